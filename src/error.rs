@@ -1,0 +1,224 @@
+//! Everything that can go wrong, as data.
+//!
+//! Two enums: a [`Failure`] is what the mathematics can do wrong in a step (it knows *what* and *where*), an [`Error`]
+//! is what reaches the caller (it adds *when*, and covers settings and files). Both name the remedy in the words of a
+//! study file through `help`.
+
+use std::path::PathBuf;
+
+/// `Result` with the library's own [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// A numerical failure inside one step. It never carries a time: the loop that knows it adds it ([`Error::Failed`]).
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// A mesh cell has a corner whose Jacobian is not positive.
+    #[error("the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {:.4}, y = {:.4}", cell[0], cell[1], x[0], x[1])]
+    Folded {
+        /// Indices of the cell along ξ and η.
+        cell: [usize; 2],
+        /// Smallest corner Jacobian of the cell over that of the uniform mesh; at most 0.
+        jacobian: f64,
+        /// Where the corner is.
+        x: [f64; 2],
+    },
+    /// A quantity stopped being finite.
+    #[error("{what} is {value} at node ({}, {}), x = {:.4}, y = {:.4}", node[0], node[1], x[0], x[1])]
+    NonFinite {
+        /// The quantity, in the reader's words.
+        what: &'static str,
+        /// The value found: NaN or ±∞.
+        value: f64,
+        /// Indices of the node along ξ and η.
+        node: [usize; 2],
+        /// Where the node is.
+        x: [f64; 2],
+    },
+    /// Newton's method did not reach its tolerance.
+    #[error("Newton's method stalled: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed")]
+    NewtonStalled {
+        /// Largest residual, in the unit of the solution.
+        residual: f64,
+        /// What was asked for.
+        tolerance: f64,
+        /// Iterations done.
+        iterations: usize,
+    },
+    /// A linear system was not solved to its tolerance by any solver at hand.
+    #[error("a linear system of {unknowns} unknowns was not solved: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed")]
+    LinearStalled {
+        /// Size of the system.
+        unknowns: usize,
+        /// Largest residual.
+        residual: f64,
+        /// What was asked for.
+        tolerance: f64,
+        /// Iterations done.
+        iterations: usize,
+    },
+    /// An array does not fit the lattice it is given with.
+    #[error("{what} has {found} values, but the lattice has {expected} nodes")]
+    WrongLength {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// Number of nodes.
+        expected: usize,
+    },
+}
+
+impl Failure {
+    /// Short name of the variant, for `summary.json`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Folded { .. } => "mesh-folded",
+            Self::NonFinite { .. } => "non-finite",
+            Self::NewtonStalled { .. } => "newton-stalled",
+            Self::LinearStalled { .. } => "linear-stalled",
+            Self::WrongLength { .. } => "wrong-length",
+        }
+    }
+
+    /// The keys of a study that may cure it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Folded { .. } => "raise monitor.smoothing, lower monitor.strength or lower time.step",
+            Self::NonFinite { .. } | Self::NewtonStalled { .. } => {
+                "lower time.step, refine grid.cells or raise monitor.smoothing"
+            }
+            Self::LinearStalled { .. } => "lower time.step or raise mesh.relaxation",
+            Self::WrongLength { .. } => "give one value a node, in lattice order",
+        }
+    }
+}
+
+/// When something happened.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Simulated time.
+    pub t: f64,
+    /// Step number; the initial state is step 0.
+    pub step: usize,
+}
+
+/// What reaches the caller.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A numerical failure, and when it happened if a time loop was running.
+    #[error("{}{failure}", at(.moment))]
+    Failed {
+        /// The failure.
+        failure: Failure,
+        /// The step that failed.
+        moment: Option<Moment>,
+    },
+    /// A setting is out of range.
+    #[error("`{key}` is {value}, but {rule}")]
+    Invalid {
+        /// Dotted key as in a study file.
+        key: String,
+        /// Value found.
+        value: String,
+        /// What must hold, and how to make it hold.
+        rule: String,
+    },
+    /// A study file (or a `--set`) is wrong at a known place.
+    #[error("{0}")]
+    Study(Box<Diagnostic>),
+    /// A file could not be read.
+    #[error("cannot read {}: {reason}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A file or directory could not be written.
+    #[error("cannot write {}: {reason}", path.display())]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The output directory holds something that no run of ours wrote.
+    #[error("{} is not empty and was not written by driftmesh (it holds {found})", path.display())]
+    ForeignDirectory {
+        /// The directory.
+        path: PathBuf,
+        /// Something found in it.
+        found: String,
+    },
+}
+
+fn at(moment: &Option<Moment>) -> String {
+    moment.map_or(String::new(), |m| format!("at t = {:.6} (step {}): ", m.t, m.step))
+}
+
+impl From<Failure> for Error {
+    fn from(failure: Failure) -> Self {
+        Self::Failed { failure, moment: None }
+    }
+}
+
+impl Error {
+    /// A setting out of range.
+    pub fn invalid(key: impl Into<String>, value: impl std::fmt::Display, rule: impl Into<String>) -> Self {
+        Self::Invalid { key: key.into(), value: value.to_string(), rule: rule.into() }
+    }
+
+    /// The same error with its key seen from one table further out: `viscosity` becomes `pde.viscosity`.
+    pub fn within(self, table: &str) -> Self {
+        match self {
+            Self::Invalid { key, value, rule } => Self::Invalid { key: format!("{table}.{key}"), value, rule },
+            other => other,
+        }
+    }
+
+    /// What to do about it, where there is one answer.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::Failed { failure, .. } => Some(failure.help().into()),
+            Self::Study(diagnostic) => diagnostic.help.clone(),
+            Self::ForeignDirectory { .. } => Some("name another directory with --out, or empty this one".into()),
+            Self::Invalid { .. } | Self::Unreadable { .. } | Self::Unwritable { .. } => None,
+        }
+    }
+
+    /// True if the computation failed (exit status 1), false if what was asked for is wrong (exit status 2).
+    pub fn is_failure(&self) -> bool {
+        matches!(self, Self::Failed { .. } | Self::Unwritable { .. })
+    }
+}
+
+/// A mistake at a place in a text, shown as the line with a caret under it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostic {
+    /// What is wrong.
+    pub message: String,
+    /// Name of the text: a file, or `--set`.
+    pub origin: String,
+    /// The line, without its end.
+    pub text: String,
+    /// Line number from 1.
+    pub line: usize,
+    /// Column of the first marked character, from 1, in characters.
+    pub column: usize,
+    /// Number of marked characters, at least 1.
+    pub width: usize,
+    /// The remedy.
+    pub help: Option<String>,
+}
+
+impl std::fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let number = self.line.to_string();
+        let gutter = " ".repeat(number.len());
+        writeln!(f, "{}", self.message)?;
+        writeln!(f, "{gutter}--> {}:{}:{}", self.origin, self.line, self.column)?;
+        writeln!(f, "{gutter} |")?;
+        writeln!(f, "{number} | {}", self.text)?;
+        write!(f, "{gutter} | {}{}", " ".repeat(self.column - 1), "^".repeat(self.width))
+    }
+}

@@ -1,0 +1,31 @@
+/// One or more unknowns at every node of a lattice
+///
+/// The values of one node stand together: component c of node k is `values[k * components + c]`. A scalar field is
+/// therefore simply one value a node in lattice order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    components: usize,
+    values: Vec<f64>,
+}
+
+impl Field {
+    /// A field of one unknown.
+    pub fn scalar(values: Vec<f64>) -> Self {
+        Self { components: 1, values }
+    }
+
+    /// Unknowns a node.
+    pub fn components(&self) -> usize {
+        self.components
+    }
+
+    /// All values, node by node.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// One unknown at all nodes.
+    pub fn component(&self, c: usize) -> impl ExactSizeIterator<Item = f64> + '_ {
+        self.values.iter().skip(c).step_by(self.components).copied()
+    }
+}

@@ -1,0 +1,103 @@
+use super::Lattice;
+use crate::error::{Error, Failure, Result};
+use std::borrow::Cow;
+
+/// A mesh: the position of every lattice node in a box
+///
+/// ```text
+/// x = x(ξ),   ξ ∈ [0, 1]^D,   x ∈ [lower, upper]
+/// ```
+///
+/// The lattice fixes the connections; only positions move. On a bounded axis the nodes of a side lie exactly on the
+/// box. On a periodic axis x(ξ + 1) = x(ξ) + (upper − lower).
+///
+/// # Example
+/// ```
+/// use driftmesh::geometry::{Lattice, Mesh};
+/// let mesh = Mesh::uniform(Lattice::bounded([4, 2])?, [0.0, 0.0], [1.0, 3.0])?;
+/// assert_eq!(mesh.x()[mesh.lattice().index([1, 1])], [0.25, 1.5]);
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mesh<const D: usize> {
+    lattice: Lattice<D>,
+    lower: [f64; D],
+    upper: [f64; D],
+    x: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Mesh<D> {
+    /// The uniform mesh of the box from `lower` to `upper`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless `lower < upper` along every axis and both are finite.
+    pub fn uniform(lattice: Lattice<D>, lower: [f64; D], upper: [f64; D]) -> Result<Self> {
+        for d in 0..D {
+            if !(lower[d].is_finite() && upper[d].is_finite() && lower[d] < upper[d]) {
+                let rule = format!("must be finite and above lower = {lower:?} along every axis");
+                return Err(Error::invalid("upper", format!("{upper:?}"), rule));
+            }
+        }
+        let cells = lattice.cells();
+        let x = (0..lattice.len())
+            .map(|k| {
+                let node = lattice.node(k);
+                std::array::from_fn(|d| match node[d] {
+                    i if i == cells[d] => upper[d], // exactly on the box
+                    i => lower[d] + (upper[d] - lower[d]) * (i as f64 / cells[d] as f64),
+                })
+            })
+            .collect();
+        Ok(Self { lattice, lower, upper, x })
+    }
+
+    /// The same lattice and box with other positions, one a node in lattice order.
+    ///
+    /// # Errors
+    /// [`Failure::WrongLength`] where the number of positions is not the number of nodes.
+    pub fn moved(&self, x: Vec<[f64; D]>) -> Result<Self, Failure> {
+        match x.len() {
+            n if n == self.lattice.len() => Ok(Self { x, ..*self }),
+            found => Err(Failure::WrongLength { what: "the mesh", found, expected: self.lattice.len() }),
+        }
+    }
+
+    /// The lattice under the mesh.
+    pub fn lattice(&self) -> &Lattice<D> {
+        &self.lattice
+    }
+
+    /// Positions of the nodes, in lattice order.
+    pub fn x(&self) -> &[[f64; D]] {
+        &self.x
+    }
+
+    /// Positions with the closing nodes of periodic axes appended, shape cells + 1: what is drawn and written.
+    pub fn closed(&self) -> Cow<'_, [[f64; D]]> {
+        let nodes = self.lattice.nodes();
+        if nodes == self.lattice.cells().map(|n| n + 1) {
+            return Cow::Borrowed(&self.x);
+        }
+        let extent = self.extent();
+        let positions = self.lattice.closed_nodes().map(|node| {
+            let x = self.x[self.lattice.index(std::array::from_fn(|d| node[d] % nodes[d]))];
+            std::array::from_fn(|d| x[d] + if node[d] == nodes[d] { extent[d] } else { 0.0 })
+        });
+        Cow::Owned(positions.collect())
+    }
+
+    /// Lower corner of the box.
+    pub fn lower(&self) -> [f64; D] {
+        self.lower
+    }
+
+    /// Upper corner of the box.
+    pub fn upper(&self) -> [f64; D] {
+        self.upper
+    }
+
+    /// Edge lengths of the box.
+    pub fn extent(&self) -> [f64; D] {
+        std::array::from_fn(|d| self.upper[d] - self.lower[d])
+    }
+}

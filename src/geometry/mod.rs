@@ -1,0 +1,16 @@
+//! Where things are: the lattice of computational nodes, the mesh over it, fields on it, and how good the mesh is.
+
+mod field;
+mod lattice;
+mod locate;
+mod mesh;
+mod patch;
+mod quality;
+
+pub use field::Field;
+pub use lattice::Lattice;
+pub(crate) use lattice::strides;
+pub use locate::interpolate;
+pub use mesh::Mesh;
+pub use patch::Patch;
+pub use quality::{Quality, cell_areas, check_unfolded, node_areas, quality};

@@ -1,0 +1,189 @@
+use super::Mesh;
+use crate::error::Failure;
+
+/// How good a mesh is
+///
+/// ```text
+/// Q(K) = ½ tr(JᵀJ) / √det(JᵀJ) ≥ 1,   J = the averaged edge vectors of cell K
+/// ```
+///
+/// Q is 1 exactly for a square cell; stretching and shearing raise it.
+///
+/// # Source
+/// (3.4) of Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation*
+/// (2015).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Largest Q over the cells.
+    pub q_max: f64,
+    /// Mean Q over the cells.
+    pub q_mean: f64,
+    /// Smallest corner Jacobian over that of the uniform mesh; positive exactly if no cell is folded.
+    pub min_scaled_jacobian: f64,
+    /// max / mean of ρ·area over the cells; 1 is perfect equidistribution.
+    pub equidistribution: f64,
+}
+
+/// Corners of a cell, counter-clockwise: (i, j), (i+1, j), (i+1, j+1), (i, j+1).
+type Corners = [[f64; 2]; 4];
+
+fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// Calls `visit(cell, corner indices, corners)` for every cell, in lattice order, on arrays of shape cells + 1.
+fn for_each_cell(mesh: &Mesh<2>, mut visit: impl FnMut([usize; 2], [usize; 4], Corners)) {
+    let x = mesh.closed();
+    let [n, m] = mesh.lattice().cells();
+    for i in 0..n {
+        for j in 0..m {
+            let k = i * (m + 1) + j;
+            let corners = [k, k + m + 1, k + m + 2, k + 1];
+            visit([i, j], corners, corners.map(|c| x[c]));
+        }
+    }
+}
+
+/// The Jacobian at each corner: the cross product of the two edges that meet there.
+fn corner_jacobians([a, b, c, d]: Corners) -> [f64; 4] {
+    let (south, east, north, west) = (minus(b, a), minus(c, b), minus(c, d), minus(d, a));
+    [cross(south, west), cross(south, east), cross(north, east), cross(north, west)]
+}
+
+fn area([a, b, c, d]: Corners) -> f64 {
+    0.5 * cross(minus(c, a), minus(d, b))
+}
+
+/// Area of the box over the number of cells: what every corner Jacobian of the uniform mesh is.
+fn uniform_jacobian(mesh: &Mesh<2>) -> f64 {
+    let ([w, h], [n, m]) = (mesh.extent(), mesh.lattice().cells());
+    w * h / (n * m) as f64
+}
+
+/// Areas of the cells, in lattice order.
+pub fn cell_areas(mesh: &Mesh<2>) -> Vec<f64> {
+    let mut areas = Vec::with_capacity(mesh.lattice().cells().iter().product());
+    for_each_cell(mesh, |_, _, corners| areas.push(area(corners)));
+    areas
+}
+
+/// Area that belongs to each node: a quarter of each cell around it. They add up to the area of the box.
+pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
+    let lattice = mesh.lattice();
+    let nodes = lattice.nodes();
+    let mut areas = vec![0.0; lattice.len()];
+    for_each_cell(mesh, |[i, j], _, corners| {
+        let share = 0.25 * area(corners);
+        for (di, dj) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+            areas[lattice.index([(i + di) % nodes[0], (j + dj) % nodes[1]])] += share;
+        }
+    });
+    areas
+}
+
+/// All quality figures of a mesh under a density `rho`, one value a node.
+///
+/// # Example
+/// ```
+/// use driftmesh::geometry::{quality, Lattice, Mesh};
+/// // cells of 1 × 2: Q = ½ (1 + 4) / 2 = 1.25
+/// let mesh = Mesh::uniform(Lattice::bounded([3, 3])?, [0.0, 0.0], [3.0, 6.0])?;
+/// let q = quality(&mesh, &vec![1.0; 16]);
+/// assert!((q.q_max - 1.25).abs() < 1e-14);
+/// assert!((q.equidistribution - 1.0).abs() < 1e-14);
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
+    let rho = mesh.lattice().closed(rho);
+    let (mut q_max, mut q_sum, mut j_min) = (0.0_f64, 0.0, f64::INFINITY);
+    let (mut share_max, mut share_sum, mut count) = (0.0_f64, 0.0, 0.0);
+    for_each_cell(mesh, |_, nodes, corners| {
+        let [a, b, c, d] = corners;
+        let e = [0, 1].map(|k| 0.5 * (b[k] - a[k] + c[k] - d[k]));
+        let f = [0, 1].map(|k| 0.5 * (d[k] - a[k] + c[k] - b[k]));
+        let q = 0.5 * (e[0] * e[0] + e[1] * e[1] + f[0] * f[0] + f[1] * f[1]) / cross(e, f).abs();
+        let share = 0.25 * nodes.iter().map(|&k| rho[k]).sum::<f64>() * area(corners);
+        q_max = q_max.max(q);
+        q_sum += q;
+        share_max = share_max.max(share);
+        share_sum += share;
+        count += 1.0;
+        j_min = corner_jacobians(corners).into_iter().fold(j_min, f64::min);
+    });
+    Quality {
+        q_max,
+        q_mean: q_sum / count,
+        min_scaled_jacobian: j_min / uniform_jacobian(mesh),
+        equidistribution: share_max * count / share_sum,
+    }
+}
+
+/// Refuses a mesh with a node that is not finite or a cell that is folded.
+///
+/// # Errors
+/// [`Failure::NonFinite`] for the first such node, else [`Failure::Folded`] for the worst cell.
+pub fn check_unfolded(mesh: &Mesh<2>) -> Result<(), Failure> {
+    if let Some(k) = mesh.x().iter().position(|x| !x.iter().all(|v| v.is_finite())) {
+        let x = mesh.x()[k];
+        let value = if x[0].is_finite() { x[1] } else { x[0] };
+        return Err(Failure::NonFinite { what: "the mesh", value, node: mesh.lattice().node(k), x });
+    }
+    let mut worst: Option<(f64, [usize; 2], [f64; 2])> = None;
+    for_each_cell(mesh, |cell, _, corners| {
+        for (jacobian, x) in corner_jacobians(corners).into_iter().zip(corners) {
+            if jacobian <= worst.map_or(0.0, |w| w.0) {
+                worst = Some((jacobian, cell, x));
+            }
+        }
+    });
+    match worst {
+        None => Ok(()),
+        Some((jacobian, cell, x)) => Err(Failure::Folded { cell, jacobian: jacobian / uniform_jacobian(mesh), x }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Lattice;
+
+    fn square(cells: usize) -> Mesh<2> {
+        Mesh::uniform(Lattice::bounded([cells, cells]).unwrap(), [0.0, 0.0], [1.0, 1.0]).unwrap()
+    }
+
+    /// A shear of the unit square by s has J = [[1, s], [0, 1]], so Q = ½ (2 + s²) and every Jacobian ratio is 1.
+    #[test]
+    fn a_sheared_mesh_has_the_q_of_its_shear() {
+        let mesh = square(4);
+        let sheared = mesh.moved(mesh.x().iter().map(|&[x, y]| [x + 0.5 * y, y]).collect()).unwrap();
+        let q = quality(&sheared, &[1.0; 25]);
+        assert!((q.q_max - 1.125).abs() < 1e-14 && (q.q_mean - 1.125).abs() < 1e-14);
+        assert!((q.min_scaled_jacobian - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn node_areas_add_up_to_the_box() {
+        let mesh = square(5);
+        let moved = mesh.moved(mesh.x().iter().map(|&[x, y]| [x * x, (y + 0.2 * x * (1.0 - y) * y)]).collect()).unwrap();
+        assert!((node_areas(&moved).iter().sum::<f64>() - 1.0).abs() < 1e-14);
+        assert!((cell_areas(&moved).iter().sum::<f64>() - 1.0).abs() < 1e-14);
+    }
+
+    /// Moving node (2, 2) of a 4 × 4 mesh past (3, 3) folds the cell between them.
+    #[test]
+    fn a_folded_cell_is_named() {
+        let mesh = square(4);
+        let mut x = mesh.x().to_vec();
+        x[12] = [0.8, 0.8];
+        let error = check_unfolded(&mesh.moved(x.clone()).unwrap()).unwrap_err();
+        assert!(matches!(error, Failure::Folded { cell: [2, 2], jacobian, .. } if jacobian < 0.0), "{error}");
+        x[12] = [f64::NAN, 0.5];
+        let error = check_unfolded(&mesh.moved(x).unwrap()).unwrap_err();
+        assert!(matches!(error, Failure::NonFinite { node: [2, 2], .. }), "{error}");
+        assert!(check_unfolded(&mesh).is_ok());
+    }
+}

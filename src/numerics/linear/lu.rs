@@ -1,0 +1,97 @@
+use super::{LatticeMatrix, LinearSolver, largest};
+use crate::error::Failure;
+use crate::geometry::Patch;
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
+use faer::sparse::{SparseColMat, Triplet};
+
+/// Sparse LU by faer: the oracle of the tests, and the last resort where an iteration stalls
+///
+/// The symbolic factorisation is kept while the patch stays the same. Runs on one thread, so that its bits do not
+/// depend on their number.
+#[derive(Default)]
+pub struct SparseLu {
+    symbolic: Option<(Vec<usize>, SymbolicLu<usize>)>,
+}
+
+impl std::fmt::Debug for SparseLu {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SparseLu").field("analysed", &self.symbolic.as_ref().map(|s| &s.0)).finish()
+    }
+}
+
+impl SparseLu {
+    fn factorise<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> Option<Lu<usize, f64>> {
+        let matrix = assemble(a)?;
+        let wraps = a.patch.wraps.iter().map(|&w| usize::from(w));
+        let pattern: Vec<usize> = a.patch.size.into_iter().chain(wraps).chain([S]).collect();
+        if self.symbolic.as_ref().is_none_or(|(known, _)| *known != pattern) {
+            self.symbolic = Some((pattern, SymbolicLu::try_new(matrix.symbolic()).ok()?));
+        }
+        let (_, symbolic) = self.symbolic.as_ref()?;
+        Lu::try_new_with_symbolic(symbolic.clone(), matrix.as_ref()).ok()
+    }
+}
+
+/// The matrix on the unknowns alone; entries for the ring are dropped, since corrections vanish there.
+fn assemble<const D: usize, const S: usize>(a: &LatticeMatrix<D, S>) -> Option<SparseColMat<usize, f64>> {
+    let Patch { size, wraps, .. } = a.patch;
+    let strides = crate::geometry::strides(size);
+    let mut entries = Vec::with_capacity(a.rows.len() * S);
+    for (i, row) in a.rows.iter().enumerate() {
+        'points: for (point, &value) in LatticeMatrix::<D, S>::POINTS.iter().zip(row) {
+            let mut column = 0;
+            for d in 0..D {
+                let k = (i / strides[d] % size[d]) as isize + point[d];
+                let n = size[d] as isize;
+                if !wraps[d] && !(0..n).contains(&k) {
+                    continue 'points;
+                }
+                column += k.rem_euclid(n) as usize * strides[d];
+            }
+            entries.push(Triplet::new(i, column, value));
+        }
+    }
+    SparseColMat::try_new_from_triplets(a.rows.len(), a.rows.len(), &entries).ok()
+}
+
+impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for SparseLu {
+    fn solve(
+        &mut self,
+        a: &LatticeMatrix<D, S>,
+        b: &[[f64; K]],
+        x: &mut [[f64; K]],
+        tolerance: f64,
+    ) -> Result<usize, Failure> {
+        let n = a.patch.pencil_len();
+        let mut r = vec![[0.0; K]; a.patch.padded_len()];
+        let mut size = largest(a.residual(b, x, &mut r));
+        if size <= tolerance {
+            return Ok(0);
+        }
+        if let Some(lu) = self.factorise(a) {
+            // one pass solves; more refine what round-off left
+            for _pass in 0..3 {
+                let mut unknowns = faer::Mat::<f64>::zeros(a.rows.len(), K);
+                let places = || a.patch.pencils().flat_map(|start| start..start + n).enumerate();
+                for (i, k) in places() {
+                    (0..K).for_each(|c| unknowns[(i, c)] = r[k][c]);
+                }
+                lu.solve_in_place(&mut unknowns);
+                let mut correction = vec![[0.0; K]; a.patch.padded_len()];
+                for (i, k) in places() {
+                    correction[k] = std::array::from_fn(|c| unknowns[(i, c)]);
+                }
+                a.patch.wrap(&mut correction);
+                for (x, e) in x.iter_mut().zip(&correction) {
+                    (0..K).for_each(|c| x[c] += e[c]);
+                }
+                size = largest(a.residual(b, x, &mut r));
+                if size <= tolerance {
+                    return Ok(0);
+                }
+            }
+        }
+        Err(Failure::LinearStalled { unknowns: a.rows.len() * K, residual: size, tolerance, iterations: 0 })
+    }
+}

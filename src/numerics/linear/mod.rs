@@ -1,0 +1,159 @@
+//! Linear systems on a patch of the lattice.
+//!
+//! A [`LatticeMatrix`] couples every unknown of a [`Patch`] to its nearest neighbours. [`LinearSolver`] is the seam:
+//! [`Bicgstab`] is the fast way, [`SparseLu`] the oracle and the last resort, [`Fallback`] one after the other.
+
+mod adi;
+mod bicgstab;
+mod lu;
+
+pub use bicgstab::Bicgstab;
+pub use lu::SparseLu;
+
+use crate::error::Failure;
+use crate::geometry::Patch;
+
+/// A matrix whose rows couple a node of a patch to itself and its nearest neighbours
+///
+/// Each row holds S coefficients. The first 2D + 1 belong to the star: the node, then its neighbours below and above
+/// along each axis in turn. In two dimensions S = 9 adds the corners (−,−), (−,+), (+,−), (+,+).
+///
+/// Rows are scaled such that the identity of `I − Δt A` is there with weight one; solvers rely on it.
+#[derive(Debug, Clone)]
+pub struct LatticeMatrix<const D: usize, const S: usize> {
+    /// The unknowns.
+    pub patch: Patch<D>,
+    /// One row an unknown, last axis fastest.
+    pub rows: Vec<[f64; S]>,
+}
+
+impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
+    /// A matrix of zeros.
+    pub fn zero(patch: Patch<D>) -> Self {
+        Self { patch, rows: vec![[0.0; S]; patch.len()] }
+    }
+
+    /// Steps to the S points of the stencil, in units of nodes along each axis.
+    pub const POINTS: [[isize; D]; S] = {
+        assert!(S == 2 * D + 1 || (D == 2 && S == 9), "a star, or the nine points of two dimensions");
+        let mut points = [[0; D]; S];
+        let mut d = 0;
+        while d < D {
+            points[1 + 2 * d][d] = -1;
+            points[2 + 2 * d][d] = 1;
+            d += 1;
+        }
+        let mut corner = 2 * D + 1;
+        while corner < S {
+            let c = corner - (2 * D + 1);
+            points[corner][0] = if c < 2 { -1 } else { 1 };
+            points[corner][1] = if c.is_multiple_of(2) { -1 } else { 1 };
+            corner += 1;
+        }
+        points
+    };
+
+    /// Steps to the S points in a padded vector.
+    pub fn offsets(&self) -> [isize; S] {
+        let strides = self.patch.padded_strides();
+        Self::POINTS.map(|p| (0..D).map(|d| p[d] * strides[d] as isize).sum())
+    }
+
+    /// Sets the unknowns of `out` to `combine(A x, their place in rows, their place in a padded vector)`.
+    fn apply<const K: usize>(&self, x: &[[f64; K]], mut out: impl FnMut(usize, usize, [f64; K])) {
+        let offsets = self.offsets();
+        let n = self.patch.pencil_len();
+        for (p, start) in self.patch.pencils().enumerate() {
+            let rows = &self.rows[p * n..(p + 1) * n];
+            let neighbours: [&[[f64; K]]; S] = offsets.map(|o| {
+                let first = start.wrapping_add_signed(o);
+                &x[first..first + n]
+            });
+            for (j, row) in rows.iter().enumerate() {
+                let mut sum = [0.0; K];
+                for s in 0..S {
+                    for c in 0..K {
+                        sum[c] += row[s] * neighbours[s][j][c];
+                    }
+                }
+                out(p * n + j, start + j, sum);
+            }
+        }
+    }
+
+    /// `out` = A x on the unknowns of padded vectors.
+    pub fn multiply<const K: usize>(&self, x: &[[f64; K]], out: &mut [[f64; K]]) {
+        self.apply(x, |_, k, ax| out[k] = ax);
+    }
+
+    /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown; returns the largest |b − A x| of each
+    /// right-hand side, NaN where there is one.
+    pub fn residual<const K: usize>(&self, b: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) -> [f64; K] {
+        let mut largest = [0.0; K];
+        self.apply(x, |i, k, ax| {
+            for c in 0..K {
+                out[k][c] = b[i][c] - ax[c];
+                largest[c] = larger(largest[c], out[k][c]);
+            }
+        });
+        largest
+    }
+}
+
+/// max(m, |r|) that keeps a NaN.
+fn larger(m: f64, r: f64) -> f64 {
+    if r.abs() <= m { m } else { r.abs() }
+}
+
+fn largest<const K: usize>(sizes: [f64; K]) -> f64 {
+    sizes.into_iter().fold(0.0, larger)
+}
+
+/// Solves A x = b for K right-hand sides that share one matrix
+///
+/// `b` has one value an unknown. `x` is padded: on entry its ring holds the known values and its unknowns the guess; on
+/// success its unknowns hold the solution, and the images of wrapping axes have moved along. The largest residual is then at most `tolerance`, in the unit of b, checked
+/// on the solution itself. Returns the number of iterations, 0 for a direct method.
+///
+/// # Errors
+/// [`Failure::LinearStalled`] with the residual reached; `x` then holds no solution.
+pub trait LinearSolver<const D: usize, const S: usize, const K: usize>: Send {
+    /// See the trait.
+    fn solve(
+        &mut self,
+        a: &LatticeMatrix<D, S>,
+        b: &[[f64; K]],
+        x: &mut [[f64; K]],
+        tolerance: f64,
+    ) -> Result<usize, Failure>;
+}
+
+/// One solver, and another for the systems on which the first fails.
+#[derive(Debug, Default)]
+pub struct Fallback<First, Then>(First, Then);
+
+/// What the library uses: fast where it converges, direct where it does not.
+pub type Robust<const K: usize> = Fallback<Bicgstab<K>, SparseLu>;
+
+impl<const D: usize, const S: usize, const K: usize, First, Then> LinearSolver<D, S, K> for Fallback<First, Then>
+where
+    First: LinearSolver<D, S, K>,
+    Then: LinearSolver<D, S, K>,
+{
+    fn solve(
+        &mut self,
+        a: &LatticeMatrix<D, S>,
+        b: &[[f64; K]],
+        x: &mut [[f64; K]],
+        tolerance: f64,
+    ) -> Result<usize, Failure> {
+        let guess = x.to_vec();
+        self.0.solve(a, b, x, tolerance).or_else(|_| {
+            x.copy_from_slice(&guess);
+            self.1.solve(a, b, x, tolerance)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

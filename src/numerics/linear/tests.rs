@@ -1,0 +1,91 @@
+use super::*;
+use proptest::prelude::*;
+
+/// A matrix like the library's own: I plus diffusion of strength `a` and skewed couplings, corners if S has them.
+fn sample<const S: usize>(size: [usize; 2], wraps: [bool; 2], a: f64, seed: u64) -> LatticeMatrix<2, S> {
+    let mut matrix = LatticeMatrix::zero(Patch { origin: [1, 1], size, wraps });
+    let mut state = seed;
+    for row in &mut matrix.rows {
+        for entry in &mut row[1..] {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            *entry = -a * (0.2 + (state >> 40) as f64 / (1_u64 << 24) as f64);
+        }
+        for corner in &mut row[5.min(S)..] {
+            *corner *= 0.1;
+        }
+        row[0] = 1.0 - row[1..].iter().sum::<f64>();
+    }
+    matrix
+}
+
+fn wave(n: usize) -> Vec<[f64; 2]> {
+    (0..n).map(|k| [(0.37 * k as f64).sin(), 1.0 + (0.11 * k as f64).cos()]).collect()
+}
+
+fn compare<const S: usize>(matrix: &LatticeMatrix<2, S>) {
+    let b = wave(matrix.rows.len());
+    let mut fast = wave(matrix.patch.padded_len());
+    matrix.patch.wrap(&mut fast);
+    let mut exact = fast.clone();
+    Bicgstab::default().solve(matrix, &b, &mut fast, 1e-12).expect("the iteration converges");
+    SparseLu::default().solve(matrix, &b, &mut exact, 1e-12).expect("the factorisation exists");
+    for (f, e) in fast.as_flattened().iter().zip(exact.as_flattened()) {
+        assert!((f - e).abs() < 1e-10, "{f} against {e}");
+    }
+}
+
+proptest! {
+    /// The fast solver and the direct one agree to 1e-10 on stars and nine points, bounded and wrapped, any strength.
+    #[test]
+    fn both_solvers_agree(n in 2_usize..24, m in 2_usize..24, wx: bool, wy: bool, log_a in -2.0..2.0_f64, seed: u64) {
+        compare(&sample::<5>([n, m], [wx, wy], 10_f64.powf(log_a), seed));
+        compare(&sample::<9>([n, m], [wx, wy], 10_f64.powf(log_a), seed));
+    }
+}
+
+/// In one dimension the alternating-direction factorisation is the inverse itself: one iteration, any strength.
+#[test]
+fn one_dimension_takes_one_iteration() {
+    for a in [0.1, 10.0, 1e4] {
+        let mut matrix = LatticeMatrix::<1, 3>::zero(Patch { origin: [1], size: [40], wraps: [false] });
+        matrix.rows.fill([1.0 + 2.0 * a, -0.9 * a, -1.1 * a]);
+        let mut x = vec![[0.0]; 42];
+        x[41] = [1.0];
+        let iterations = Bicgstab::default().solve(&matrix, &[[0.5]; 40], &mut x, 1e-11).unwrap();
+        assert_eq!(iterations, 1, "a = {a}");
+    }
+}
+
+/// A right-hand side gets the same bits alone and beside another one.
+#[test]
+fn right_hand_sides_do_not_disturb_each_other() {
+    let matrix = sample::<5>([17, 13], [false, true], 3.0, 7);
+    let b = wave(matrix.rows.len());
+    let mut both = vec![[0.0; 2]; matrix.patch.padded_len()];
+    Bicgstab::default().solve(&matrix, &b, &mut both, 1e-9).unwrap();
+    for c in 0..2 {
+        let alone: Vec<[f64; 1]> = b.iter().map(|b| [b[c]]).collect();
+        let mut x = vec![[0.0]; matrix.patch.padded_len()];
+        Bicgstab::default().solve(&matrix, &alone, &mut x, 1e-9).unwrap();
+        assert!(x.iter().zip(&both).all(|(x, both)| x[0].to_bits() == both[c].to_bits()));
+    }
+}
+
+/// A singular matrix is reported with its residual, never returned as a solution.
+#[test]
+fn a_singular_system_is_refused() {
+    let matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1, 1], size: [4, 4], wraps: [false; 2] });
+    let mut x = vec![[0.0]; 36];
+    let error = Robust::default().solve(&matrix, &[[1.0]; 16], &mut x, 1e-10).unwrap_err();
+    assert!(matches!(error, Failure::LinearStalled { unknowns: 16, .. }), "{error}");
+}
+
+/// Where the fast solver cannot start (no positive pivots), the direct one steps in.
+#[test]
+fn the_fallback_solves_what_the_iteration_cannot() {
+    let mut matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1, 1], size: [5, 4], wraps: [false; 2] });
+    matrix.rows.fill([-3.0, 1.0, 0.5, 0.25, 0.125]);
+    let mut x = vec![[0.0]; 42];
+    assert!(Bicgstab::default().solve(&matrix, &[[1.0]; 20], &mut x, 1e-12).is_err());
+    Robust::default().solve(&matrix, &[[1.0]; 20], &mut x, 1e-12).unwrap();
+}
