@@ -1,7 +1,13 @@
 //! Moving meshes for time-dependent partial differential equations.
 
+pub mod density;
 pub mod error;
 pub mod geometry;
+mod kind;
+pub mod meshing;
 pub mod numerics;
+pub mod physics;
+mod work;
 
 pub use error::{Error, Failure, Result};
+pub use work::Work;

@@ -24,6 +24,11 @@ impl Field {
         &self.values
     }
 
+    /// All values, to be changed.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// One unknown at all nodes.
     pub fn component(&self, c: usize) -> impl ExactSizeIterator<Item = f64> + '_ {
         self.values.iter().skip(c).step_by(self.components).copied()

@@ -71,43 +71,70 @@ impl<const D: usize> Patch<D> {
         (0..self.pencil_count()).map(|p| self.pencil(p))
     }
 
-    /// Gathers nodal values into a padded vector, ring included; `jump[d]` is added on wrapping around axis d.
+    /// Nodal values as a padded vector, ring included; `jump[d]` is added on wrapping around axis d.
     pub fn gather<const K: usize>(&self, lattice: &Lattice<D>, values: &[[f64; K]], jump: [[f64; K]; D]) -> Vec<[f64; K]> {
-        let nodes = lattice.nodes();
-        let node_strides = lattice.strides();
-        let strides = self.padded_strides();
-        (0..self.padded_len())
-            .map(|k| {
-                let mut index = 0;
-                let mut offset = [0.0; K];
-                for d in 0..D {
-                    // position on the lattice, shifted by one period so that the ring below the origin is not negative
-                    let i = self.origin[d] + nodes[d] + k / strides[d] % (self.size[d] + 2) - 1;
-                    index += i % nodes[d] * node_strides[d];
-                    let turns = (i / nodes[d]) as f64 - 1.0;
-                    if turns != 0.0 {
-                        for c in 0..K {
-                            offset[c] += turns * jump[d][c];
-                        }
-                    }
+        let mut padded = Vec::with_capacity(self.padded_len());
+        self.for_each_padded(lattice, |index, turns| {
+            let mut value = values[index];
+            if turns != [0; D] {
+                for (turns, jump) in turns.iter().zip(jump) {
+                    (0..K).for_each(|c| value[c] += f64::from(*turns) * jump[c]);
                 }
-                std::array::from_fn(|c| values[index][c] + offset[c])
-            })
-            .collect()
+            }
+            padded.push(value);
+        });
+        padded
+    }
+
+    /// Calls `visit(index of the node, turns around each axis)` for every place of a padded vector in turn.
+    fn for_each_padded(&self, lattice: &Lattice<D>, mut visit: impl FnMut(usize, [i32; D])) {
+        let (nodes, strides) = (lattice.nodes(), lattice.strides());
+        let mut place = [0; D];
+        loop {
+            let mut index = 0;
+            let mut turns = [0; D];
+            for d in 0..D {
+                // one period more, so that the ring below the origin is not negative
+                let i = self.origin[d] + nodes[d] + place[d] - 1;
+                index += i % nodes[d] * strides[d];
+                turns[d] = (i / nodes[d]) as i32 - 1;
+            }
+            visit(index, turns);
+            let mut d = D - 1;
+            while place[d] == self.size[d] + 1 {
+                place[d] = 0;
+                if d == 0 {
+                    return;
+                }
+                d -= 1;
+            }
+            place[d] += 1;
+        }
+    }
+
+    /// Indices of the nodes of the unknowns, last axis fastest.
+    pub fn nodes(&self, lattice: &Lattice<D>) -> impl Iterator<Item = usize> {
+        let (strides, n) = (lattice.strides(), self.pencil_len());
+        (0..self.pencil_count()).flat_map(move |p| {
+            let mut rest = p;
+            let mut first = self.origin[D - 1];
+            for d in (0..D - 1).rev() {
+                first += (rest % self.size[d] + self.origin[d]) * strides[d];
+                rest /= self.size[d];
+            }
+            first..first + n
+        })
+    }
+
+    /// Places of the unknowns in a padded vector, last axis fastest.
+    pub fn places(&self) -> impl Iterator<Item = usize> {
+        self.pencils().flat_map(|start| start..start + self.pencil_len())
     }
 
     /// Writes the unknowns of a padded vector back to their nodes.
     pub fn scatter<T: Copy>(&self, lattice: &Lattice<D>, padded: &[T], values: &mut [T]) {
-        let node_strides = lattice.strides();
-        let n = self.pencil_len();
-        for (p, start) in self.pencils().enumerate() {
-            let mut rest = p;
-            let mut index = self.origin[D - 1];
-            for d in (0..D - 1).rev() {
-                index += (rest % self.size[d] + self.origin[d]) * node_strides[d];
-                rest /= self.size[d];
-            }
-            values[index..index + n].copy_from_slice(&padded[start..start + n]);
+        for (node, place) in self.nodes(lattice).zip(self.places()) {
+            values[node] = padded[place];
         }
     }
 

@@ -1,6 +1,7 @@
 //! Second-order differences on the lattice, and the metrics of a mesh that follow from them.
 
 use crate::geometry::{Lattice, Mesh};
+use serde::{Deserialize, Serialize};
 
 /// Derivative along one axis of the lattice at every node
 ///
@@ -49,6 +50,39 @@ pub fn derivative<const D: usize, const K: usize>(
         }
     }
     out
+}
+
+/// How ∇_ξρ/ρ is differenced.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gradient {
+    /// Central differences of ρ over ρ.
+    #[default]
+    Central,
+    /// Central differences of ln ρ; bounded by half the jump of ln ρ over two cells, however steep ρ is.
+    Log,
+}
+
+impl Gradient {
+    /// b = ∇_ξρ/ρ at every node.
+    pub fn of_log<const D: usize>(self, lattice: &Lattice<D>, rho: &[f64]) -> Vec<[f64; D]> {
+        let logarithm: Vec<f64>;
+        let potential = match self {
+            Self::Central => rho,
+            Self::Log => {
+                logarithm = rho.iter().map(|r| r.ln()).collect();
+                &logarithm
+            }
+        };
+        let mut b = vec![[0.0; D]; rho.len()];
+        for d in 0..D {
+            let slopes = derivative(lattice, potential.as_chunks::<1>().0, d, [0.0]);
+            for ((b, [slope]), rho) in b.iter_mut().zip(slopes).zip(rho) {
+                b[d] = if self == Self::Central { slope / rho } else { slope };
+            }
+        }
+        b
+    }
 }
 
 /// Nodal metrics of a two-dimensional mesh

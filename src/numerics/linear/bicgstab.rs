@@ -1,4 +1,4 @@
-use super::{LatticeMatrix, LinearSolver, adi::Adi, larger, largest};
+use super::{LatticeMatrix, LinearSolver, adi::Adi, larger, solved, stalled};
 use crate::error::Failure;
 use crate::geometry::Patch;
 
@@ -9,7 +9,7 @@ use crate::geometry::Patch;
 ///
 /// # Source
 /// van der Vorst, *Bi-CGSTAB: a fast and smoothly converging variant of Bi-CG* (1992); Peaceman and Rachford (1955).
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Bicgstab<const K: usize> {
     adi: Adi,
     space: [Vec<[f64; K]>; 6],
@@ -23,12 +23,9 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
         a: &LatticeMatrix<D, S>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
-        tolerance: f64,
+        tolerance: [f64; K],
     ) -> Result<usize, Failure> {
         let patch = &a.patch;
-        let stalled = |residual: f64, iterations: usize| {
-            Err(Failure::LinearStalled { unknowns: patch.len() * K, residual, tolerance, iterations })
-        };
         let Self { adi, space } = self;
         for v in space.iter_mut() {
             v.clear();
@@ -36,11 +33,11 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
         }
         let [r, shadow, p, v, t, hat] = space;
         let mut sizes = a.residual(b, x, r);
-        if largest(sizes) <= tolerance {
+        if solved(sizes, tolerance) {
             return Ok(0);
         }
-        if !largest(sizes).is_finite() || !adi.factorise(a) {
-            return stalled(largest(sizes), 0);
+        if !sizes.iter().all(|s| s.is_finite()) || !adi.factorise(a) {
+            return Err(stalled(a.rows.len(), sizes, tolerance, 0));
         }
         let mut iterations = 0;
         // The recursive residual drifts from the true one by round-off; a restart from the true one closes the gap.
@@ -48,9 +45,9 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
             shadow.copy_from_slice(r);
             p.copy_from_slice(r);
             let mut rho = dot(patch, shadow, r);
-            while largest(sizes) > tolerance {
+            while !solved(sizes, tolerance) {
                 iterations += 1;
-                let active = sizes.map(|size| size > tolerance);
+                let active = std::array::from_fn(|c| sizes[c] > tolerance[c]);
                 precondition(adi, patch, p, hat);
                 a.multiply(hat, v);
                 let alpha = divide(active, rho, dot(patch, shadow, v));
@@ -64,16 +61,16 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
                 let rho_before = std::mem::replace(&mut rho, dot(patch, shadow, r));
                 let (gain, step) = (divide(active, rho, rho_before), divide(active, alpha, omega));
                 update(patch, p, |k, c, p| r[k][c] + gain[c] * step[c] * (p - omega[c] * v[k][c]));
-                if iterations == MAX_ITERATIONS || !largest(sizes).is_finite() {
-                    return stalled(largest(sizes), iterations);
+                if iterations == MAX_ITERATIONS || !sizes.iter().all(|s| s.is_finite()) {
+                    return Err(stalled(a.rows.len(), sizes, tolerance, iterations));
                 }
             }
             sizes = a.residual(b, x, r);
-            if largest(sizes) <= tolerance {
+            if solved(sizes, tolerance) {
                 return Ok(iterations);
             }
         }
-        stalled(largest(sizes), iterations)
+        Err(stalled(a.rows.len(), sizes, tolerance, iterations))
     }
 }
 

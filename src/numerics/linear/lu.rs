@@ -1,4 +1,4 @@
-use super::{LatticeMatrix, LinearSolver, largest};
+use super::{LatticeMatrix, LinearSolver, solved, stalled};
 use crate::error::Failure;
 use crate::geometry::Patch;
 use faer::linalg::solvers::Solve;
@@ -9,7 +9,7 @@ use faer::sparse::{SparseColMat, Triplet};
 ///
 /// The symbolic factorisation is kept while the patch stays the same. Runs on one thread, so that its bits do not
 /// depend on their number.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct SparseLu {
     symbolic: Option<(Vec<usize>, SymbolicLu<usize>)>,
 }
@@ -61,12 +61,12 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for S
         a: &LatticeMatrix<D, S>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
-        tolerance: f64,
+        tolerance: [f64; K],
     ) -> Result<usize, Failure> {
         let n = a.patch.pencil_len();
         let mut r = vec![[0.0; K]; a.patch.padded_len()];
-        let mut size = largest(a.residual(b, x, &mut r));
-        if size <= tolerance {
+        let mut sizes = a.residual(b, x, &mut r);
+        if solved(sizes, tolerance) {
             return Ok(0);
         }
         if let Some(lu) = self.factorise(a) {
@@ -86,12 +86,12 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for S
                 for (x, e) in x.iter_mut().zip(&correction) {
                     (0..K).for_each(|c| x[c] += e[c]);
                 }
-                size = largest(a.residual(b, x, &mut r));
-                if size <= tolerance {
+                sizes = a.residual(b, x, &mut r);
+                if solved(sizes, tolerance) {
                     return Ok(0);
                 }
             }
         }
-        Err(Failure::LinearStalled { unknowns: a.rows.len() * K, residual: size, tolerance, iterations: 0 })
+        Err(stalled(a.rows.len(), sizes, tolerance, 0))
     }
 }

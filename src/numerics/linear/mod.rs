@@ -105,15 +105,23 @@ fn larger(m: f64, r: f64) -> f64 {
     if r.abs() <= m { m } else { r.abs() }
 }
 
-fn largest<const K: usize>(sizes: [f64; K]) -> f64 {
-    sizes.into_iter().fold(0.0, larger)
+/// True where every right-hand side has met its tolerance; false where one is NaN.
+fn solved<const K: usize>(sizes: [f64; K], tolerance: [f64; K]) -> bool {
+    sizes.iter().zip(tolerance).all(|(size, tolerance)| *size <= tolerance)
+}
+
+/// The failure of a solve, named by the right-hand side that is furthest from its tolerance.
+fn stalled<const K: usize>(unknowns: usize, sizes: [f64; K], tolerance: [f64; K], iterations: usize) -> Failure {
+    let miss = |c: &usize| sizes[*c] / tolerance[*c];
+    let worst = (0..K).max_by(|a, b| miss(a).total_cmp(&miss(b))).unwrap_or(0);
+    Failure::LinearStalled { unknowns, residual: sizes[worst], tolerance: tolerance[worst], iterations }
 }
 
 /// Solves A x = b for K right-hand sides that share one matrix
 ///
 /// `b` has one value an unknown. `x` is padded: on entry its ring holds the known values and its unknowns the guess; on
-/// success its unknowns hold the solution, and the images of wrapping axes have moved along. The largest residual is then at most `tolerance`, in the unit of b, checked
-/// on the solution itself. Returns the number of iterations, 0 for a direct method.
+/// success its unknowns hold the solution, and the images of wrapping axes have moved along. The largest residual of right-hand side c is then at most
+/// `tolerance[c]`, in the unit of b, checked on the solution itself. Returns the number of iterations, 0 for a direct method.
 ///
 /// # Errors
 /// [`Failure::LinearStalled`] with the residual reached; `x` then holds no solution.
@@ -124,12 +132,12 @@ pub trait LinearSolver<const D: usize, const S: usize, const K: usize>: Send {
         a: &LatticeMatrix<D, S>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
-        tolerance: f64,
+        tolerance: [f64; K],
     ) -> Result<usize, Failure>;
 }
 
 /// One solver, and another for the systems on which the first fails.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Fallback<First, Then>(First, Then);
 
 /// What the library uses: fast where it converges, direct where it does not.
@@ -145,7 +153,7 @@ where
         a: &LatticeMatrix<D, S>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
-        tolerance: f64,
+        tolerance: [f64; K],
     ) -> Result<usize, Failure> {
         let guess = x.to_vec();
         self.0.solve(a, b, x, tolerance).or_else(|_| {

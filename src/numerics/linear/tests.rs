@@ -27,8 +27,8 @@ fn compare<const S: usize>(matrix: &LatticeMatrix<2, S>) {
     let mut fast = wave(matrix.patch.padded_len());
     matrix.patch.wrap(&mut fast);
     let mut exact = fast.clone();
-    Bicgstab::default().solve(matrix, &b, &mut fast, 1e-12).expect("the iteration converges");
-    SparseLu::default().solve(matrix, &b, &mut exact, 1e-12).expect("the factorisation exists");
+    Bicgstab::default().solve(matrix, &b, &mut fast, [1e-12; 2]).expect("the iteration converges");
+    SparseLu::default().solve(matrix, &b, &mut exact, [1e-12; 2]).expect("the factorisation exists");
     for (f, e) in fast.as_flattened().iter().zip(exact.as_flattened()) {
         assert!((f - e).abs() < 1e-10, "{f} against {e}");
     }
@@ -51,7 +51,7 @@ fn one_dimension_takes_one_iteration() {
         matrix.rows.fill([1.0 + 2.0 * a, -0.9 * a, -1.1 * a]);
         let mut x = vec![[0.0]; 42];
         x[41] = [1.0];
-        let iterations = Bicgstab::default().solve(&matrix, &[[0.5]; 40], &mut x, 1e-11).unwrap();
+        let iterations = Bicgstab::default().solve(&matrix, &[[0.5]; 40], &mut x, [1e-11]).unwrap();
         assert_eq!(iterations, 1, "a = {a}");
     }
 }
@@ -62,11 +62,11 @@ fn right_hand_sides_do_not_disturb_each_other() {
     let matrix = sample::<5>([17, 13], [false, true], 3.0, 7);
     let b = wave(matrix.rows.len());
     let mut both = vec![[0.0; 2]; matrix.patch.padded_len()];
-    Bicgstab::default().solve(&matrix, &b, &mut both, 1e-9).unwrap();
+    Bicgstab::default().solve(&matrix, &b, &mut both, [1e-9; 2]).unwrap();
     for c in 0..2 {
         let alone: Vec<[f64; 1]> = b.iter().map(|b| [b[c]]).collect();
         let mut x = vec![[0.0]; matrix.patch.padded_len()];
-        Bicgstab::default().solve(&matrix, &alone, &mut x, 1e-9).unwrap();
+        Bicgstab::default().solve(&matrix, &alone, &mut x, [1e-9]).unwrap();
         assert!(x.iter().zip(&both).all(|(x, both)| x[0].to_bits() == both[c].to_bits()));
     }
 }
@@ -76,7 +76,7 @@ fn right_hand_sides_do_not_disturb_each_other() {
 fn a_singular_system_is_refused() {
     let matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1, 1], size: [4, 4], wraps: [false; 2] });
     let mut x = vec![[0.0]; 36];
-    let error = Robust::default().solve(&matrix, &[[1.0]; 16], &mut x, 1e-10).unwrap_err();
+    let error = Robust::default().solve(&matrix, &[[1.0]; 16], &mut x, [1e-10]).unwrap_err();
     assert!(matches!(error, Failure::LinearStalled { unknowns: 16, .. }), "{error}");
 }
 
@@ -86,6 +86,6 @@ fn the_fallback_solves_what_the_iteration_cannot() {
     let mut matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1, 1], size: [5, 4], wraps: [false; 2] });
     matrix.rows.fill([-3.0, 1.0, 0.5, 0.25, 0.125]);
     let mut x = vec![[0.0]; 42];
-    assert!(Bicgstab::default().solve(&matrix, &[[1.0]; 20], &mut x, 1e-12).is_err());
-    Robust::default().solve(&matrix, &[[1.0]; 20], &mut x, 1e-12).unwrap();
+    assert!(Bicgstab::default().solve(&matrix, &[[1.0]; 20], &mut x, [1e-12]).is_err());
+    Robust::default().solve(&matrix, &[[1.0]; 20], &mut x, [1e-12]).unwrap();
 }

@@ -1,0 +1,103 @@
+use super::{Monitor, smooth};
+use crate::error::{Error, Failure, Result};
+use crate::geometry::Mesh;
+use crate::numerics::difference::{Gradient, Metrics};
+use serde::{Deserialize, Serialize};
+
+/// Arc-length density
+///
+/// ```text
+/// ρ = √(1 + α |∇u|²)
+/// ```
+///
+/// followed by `smoothing` passes of the filter [`smooth`]. α ≥ 0 comes from `strength` and has the unit (x/u)²; α = 0
+/// gives ρ = 1 and a uniform mesh. ∇u is taken on the current mesh, by central differences in ξ and one-sided ones of
+/// second order at the sides.
+///
+/// # Example
+/// ```
+/// use driftmesh::{density::{Arclength, Monitor, Strength}, geometry::{Lattice, Mesh}};
+/// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 1.0])?;
+/// let ramp: Vec<f64> = mesh.x().iter().map(|x| 2.0 * x[0]).collect();
+/// // a ramp of slope 2 with α = 2 has ρ = √(1 + 2·2²) = 3
+/// let rho = Arclength { strength: Strength::Absolute(2.0), ..Arclength::default() }.density(&mesh, &ramp)?;
+/// assert!(rho.iter().all(|r| (r - 3.0).abs() < 1e-14));
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+///
+/// # Source
+/// Huang and Russell, *Adaptive Moving Mesh Methods*, Springer (2011).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Arclength {
+    /// How α is chosen.
+    pub strength: Strength,
+    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    pub smoothing: usize,
+    /// How the mesh equation differences ρ.
+    pub gradient: Gradient,
+}
+
+/// How α is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Strength {
+    /// α = this / max |∇u|², the maximum over all nodes; no unit.
+    Relative(f64),
+    /// α itself.
+    Absolute(f64),
+}
+
+impl Default for Arclength {
+    fn default() -> Self {
+        Self { strength: Strength::Relative(30.0), smoothing: 2, gradient: Gradient::Central }
+    }
+}
+
+/// More passes than this leave nothing of ρ on any lattice that fits a machine.
+const MAX_SMOOTHING: usize = 10_000;
+
+impl Arclength {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the strength is negative or not finite, or the smoothing beyond all reason.
+    pub fn check(&self) -> Result<()> {
+        let (key, value) = match self.strength {
+            Strength::Relative(value) => ("strength.relative", value),
+            Strength::Absolute(value) => ("strength.absolute", value),
+        };
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(Error::invalid(key, value, "must be a finite number, 0 or more"));
+        }
+        if self.smoothing > MAX_SMOOTHING {
+            return Err(Error::invalid("smoothing", self.smoothing, format!("must be at most {MAX_SMOOTHING} passes")));
+        }
+        Ok(())
+    }
+}
+
+impl Monitor for Arclength {
+    fn density(&self, mesh: &Mesh<2>, u: &[f64]) -> Result<Vec<f64>, Failure> {
+        let slope2: Vec<f64> =
+            Metrics::new(mesh).gradient(u).into_iter().map(|[gx, gy]| gx * gx + gy * gy).collect();
+        let alpha = match self.strength {
+            Strength::Absolute(alpha) => alpha,
+            Strength::Relative(strength) => {
+                let steepest = slope2.iter().copied().fold(0.0, f64::max);
+                if steepest > 0.0 { strength / steepest } else { 0.0 }
+            }
+        };
+        let mut rho: Vec<f64> = slope2.into_iter().map(|s| (1.0 + alpha * s).sqrt()).collect();
+        smooth(mesh.lattice(), &mut rho, self.smoothing);
+        match rho.iter().position(|r| !r.is_finite()) {
+            None => Ok(rho),
+            Some(k) => Err(Failure::NonFinite {
+                what: "the mesh density",
+                value: rho[k],
+                node: mesh.lattice().node(k),
+                x: mesh.x()[k],
+            }),
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! How a study names one of several kinds of a thing.
+
+/// Declares the kinds that a seam knows: an enum over their configuration structs
+///
+/// A study writes `{ kind = "name", … }`; the study reader hands it on as `{ name = { … } }`, which is what the derived
+/// `Deserialize` of the enum expects and which keeps the place of every mistake. `Serialize` writes the study's form.
+/// `KINDS` lists names and one line each for `driftmesh list`.
+macro_rules! kinds {
+    ($(#[$attribute:meta])* $enum:ident { $($kind:literal = $type:ident: $line:literal),+ $(,)? }) => {
+        $(#[$attribute])*
+        #[derive(Debug, Clone, serde::Deserialize)]
+        pub enum $enum {
+            $(
+                #[doc = $line]
+                #[serde(rename = $kind)]
+                $type($type),
+            )+
+        }
+
+        impl $enum {
+            /// Name and description of every kind.
+            pub const KINDS: &'static [(&'static str, &'static str)] = &[$(($kind, $line)),+];
+        }
+
+        impl serde::Serialize for $enum {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                #[derive(serde::Serialize)]
+                #[serde(tag = "kind")]
+                enum Tagged<'a> {
+                    $(#[serde(rename = $kind)] $type(&'a $type),)+
+                }
+                match self {
+                    $(Self::$type(it) => Tagged::$type(it).serialize(serializer),)+
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use kinds;

@@ -1,0 +1,126 @@
+use crate::error::{Error, Failure, Result};
+use crate::geometry::{Lattice, Patch};
+use crate::numerics::difference::Gradient;
+use crate::numerics::linear::{LatticeMatrix, LinearSolver};
+use crate::work::Work;
+
+/// The moving mesh equation, with ρ frozen over a step
+///
+/// ```text
+/// x_t = (1/τ) (b·∇_ξ x + ∇²_ξ x),   b = ∇_ξ ρ / ρ,   the same for y
+/// ```
+///
+/// τ > 0 (`relaxation`) has the unit of time: how long the mesh takes to follow its density across the domain.
+///
+/// # Source
+/// (2.4) of Bihlo, Haynes and Walsh (2015), MMPDE5 divided by ρ before it is relaxed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mmpde {
+    /// τ.
+    pub relaxation: f64,
+    /// How b is differenced.
+    pub gradient: Gradient,
+}
+
+impl Default for Mmpde {
+    fn default() -> Self {
+        Self { relaxation: 1.0, gradient: Gradient::Central }
+    }
+}
+
+impl Mmpde {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless τ is positive and finite.
+    pub fn check(&self) -> Result<()> {
+        if self.relaxation.is_finite() && self.relaxation > 0.0 {
+            return Ok(());
+        }
+        Err(Error::invalid("relaxation", self.relaxation, "must be a finite number above 0"))
+    }
+
+    /// The implicit step over `dt` on a lattice with density `rho`, one value a node.
+    ///
+    /// # Errors
+    /// [`Failure::WrongLength`] where ρ does not fit the lattice.
+    pub fn operator<const D: usize>(&self, lattice: &Lattice<D>, rho: &[f64], dt: f64) -> Result<MeshOperator<D>, Failure> {
+        if rho.len() != lattice.len() {
+            return Err(Failure::WrongLength { what: "the density", found: rho.len(), expected: lattice.len() });
+        }
+        let h = lattice.spacing();
+        let a = h.map(|h| dt / (self.relaxation * h * h));
+        let b = self.gradient.of_log(lattice, rho);
+        let weights = b
+            .into_iter()
+            .map(|b| {
+                std::array::from_fn(|d| {
+                    let skew = 0.5 * b[d] * h[d];
+                    [a[d] * (1.0 - skew), a[d] * (1.0 + skew)]
+                })
+            })
+            .collect();
+        Ok(MeshOperator { lattice: *lattice, weights })
+    }
+}
+
+/// One implicit Euler step of a mesh equation, as what each node draws from its neighbours
+///
+/// ```text
+/// (1 + Σ_e w_e) x_i − Σ_e w_e x_e = xⁿ_i,   e the 2D neighbours of node i
+/// ```
+///
+/// Rows add up to one, so with all weights ≥ 0 a residual bounds the error of the mesh in the maximum norm, and the
+/// weights over 1 + Σ w_e are the jump probabilities of a walk on the lattice that stops with 1/(1 + Σ w_e). Every form
+/// of the mesh equation and every way to solve it meets here.
+#[derive(Debug, Clone)]
+pub struct MeshOperator<const D: usize> {
+    lattice: Lattice<D>,
+    /// For each node and axis the weights toward the neighbour below and above.
+    weights: Vec<[[f64; 2]; D]>,
+}
+
+impl<const D: usize> MeshOperator<D> {
+    /// For each node and axis the weights toward the neighbour below and above.
+    pub fn weights(&self) -> &[[[f64; 2]; D]] {
+        &self.weights
+    }
+
+    /// The system on one patch, as a star of S = 2D + 1 points.
+    pub fn matrix<const S: usize>(&self, patch: Patch<D>) -> LatticeMatrix<D, S> {
+        let mut matrix = LatticeMatrix::zero(patch);
+        for (row, node) in matrix.rows.iter_mut().zip(patch.nodes(&self.lattice)) {
+            row[0] = 1.0;
+            for (d, w) in self.weights[node].iter().enumerate() {
+                row[0] += w[0] + w[1];
+                row[1 + 2 * d] = -w[0];
+                row[2 + 2 * d] = -w[1];
+            }
+        }
+        matrix
+    }
+
+    /// Solves the step on one patch, given new values on the ring around it
+    ///
+    /// `old` and `new` are nodal values on the whole lattice. On entry `new` holds the known values on the ring and a
+    /// guess inside; on success the solution inside, its residual at most `tolerance`. `jump[d]` is added on wrapping
+    /// around axis d.
+    ///
+    /// # Errors
+    /// [`Failure::LinearStalled`].
+    pub fn solve<const S: usize, const K: usize>(
+        &self,
+        patch: Patch<D>,
+        old: &[[f64; K]],
+        new: &mut [[f64; K]],
+        jump: [[f64; K]; D],
+        solver: &mut impl LinearSolver<D, S, K>,
+        tolerance: [f64; K],
+    ) -> Result<Work, Failure> {
+        let right: Vec<[f64; K]> = patch.nodes(&self.lattice).map(|node| old[node]).collect();
+        let mut x = patch.gather(&self.lattice, new, jump);
+        let linear_iterations = solver.solve(&self.matrix(patch), &right, &mut x, tolerance)?;
+        patch.scatter(&self.lattice, &x, new);
+        Ok(Work { linear_solves: K, linear_iterations, ..Work::default() })
+    }
+}

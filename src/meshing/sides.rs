@@ -1,0 +1,45 @@
+use super::Mmpde;
+use crate::error::{Failure, Result};
+use crate::geometry::{Lattice, Mesh, Patch};
+use crate::numerics::linear::Robust;
+use crate::work::Work;
+
+/// Moves the nodes along the bounded sides of the box: the mesh equation in one dimension, on each side by itself
+///
+/// On a side the coordinate across it is fixed and the one along it solves the mesh equation with the ρ of the side;
+/// corners stay. `x` holds the old positions of all nodes and receives the new ones on the sides.
+pub fn move_sides(
+    equation: &Mmpde,
+    mesh: &Mesh<2>,
+    rho: &[f64],
+    dt: f64,
+    x: &mut [[f64; 2]],
+    solver: &mut Robust<1>,
+) -> Result<Work, Failure> {
+    let lattice = mesh.lattice();
+    let (cells, nodes, strides) = (lattice.cells(), lattice.nodes(), lattice.strides());
+    let mut work = Work::default();
+    for across in (0..2).filter(|&d| !lattice.periodic()[d]) {
+        let along = 1 - across;
+        let line = Lattice::<1>::new([cells[along]], [lattice.periodic()[along]]).expect("an axis of a lattice is one");
+        let jump = [[mesh.extent()[along]]];
+        for end in [0, cells[across]] {
+            let place = |i: usize| end * strides[across] + i * strides[along];
+            let side_rho: Vec<f64> = (0..nodes[along]).map(|i| rho[place(i)]).collect();
+            let old: Vec<[f64; 1]> = (0..nodes[along]).map(|i| [mesh.x()[place(i)][along]]).collect();
+            let mut new = old.clone();
+            let operator = equation.operator(&line, &side_rho, dt)?;
+            let tolerance = [tolerance(mesh)[along]];
+            work += operator.solve::<3, 1>(Patch::whole(&line), &old, &mut new, jump, solver, tolerance)?;
+            for (i, [value]) in new.into_iter().enumerate() {
+                x[place(i)][along] = value;
+            }
+        }
+    }
+    Ok(work)
+}
+
+/// How exactly mesh equations are solved: 1e-12 of the largest coordinate, far below any cell.
+pub(super) fn tolerance(mesh: &Mesh<2>) -> [f64; 2] {
+    std::array::from_fn(|d| 1e-12 * mesh.lower()[d].abs().max(mesh.upper()[d].abs()))
+}

@@ -1,0 +1,214 @@
+use super::{Motion, Physics, check_finite, curvilinear::Stencils};
+use crate::error::{Error, Failure, Result};
+use crate::geometry::{Field, Mesh, Patch};
+use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
+use crate::work::Work;
+use serde::{Deserialize, Serialize};
+
+/// Burgers' equation with a travelling oblique front
+///
+/// ```text
+/// u_t + u u_x + u u_y = ν (u_xx + u_yy),   exact   u = 1 / (1 + exp((x + y − t) / 2ν))
+/// ```
+///
+/// ν > 0 (`viscosity`) sets the width of the front, about 10ν between u = .1 and .9. Initial and side values come from
+/// the exact solution. In the moving coordinate ξ, with the velocity ẋ of the nodes, the right-hand side is
+///
+/// ```text
+/// R = ẋ·∇u − (u²/2)_x − (u²/2)_y + ν Δu   (conservative)      R = (ẋ − u)·∇u + ν Δu   (advective)
+/// (uⁿ⁺¹ − uⁿ)/Δt = ½ R(uⁿ; meshⁿ) + ½ R(uⁿ⁺¹; meshⁿ⁺¹)
+/// ```
+///
+/// with ẋ = (xⁿ⁺¹ − xⁿ)/Δt in both halves, solved by Newton's method with the true Jacobian. Second order in space
+/// and time.
+///
+/// # Source
+/// (4.1) of Bihlo, Haynes and Walsh (2015), whose diffusion has the wrong sign in print and whose exact solution has
+/// t₀ where t must stand.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Burgers {
+    /// ν.
+    pub viscosity: f64,
+    /// Form of the convection term.
+    #[serde(default)]
+    pub convection: Convection,
+    #[serde(skip)]
+    solver: Robust<1>,
+    /// Stencils of the newest mesh, with the mesh: the next step starts on it.
+    #[serde(skip)]
+    newest: Option<(Mesh<2>, Stencils)>,
+}
+
+/// Form of the convection term.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Convection {
+    /// (u²/2)_x + (u²/2)_y.
+    #[default]
+    Conservative,
+    /// u u_x + u u_y.
+    Advective,
+}
+
+/// Newton stops where the largest residual is below this, for u of size one.
+const TOLERANCE: f64 = 1e-10;
+const MAX_NEWTON: usize = 20;
+
+impl Burgers {
+    /// Burgers' equation of a viscosity.
+    ///
+    /// # Errors
+    /// As [`Burgers::check`].
+    pub fn new(viscosity: f64, convection: Convection) -> Result<Self> {
+        let burgers = Self { viscosity, convection, solver: Robust::default(), newest: None };
+        burgers.check().map(|()| burgers)
+    }
+
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless ν is positive and finite.
+    pub fn check(&self) -> Result<()> {
+        if self.viscosity.is_finite() && self.viscosity > 0.0 {
+            return Ok(());
+        }
+        Err(Error::invalid("viscosity", self.viscosity, "must be a finite number above 0"))
+    }
+
+    /// The exact solution.
+    pub fn front(&self, t: f64, x: [f64; 2]) -> f64 {
+        1.0 / (1.0 + ((x[0] + x[1] - t) / (2.0 * self.viscosity)).exp())
+    }
+
+    fn on_mesh(&self, t: f64, mesh: &Mesh<2>) -> Field {
+        Field::scalar(mesh.x().iter().map(|&x| self.front(t, x)).collect())
+    }
+
+    /// R of one mesh as stencils, for nodes that move with `velocity`.
+    fn right_hand_side<'a>(&self, stencils: &'a Stencils, velocity: &'a [[f64; 2]]) -> impl Iterator<Item = Row> + 'a {
+        let (viscosity, convection) = (self.viscosity, self.convection);
+        (stencils.gradient.iter().zip(&stencils.laplacian)).zip(velocity).map(move |((gradient, laplacian), v)| {
+            let mut linear = laplacian.map(|w| viscosity * w);
+            for (l, g) in linear[1..5].iter_mut().zip(gradient) {
+                *l += v[0] * g[0] + v[1] * g[1];
+            }
+            Row { linear, flux: gradient.map(|g| g[0] + g[1]), convection }
+        })
+    }
+}
+
+/// R at one node: what is linear in the nine values, and the weights of ∂_x + ∂_y for the convection.
+struct Row {
+    linear: [f64; 9],
+    flux: [f64; 4],
+    convection: Convection,
+}
+
+impl Row {
+    fn value(&self, u: &[f64; 9]) -> f64 {
+        let linear: f64 = self.linear.iter().zip(u).map(|(l, u)| l * u).sum();
+        let star = self.flux.iter().zip(&u[1..5]);
+        linear
+            - match self.convection {
+                Convection::Conservative => 0.5 * star.map(|(s, u)| s * u * u).sum::<f64>(),
+                Convection::Advective => u[0] * star.map(|(s, u)| s * u).sum::<f64>(),
+            }
+    }
+
+    fn derivative(&self, u: &[f64; 9]) -> [f64; 9] {
+        let mut row = self.linear;
+        for (k, s) in self.flux.iter().enumerate() {
+            match self.convection {
+                Convection::Conservative => row[k + 1] -= s * u[k + 1],
+                Convection::Advective => {
+                    row[k + 1] -= s * u[0];
+                    row[0] -= s * u[k + 1];
+                }
+            }
+        }
+        row
+    }
+}
+
+impl Physics for Burgers {
+    fn unknowns(&self) -> Vec<String> {
+        vec!["u".into()]
+    }
+
+    fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field {
+        self.on_mesh(t, mesh)
+    }
+
+    fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
+        Some(self.on_mesh(t, mesh))
+    }
+
+    fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
+        let Motion { t, dt, old, new } = motion;
+        let lattice = new.lattice();
+        let patch = Patch::whole(lattice);
+        let [width, height] = new.extent();
+        let jump = [[width, 0.0], [0.0, height]];
+        let (x_old, x_new) = (patch.gather(lattice, old.x(), jump), patch.gather(lattice, new.x(), jump));
+        let velocity: Vec<[f64; 2]> =
+            patch.places().map(|k| [0, 1].map(|d| (x_new[k][d] - x_old[k][d]) / dt)).collect();
+
+        let mut matrix = LatticeMatrix::<2, 9>::zero(patch);
+        let offsets = matrix.offsets();
+        let around = |u: &[[f64; 1]], k: usize| offsets.map(|o| u[k.wrapping_add_signed(o)][0]);
+
+        // the half of the step that is known
+        let stencils_old = match self.newest.take() {
+            Some((mesh, stencils)) if mesh == *old => stencils,
+            _ => Stencils::new(&patch, &x_old),
+        };
+        let u_old = patch.gather(lattice, u.values().as_chunks::<1>().0, [[0.0]; 2]);
+        let known: Vec<f64> = (self.right_hand_side(&stencils_old, &velocity).zip(patch.places()))
+            .map(|(row, k)| u_old[k][0] + 0.5 * dt * row.value(&around(&u_old, k)))
+            .collect();
+
+        // the half that is not: new side values around the old ones inside
+        let stencils = Stencils::new(&patch, &x_new);
+        let rows: Vec<Row> = self.right_hand_side(&stencils, &velocity).collect();
+        let mut all = self.on_mesh(t + dt, new);
+        patch.scatter(lattice, u_old.as_flattened(), all.values_mut());
+        let mut u_new = patch.gather(lattice, all.values().as_chunks::<1>().0, [[0.0]; 2]);
+        let size = u_new.iter().fold(1.0_f64, |m, u| m.max(u[0].abs()));
+        let mut work = Work::default();
+        loop {
+            let mut residual: Vec<[f64; 1]> = Vec::with_capacity(patch.len());
+            let mut largest = 0.0_f64;
+            for ((row, known), k) in rows.iter().zip(&known).zip(patch.places()) {
+                let r = known - u_new[k][0] + 0.5 * dt * row.value(&around(&u_new, k));
+                largest = if r.abs() <= largest { largest } else { r.abs() };
+                residual.push([r]);
+            }
+            if largest <= TOLERANCE * size {
+                break;
+            }
+            if work.newton_iterations == MAX_NEWTON || !largest.is_finite() {
+                patch.scatter(lattice, u_new.as_flattened(), all.values_mut());
+                check_finite("u", new, all.values())?;
+                let iterations = work.newton_iterations;
+                return Err(Failure::NewtonStalled { residual: largest, tolerance: TOLERANCE * size, iterations });
+            }
+            for ((entries, row), k) in matrix.rows.iter_mut().zip(&rows).zip(patch.places()) {
+                *entries = row.derivative(&around(&u_new, k)).map(|d| -0.5 * dt * d);
+                entries[0] += 1.0;
+            }
+            let mut correction = vec![[0.0]; patch.padded_len()];
+            let tolerance = [0.1 * TOLERANCE * size];
+            work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
+            work.linear_solves += 1;
+            work.newton_iterations += 1;
+            for (u, c) in u_new.iter_mut().zip(&correction) {
+                u[0] += c[0];
+            }
+        }
+        patch.scatter(lattice, u_new.as_flattened(), all.values_mut());
+        check_finite("u", new, all.values())?;
+        self.newest = Some((new.clone(), stencils));
+        Ok((all, work))
+    }
+}

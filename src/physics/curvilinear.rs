@@ -1,0 +1,88 @@
+use crate::geometry::Patch;
+
+/// Differential operators in x as stencils on the lattice, at every unknown of the whole domain
+///
+/// ```text
+/// u_x = (u_ξ y_η − u_η y_ξ) / J,   u_y = (u_η x_ξ − u_ξ x_η) / J,   J = x_ξ y_η − x_η y_ξ
+/// Δu  = (1/J) [ ∂_ξ((α u_ξ − β u_η)/J) + ∂_η((γ u_η − β u_ξ)/J) ]
+/// α = x_η² + y_η²,   β = x_ξ x_η + y_ξ y_η,   γ = x_ξ² + y_ξ²
+/// ```
+///
+/// Nodal metrics are central differences. Those of the Laplacian's faces come from coordinates: the direct difference
+/// across the face and the mean of the two central differences along it. Points are in the order of
+/// [`LatticeMatrix`](crate::numerics::linear::LatticeMatrix).
+#[derive(Debug, Clone)]
+pub(super) struct Stencils {
+    /// Weights of u_x and u_y for the four neighbours of the star; the node itself has none.
+    pub gradient: Vec<[[f64; 2]; 4]>,
+    /// Weights of Δu for the nine points.
+    pub laplacian: Vec<[f64; 9]>,
+}
+
+/// How the flux through a face follows from u: weight of the difference across it, and of the four differences of two
+/// spacings whose quarter is the difference along it.
+type Face = [f64; 2];
+
+impl Stencils {
+    /// Stencils of a mesh given by its positions, padded on the patch of all unknowns.
+    ///
+    /// Written with undivided differences, in which every lattice spacing cancels.
+    pub fn new(patch: &Patch<2>, x: &[[f64; 2]]) -> Self {
+        let [s, _] = patch.padded_strides();
+        let n = patch.pencil_len();
+        let mut gradient = Vec::with_capacity(patch.len());
+        let mut laplacian = Vec::with_capacity(patch.len());
+        let ring_below = patch.pencil(0) - s;
+        let mut below: Vec<Face> = (ring_below..ring_below + n).map(|k| face(x, k, s, 1)).collect();
+        for start in patch.pencils() {
+            let mut south = face(x, start - 1, 1, s);
+            for (k, west) in (start..).zip(&mut below) {
+                let (xi, eta) = (minus(x[k + s], x[k - s]), minus(x[k + 1], x[k - 1]));
+                let inverse = 1.0 / cross(xi, eta);
+                let above = [eta[1] * inverse, -eta[0] * inverse];
+                let right = [-xi[1] * inverse, xi[0] * inverse];
+                gradient.push([above.map(|v| -v), above, right.map(|v| -v), right]);
+
+                let (east, north) = (face(x, k, s, 1), face(x, k, 1, s));
+                let scale = 4.0 * inverse;
+                laplacian.push(
+                    [
+                        -(west[0] + east[0] + south[0] + north[0]),
+                        west[0] - south[1] + north[1],
+                        east[0] + south[1] - north[1],
+                        south[0] - west[1] + east[1],
+                        north[0] + west[1] - east[1],
+                        -west[1] - south[1],
+                        west[1] + north[1],
+                        east[1] + south[1],
+                        -east[1] - north[1],
+                    ]
+                    .map(|w| w * scale),
+                );
+                (*west, south) = (east, north);
+            }
+        }
+        Self { gradient, laplacian }
+    }
+}
+
+/// The face between nodes k and k + `step`; `side` leads along it.
+fn face(x: &[[f64; 2]], k: usize, step: usize, side: usize) -> Face {
+    let across = minus(x[k + step], x[k]);
+    let (here, there) = (minus(x[k + side], x[k - side]), minus(x[k + step + side], x[k + step - side]));
+    let along = [0.25 * (here[0] + there[0]), 0.25 * (here[1] + there[1])];
+    let inverse = 1.0 / cross(across, along).abs();
+    [dot(along, along) * inverse, 0.25 * dot(across, along) * inverse]
+}
+
+fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
