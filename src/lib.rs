@@ -7,6 +7,8 @@ mod kind;
 pub mod meshing;
 pub mod numerics;
 pub mod physics;
+pub mod simulation;
+pub mod study;
 mod work;
 
 pub use error::{Error, Failure, Result};

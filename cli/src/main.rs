@@ -1,2 +1,64 @@
-//! cli
-fn main() {}
+//! The `driftmesh` program: a thin door to the library.
+
+mod check;
+mod list;
+mod progress;
+mod run;
+mod terminal;
+
+use clap::{Args, Parser, Subcommand};
+use driftmesh::study::{MovingMesh, Source};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Moving meshes for time-dependent PDEs, solved by domain decomposition.
+#[derive(Parser)]
+#[command(name = "driftmesh", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Run a study.
+    #[command(after_help = "Example:\n  driftmesh run studies/burgers.toml --set time.step=5e-4 --out out/finer")]
+    Run(run::Run),
+    /// Validate a study without running it, and print it with every default filled in.
+    #[command(after_help = "Example:\n  driftmesh check studies/burgers.toml --set grid.cells=[80,80]")]
+    Check(check::Check),
+    /// List every kind that a study may name.
+    #[command(after_help = "Example:\n  driftmesh list generators")]
+    List(list::List),
+}
+
+/// A study file and what is set on top of it.
+#[derive(Args)]
+struct StudyArgs {
+    /// The study file.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Override one setting: a dotted key and a TOML value.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl StudyArgs {
+    fn read(&self) -> driftmesh::Result<MovingMesh> {
+        let mut source = Source::read(&self.study)?;
+        self.set.iter().try_for_each(|assignment| source.set(assignment))?;
+        MovingMesh::from_source(&source)
+    }
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().verb {
+        Verb::Run(run) => run.execute(),
+        Verb::Check(check) => check.execute(),
+        Verb::List(list) => list.execute(),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => terminal::complain(&error, None),
+    }
+}

@@ -11,6 +11,7 @@ pub use smoothing::smooth;
 use crate::error::{Failure, Result};
 use crate::geometry::Mesh;
 use crate::kind::kinds;
+use crate::numerics::difference::Gradient;
 
 /// Where a mesh should be fine, decided from the solution on the mesh it has.
 pub trait Monitor: Send {
@@ -25,5 +26,37 @@ kinds! {
     /// `[monitor]` of a study.
     MonitorKind {
         "arclength" = Arclength: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
+    }
+}
+
+impl Default for MonitorKind {
+    fn default() -> Self {
+        Self::Arclength(Arclength::default())
+    }
+}
+
+impl MonitorKind {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid).
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::Arclength(arclength) => arclength.check(),
+        }
+    }
+
+    /// How the mesh equation differences this density.
+    pub fn gradient(&self) -> Gradient {
+        match self {
+            Self::Arclength(arclength) => arclength.gradient,
+        }
+    }
+
+    /// The monitor, ready to use.
+    pub fn into_monitor(self) -> Box<dyn Monitor> {
+        match self {
+            Self::Arclength(arclength) => Box::new(arclength),
+        }
     }
 }

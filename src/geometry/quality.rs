@@ -12,7 +12,7 @@ use crate::error::Failure;
 /// # Source
 /// (3.4) of Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation*
 /// (2015).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Quality {
     /// Largest Q over the cells.
     pub q_max: f64,

@@ -35,6 +35,12 @@ kinds! {
     }
 }
 
+impl Default for GeneratorKind {
+    fn default() -> Self {
+        Self::Whole(Whole::default())
+    }
+}
+
 impl GeneratorKind {
     /// The generator, ready to step.
     pub fn into_generator(self) -> Box<dyn MeshGenerator> {

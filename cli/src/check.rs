@@ -1,0 +1,19 @@
+use crate::{StudyArgs, terminal::say};
+use clap::Args;
+use std::process::ExitCode;
+
+#[derive(Args)]
+pub struct Check {
+    #[command(flatten)]
+    study: StudyArgs,
+}
+
+impl Check {
+    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+        let study = self.study.read()?;
+        say(study.to_toml().trim_end());
+        let mebibytes = study.memory() as f64 / f64::from(1 << 20);
+        say(format_args!("\n# valid; needs about {:.0} MiB of memory", mebibytes.max(1.0)));
+        Ok(ExitCode::SUCCESS)
+    }
+}

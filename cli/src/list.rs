@@ -1,0 +1,34 @@
+use crate::terminal::say;
+use clap::{Args, ValueEnum};
+use driftmesh::{density::MonitorKind, meshing::GeneratorKind, physics::PdeKind};
+use std::process::ExitCode;
+
+#[derive(Args)]
+pub struct List {
+    /// Only these; all of them where nothing is named.
+    topic: Option<Topic>,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Topic {
+    Pdes,
+    Monitors,
+    Generators,
+}
+
+impl List {
+    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+        let topics = [
+            (Topic::Pdes, "pdes", "pde.kind", PdeKind::KINDS),
+            (Topic::Monitors, "monitors", "monitor.kind", MonitorKind::KINDS),
+            (Topic::Generators, "generators", "mesh.generator.kind", GeneratorKind::KINDS),
+        ];
+        for (topic, title, key, kinds) in topics {
+            if self.topic.is_none_or(|only| only == topic) {
+                say(format_args!("{title} ({key})"));
+                kinds.iter().for_each(|(name, line)| say(format_args!("  {name:<14}{line}")));
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

@@ -1,0 +1,83 @@
+use crate::{StudyArgs, progress::Progress, terminal};
+use clap::Args;
+use driftmesh::Error;
+use driftmesh::simulation::{Observer, RunDirectory, Summary};
+use driftmesh::study;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+#[derive(Args)]
+pub struct Run {
+    #[command(flatten)]
+    study: StudyArgs,
+    /// Directory for the results; out/<study name> where nothing is said.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Threads to use; all cores where nothing is said. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// No progress and no table.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Run {
+    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+        let study = self.study.read()?;
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&study.study.name));
+        RunDirectory::check(&out)?;
+        if let Some(threads) = self.threads {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
+            pool.map_err(|error| Error::invalid("--threads", threads, format!("no such pool can be made: {error}")))?;
+        }
+        let mut progress = Progress::new();
+        let finished = if self.quiet {
+            study::run(&study, &out, &mut [])
+        } else {
+            let watchers: &mut [&mut dyn Observer] = &mut [&mut progress];
+            study::run(&study, &out, watchers)
+        };
+        progress.clear();
+        let finished = finished?;
+        if !self.quiet {
+            terminal::say(table(&finished.summary));
+            terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
+            terminal::say(format_args!("run      {}", out.display()));
+        }
+        match finished.failure {
+            None => Ok(ExitCode::SUCCESS),
+            Some(error) => {
+                let note = format!("the frames up to the last good state (step {}) are in {}", finished.state.step, out.display());
+                Ok(terminal::complain(&error, Some(&note)))
+            }
+        }
+    }
+}
+
+/// Time, error, mesh quality, work and seconds in a few lines.
+fn table(summary: &Summary) -> String {
+    let mut text = String::from("       t     l_inf        l2   Q max  Q mean   min J  equidist\n");
+    for report in &summary.reports {
+        let [linf, l2] = report.error.map_or(["-".into(), "-".into()], |e| [e.linf, e.l2].map(|e| format!("{e:.3e}")));
+        let q = report.quality;
+        text += &format!(
+            "{:8.4} {linf:>9} {l2:>9} {:7.3} {:7.3} {:7.4} {:9.3}\n",
+            report.t, q.q_max, q.q_mean, q.min_scaled_jacobian, q.equidistribution
+        );
+    }
+    let (total, s) = (summary.work, summary.seconds);
+    text + &format!(
+        "work     {} steps, {} Newton iterations, {} linear solves in {} iterations\n\
+         seconds  {:.2} (mesh {:.2}, pde {:.2}, monitor {:.2}, output {:.2}), {} threads",
+        total.steps,
+        total.work.newton_iterations,
+        total.work.linear_solves,
+        total.work.linear_iterations,
+        s.wall,
+        s.mesh,
+        s.pde,
+        s.monitor,
+        s.output,
+        summary.parallel.threads
+    )
+}

@@ -1,0 +1,79 @@
+use super::{Seconds, Simulation, State, timed};
+use crate::error::{Error, Failure, Result};
+use crate::geometry::{check_unfolded, interpolate};
+use crate::physics::Motion;
+use crate::work::Work;
+use serde::{Deserialize, Serialize};
+
+/// How mesh and physics alternate within one time step
+///
+/// `mesh_steps` = k > 1 is M^kP: the mesh goes to the new time in k sub-steps, ρ carried onto each sub-mesh by
+/// piecewise linear interpolation, so that it follows ρ(x) rather than ρ(ξ). `iterations` = l > 1 is (MP)^l: mesh and
+/// physics are computed l times from the same old state, each time with ρ from the newest solution.
+///
+/// # Source
+/// Section 5 of Bihlo, Haynes and Walsh (2015).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Coupling {
+    /// k ≥ 1.
+    pub mesh_steps: usize,
+    /// l ≥ 1.
+    pub iterations: usize,
+}
+
+impl Default for Coupling {
+    fn default() -> Self {
+        Self { mesh_steps: 1, iterations: 1 }
+    }
+}
+
+impl Coupling {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless both are between 1 and 1000.
+    pub fn check(&self) -> Result<()> {
+        for (key, value) in [("mesh_steps", self.mesh_steps), ("iterations", self.iterations)] {
+            if !(1..=1000).contains(&value) {
+                return Err(Error::invalid(key, value, "must be between 1 and 1000"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One step to time `t`: mesh, then physics, as often as the coupling says.
+pub(super) fn advance(
+    simulation: &mut Simulation,
+    state: &State,
+    t: f64,
+    dt: f64,
+    seconds: &mut Seconds,
+) -> Result<(State, Work), Failure> {
+    let Simulation { physics, monitor, generator, equation, coupling, .. } = simulation;
+    let mut work = Work::default();
+    let mut rho = state.rho.clone();
+    let mut latest = None;
+    for _ in 0..coupling.iterations {
+        let mesh = timed(&mut seconds.mesh, || {
+            let mut mesh = state.mesh.clone();
+            for sub in 0..coupling.mesh_steps {
+                let carried = if sub == 0 { None } else { Some(interpolate(&state.mesh, &rho, &mesh)) };
+                let rho = carried.as_ref().unwrap_or(&rho);
+                let (moved, cost) = generator.step(equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
+                check_unfolded(&moved)?;
+                (mesh, work) = (moved, { work += cost; work });
+            }
+            Ok::<_, Failure>(mesh)
+        })?;
+        let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
+        let (u, cost) = timed(&mut seconds.pde, || physics.step(motion, &state.u))?;
+        work += cost;
+        let monitored: Vec<f64> = u.component(0).collect();
+        rho = timed(&mut seconds.monitor, || monitor.density(&mesh, &monitored))?;
+        latest = Some((mesh, u));
+    }
+    let (mesh, u) = latest.expect("a coupling has at least one iteration");
+    Ok((State { t, step: state.step + 1, mesh, u, rho }, work))
+}

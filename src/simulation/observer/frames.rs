@@ -1,0 +1,101 @@
+use super::{Event, Observer, Snapshot, vtu};
+use crate::error::{Error, Result};
+use crate::simulation::State;
+use crate::simulation::report::write_file;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// When frames are written; the first and the last state are always among them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FramesAt {
+    /// After so many steps each.
+    Every(usize),
+    /// At the first step not before each of these times.
+    Times(Vec<f64>),
+}
+
+impl FramesAt {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for every = 0 or a time that is not finite.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::Every(0) => Err(Error::invalid("frames.every", 0, "must be 1 or more")),
+            Self::Times(times) if times.iter().any(|t| !t.is_finite()) => {
+                Err(Error::invalid("frames.times", format!("{times:?}"), "every time must be finite"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn due(&self, state: &State, dt: f64) -> bool {
+        match self {
+            Self::Every(n) => state.step.is_multiple_of(*n),
+            // due where the time lies in the step that led here, give or take round-off
+            Self::Times(times) => times.iter().any(|&t| {
+                let slack = 1e-9 * dt;
+                t <= state.t + slack && t > state.t - dt + slack
+            }),
+        }
+    }
+}
+
+/// `frames/*.vtu` and the `run.pvd` that puts them in time, for ParaView, PyVista and meshio.
+#[derive(Debug)]
+pub struct Frames {
+    directory: PathBuf,
+    at: FramesAt,
+    written: Vec<(f64, String)>,
+}
+
+impl Frames {
+    /// Starts the series in a run directory.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn create(directory: &Path, at: FramesAt) -> Result<Self> {
+        let frames = directory.join("frames");
+        std::fs::create_dir_all(&frames)
+            .map_err(|error| Error::Unwritable { path: frames, reason: error.to_string() })?;
+        Ok(Self { directory: directory.to_path_buf(), at, written: Vec::new() })
+    }
+
+    /// Writes one frame, unless the state has one already. The series is complete after every call.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn write(&mut self, unknowns: &[String], state: &State) -> Result<()> {
+        let name = format!("frames/step-{:06}.vtu", state.step);
+        if self.written.iter().any(|(_, written)| *written == name) {
+            return Ok(());
+        }
+        let lattice = state.mesh.lattice();
+        let mut fields: Vec<(&str, Vec<f64>)> = (unknowns.iter().enumerate())
+            .map(|(c, unknown)| {
+                let values: Vec<f64> = state.u.component(c).collect();
+                (unknown.as_str(), lattice.closed(&values).into_owned())
+            })
+            .collect();
+        fields.push(("rho", lattice.closed(&state.rho).into_owned()));
+        let document = vtu::document(lattice.cells(), &state.mesh.closed(), &fields);
+        write_file(&self.directory.join(&name), document.as_bytes())?;
+        self.written.push((state.t, name));
+        let entries: String = (self.written.iter())
+            .map(|(t, name)| format!("<DataSet timestep=\"{t}\" file=\"{name}\"/>\n"))
+            .collect();
+        let series = format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
+             <Collection>\n{entries}</Collection>\n</VTKFile>\n"
+        );
+        write_file(&self.directory.join("run.pvd"), series.as_bytes())
+    }
+}
+
+impl Observer for Frames {
+    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
+        let due = event != Event::Stepped || self.at.due(snapshot.state, snapshot.dt);
+        if due { self.write(snapshot.unknowns, snapshot.state) } else { Ok(()) }
+    }
+}

@@ -1,0 +1,53 @@
+//! Who watches a run: each observer sees the state after every step.
+
+mod frames;
+mod history;
+mod vtu;
+
+pub use frames::{Frames, FramesAt};
+pub use history::History;
+
+use super::{ErrorNorms, State, WorkTotal};
+use crate::error::Result;
+use crate::geometry::Quality;
+
+/// What just happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// The initial state is there.
+    Started,
+    /// A step was done.
+    Stepped,
+    /// The end was reached.
+    Finished,
+}
+
+/// What an observer sees.
+#[derive(Debug)]
+pub struct Snapshot<'a> {
+    /// Time, mesh and solution.
+    pub state: &'a State,
+    /// Names of the unknowns.
+    pub unknowns: &'a [String],
+    /// Length of the step that led here; 0 at the start.
+    pub dt: f64,
+    /// Number of steps of the whole run.
+    pub steps: usize,
+    /// Quality of the mesh.
+    pub quality: Quality,
+    /// Error where an exact solution is known.
+    pub error: Option<ErrorNorms>,
+    /// Work so far.
+    pub work: WorkTotal,
+    /// Seconds since the run began.
+    pub seconds: f64,
+}
+
+/// Something that follows a run.
+pub trait Observer {
+    /// Called after every event. An error ends the run.
+    ///
+    /// # Errors
+    /// Whatever stops the observer from doing its work, such as a full disk.
+    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()>;
+}

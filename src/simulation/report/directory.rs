@@ -1,0 +1,99 @@
+use super::Summary;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// The directory of one run
+///
+/// Claimed before anything is computed. It may be new, empty, or what an earlier run of ours left: then the files that
+/// runs write are removed, and nothing else. Any other directory is refused.
+#[derive(Debug, Clone)]
+pub struct RunDirectory {
+    path: PathBuf,
+}
+
+/// Everything that a run may write.
+const OURS: [&str; 8] =
+    ["summary.json", "study.toml", "history.csv", "run.pvd", "final.npz", "mesh.png", "mesh.svg", "frames"];
+
+impl RunDirectory {
+    /// Refuses a directory that [`RunDirectory::claim`] would refuse, touching nothing.
+    ///
+    /// # Errors
+    /// [`Error::ForeignDirectory`], or [`Error::Unreadable`] where it cannot be listed.
+    pub fn check(path: &Path) -> Result<()> {
+        let unreadable = |error: std::io::Error| Error::Unreadable { path: path.into(), reason: error.to_string() };
+        let foreign = |found: String| Err(Error::ForeignDirectory { path: path.into(), found });
+        match std::fs::symlink_metadata(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(unreadable(error)),
+            Ok(_) if !path.is_dir() => return foreign("a file of that name".into()),
+            Ok(_) => {}
+        }
+        let mut entries = std::fs::read_dir(path).map_err(unreadable)?;
+        match entries.next() {
+            None => Ok(()),
+            Some(_) if wrote(path) => Ok(()),
+            Some(entry) => foreign(entry.map_err(unreadable)?.file_name().to_string_lossy().into_owned()),
+        }
+    }
+
+    /// Makes the directory ours: created if missing, cleared of an earlier run.
+    ///
+    /// # Errors
+    /// As [`RunDirectory::check`], or [`Error::Unwritable`].
+    pub fn claim(path: &Path) -> Result<Self> {
+        Self::check(path)?;
+        let unwritable = |path: &Path, error: std::io::Error| Error::Unwritable { path: path.into(), reason: error.to_string() };
+        std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))?;
+        for name in OURS {
+            let old = path.join(name);
+            let removed = if old.is_dir() { std::fs::remove_dir_all(&old) } else { std::fs::remove_file(&old) };
+            match removed {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(unwritable(&old, error)),
+                _ => {}
+            }
+        }
+        Ok(Self { path: path.into() })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes one file, which bears its name only once it is complete.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn write(&self, name: &str, contents: &[u8]) -> Result<()> {
+        write_file(&self.path.join(name), contents)
+    }
+
+    /// Writes `summary.json`.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn write_summary(&self, summary: &Summary) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
+        text.push('\n');
+        self.write("summary.json", text.as_bytes())
+    }
+}
+
+/// True if a run of ours wrote this directory: its summary says so.
+fn wrote(path: &Path) -> bool {
+    let Ok(text) = std::fs::read_to_string(path.join("summary.json")) else { return false };
+    let Ok(summary) = serde_json::from_str::<serde_json::Value>(&text) else { return false };
+    summary["schema"].is_u64() && summary["study"].is_string() && path.join("study.toml").is_file()
+}
+
+/// Writes a file under another name and renames it when it is complete.
+pub(in crate::simulation) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    std::fs::write(&part, contents).and_then(|()| std::fs::rename(&part, path)).map_err(|error| {
+        let _ = std::fs::remove_file(&part);
+        Error::Unwritable { path: path.into(), reason: error.to_string() }
+    })
+}

@@ -1,0 +1,12 @@
+//! What a run leaves behind: the summary, the arrays, the picture and the directory that holds them.
+
+mod arrays;
+mod directory;
+mod picture;
+mod summary;
+
+pub use arrays::final_arrays;
+pub use directory::RunDirectory;
+pub(super) use directory::write_file;
+pub use picture::{Picture, draw};
+pub use summary::{Conserved, ErrorNorms, Failed, Parallel, Report, Seconds, Summary, WorkTotal};

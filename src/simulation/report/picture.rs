@@ -1,0 +1,161 @@
+use crate::simulation::State;
+use resvg::{tiny_skia, usvg};
+use std::fmt::Write;
+use std::sync::Arc;
+
+/// The last mesh over the solution, as SVG and PNG.
+pub struct Picture {
+    /// The drawing.
+    pub svg: String,
+    /// The same at twice its size in pixels.
+    pub png: Vec<u8>,
+}
+
+const FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
+/// Longer edge of the box in the drawing.
+const LONGER: f64 = 640.0;
+const SHORTER_AT_LEAST: f64 = 160.0;
+const LEFT: f64 = 76.0;
+const TOP: f64 = 48.0;
+const RIGHT: f64 = 116.0;
+const BOTTOM: f64 = 64.0;
+/// Cells drawn along an axis; a finer mesh shows every second, third … line.
+const MAX_CELLS: usize = 240;
+
+/// Draws the mesh of a state over its first unknown, with axes and a colour bar.
+pub fn draw(title: &str, unknown: &str, state: &State) -> Picture {
+    let svg = svg(title, unknown, state);
+    let png = png(&svg);
+    Picture { svg, png }
+}
+
+fn svg(title: &str, unknown: &str, state: &State) -> String {
+    let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
+    let values: Vec<f64> = state.u.component(0).collect();
+    let (x, u) = (mesh.closed(), lattice.closed(&values));
+    let cells = lattice.cells();
+    let (low, high) = u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    let ([lx, ly], [wx, wy]) = (mesh.lower(), mesh.extent());
+    let scale = LONGER / wx.max(wy);
+    let (width, height) = ((wx * scale).max(SHORTER_AT_LEAST), (wy * scale).max(SHORTER_AT_LEAST));
+    let to = |p: [f64; 2]| [LEFT + (p[0] - lx) / wx * width, TOP + height - (p[1] - ly) / wy * height];
+    let (w, h) = (LEFT + width + RIGHT, TOP + height + BOTTOM);
+
+    let mut s = String::new();
+    let _ = writeln!(
+        s,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.0} {h:.0}\" width=\"{w:.0}\" height=\"{h:.0}\" \
+         font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"13\" fill=\"#222\">\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
+    );
+    let _ = writeln!(
+        s,
+        "<text x=\"{:.1}\" y=\"28\" text-anchor=\"middle\" font-size=\"15\">{}</text>",
+        LEFT + 0.5 * width,
+        escape(title)
+    );
+
+    // cells, each outlined in its own colour so that no gap shines through
+    let lines = cells.map(|n| {
+        let stride = n.div_ceil(MAX_CELLS);
+        (0..n).step_by(stride).chain([n]).collect::<Vec<usize>>()
+    });
+    let at = |i: usize, j: usize| i * (cells[1] + 1) + j;
+    s.push_str("<g stroke-width=\"0.6\" stroke-linejoin=\"round\">\n");
+    for i in lines[0].windows(2) {
+        for j in lines[1].windows(2) {
+            let corners = [at(i[0], j[0]), at(i[1], j[0]), at(i[1], j[1]), at(i[0], j[1])];
+            let mean = 0.25 * corners.iter().map(|&k| u[k]).sum::<f64>();
+            let points: Vec<String> = corners.iter().map(|&k| point(to(x[k]))).collect();
+            let fill = colour((mean - low) / (high - low));
+            let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\" stroke=\"{fill}\"/>", points.join(" "));
+        }
+    }
+    s.push_str("</g>\n<g fill=\"none\" stroke=\"white\" stroke-opacity=\"0.65\" stroke-width=\"0.7\">\n");
+    let mut polyline = |nodes: &mut dyn Iterator<Item = usize>| {
+        let points: Vec<String> = nodes.map(|k| point(to(x[k]))).collect();
+        let _ = writeln!(s, "<polyline points=\"{}\"/>", points.join(" "));
+    };
+    lines[0].iter().for_each(|&i| polyline(&mut lines[1].iter().map(|&j| at(i, j))));
+    lines[1].iter().for_each(|&j| polyline(&mut lines[0].iter().map(|&i| at(i, j))));
+    s.push_str("</g>\n");
+
+    axes(&mut s, [lx, ly], [wx, wy], [width, height]);
+    colour_bar(&mut s, unknown, low, high, LEFT + width + 24.0, height);
+    s.push_str("</svg>\n");
+    s
+}
+
+fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, height]: [f64; 2]) {
+    let bottom = TOP + height;
+    let _ = writeln!(
+        s,
+        "<g stroke=\"#222\" fill=\"none\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></g>"
+    );
+    for (value, label) in ticks(lower[0], lower[0] + extent[0]) {
+        let x = LEFT + (value - lower[0]) / extent[0] * width;
+        let _ = writeln!(s, "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>", bottom + 20.0);
+    }
+    for (value, label) in ticks(lower[1], lower[1] + extent[1]) {
+        let y = bottom - (value - lower[1]) / extent[1] * height;
+        let _ = writeln!(s, "<path d=\"M{LEFT} {y:.1}h-5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>", LEFT - 9.0, y + 4.5);
+    }
+    let (x, y) = (LEFT + 0.5 * width, TOP + 0.5 * height);
+    let _ = writeln!(s, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">x</text>", bottom + 44.0);
+    let _ = writeln!(s, "<text x=\"20\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">y</text>", y + 5.0);
+}
+
+fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: f64, height: f64) {
+    const BANDS: usize = 64;
+    let band = height / BANDS as f64;
+    for k in 0..BANDS {
+        let y = TOP + height - (k + 1) as f64 * band;
+        let fill = colour((k as f64 + 0.5) / BANDS as f64);
+        let _ = writeln!(s, "<rect x=\"{x:.1}\" y=\"{y:.2}\" width=\"16\" height=\"{:.2}\" fill=\"{fill}\"/>", band + 0.3);
+    }
+    let _ = writeln!(s, "<rect x=\"{x:.1}\" y=\"{TOP}\" width=\"16\" height=\"{height:.1}\" fill=\"none\" stroke=\"#222\"/>");
+    for (value, label) in ticks(low, high) {
+        let y = if high > low { TOP + height - (value - low) / (high - low) * height } else { TOP + 0.5 * height };
+        let _ = writeln!(s, "<path d=\"M{:.1} {y:.1}h5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\">{label}</text>", x + 16.0, x + 25.0, y + 4.5);
+    }
+    let _ = writeln!(s, "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">{}</text>", x + 8.0, TOP - 12.0, escape(unknown));
+}
+
+/// Round values 1, 2 or 5 times a power of ten apart, four to nine of them, with their labels.
+fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+    let span = high - low;
+    let scale = low.abs().max(high.abs());
+    if !(span > 1e-12 * scale && span.is_finite()) {
+        return vec![(low, format!("{low:.4}"))];
+    }
+    let power = 10_f64.powf((span / 4.0).log10().floor());
+    let step = power * [5.0, 2.0, 1.0].into_iter().find(|m| m * power <= span / 4.0).unwrap_or(1.0);
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+    let label = |v: f64| if decimals > 6 || scale >= 1e6 { format!("{v:.3e}") } else { format!("{v:.decimals$}") };
+    (first..=last).map(|k| (k as f64 * step, label(k as f64 * step))).collect()
+}
+
+fn colour(fraction: f64) -> String {
+    let c = colorous::VIRIDIS.eval_continuous(if fraction.is_finite() { fraction.clamp(0.0, 1.0) } else { 0.5 });
+    format!("#{c:x}")
+}
+
+fn point([x, y]: [f64; 2]) -> String {
+    format!("{x:.2},{y:.2}")
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+fn png(svg: &str) -> Vec<u8> {
+    let mut fonts = usvg::fontdb::Database::new();
+    fonts.load_font_data(FONT.to_vec());
+    let options = usvg::Options { fontdb: Arc::new(fonts), font_family: "DejaVu Sans".into(), ..Default::default() };
+    let tree = usvg::Tree::from_str(svg, &options).expect("the drawing is well-formed");
+    let size = tree.size().to_int_size();
+    let mut pixels = tiny_skia::Pixmap::new(2 * size.width(), 2 * size.height()).expect("the drawing has a size");
+    resvg::render(&tree, tiny_skia::Transform::from_scale(2.0, 2.0), &mut pixels.as_mut());
+    pixels.encode_png().expect("writing to memory cannot fail")
+}

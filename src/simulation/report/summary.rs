@@ -1,0 +1,125 @@
+use crate::error::Error;
+use crate::geometry::Quality;
+use crate::work::Work;
+use serde::Serialize;
+
+/// `summary.json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// Version of this format.
+    pub schema: u32,
+    /// Name of the study.
+    pub study: String,
+    /// Kind of the study.
+    pub kind: String,
+    /// Version of the program.
+    pub version: String,
+    /// `running`, `completed` or `failed`.
+    pub status: String,
+    /// What failed and when, if it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<Failed>,
+    /// Where the time went.
+    pub seconds: Seconds,
+    /// What the run had at its disposal.
+    pub parallel: Parallel,
+    /// Steps and their cost.
+    pub work: WorkTotal,
+    /// One entry for each time of `time.report` that was reached.
+    pub reports: Vec<Report>,
+}
+
+/// A failure in `summary.json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Failed {
+    /// Short name.
+    pub kind: String,
+    /// As shown to the user.
+    pub message: String,
+    /// Time of the step that failed.
+    pub t: Option<f64>,
+    /// The step that failed.
+    pub step: Option<usize>,
+}
+
+impl From<&Error> for Failed {
+    fn from(error: &Error) -> Self {
+        let (kind, moment) = match error {
+            Error::Failed { failure, moment } => (failure.name(), *moment),
+            _ => ("unwritable", None),
+        };
+        Self { kind: kind.into(), message: error.to_string(), t: moment.map(|m| m.t), step: moment.map(|m| m.step) }
+    }
+}
+
+/// Seconds by part.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Seconds {
+    /// By the clock.
+    pub wall: f64,
+    /// Of all threads.
+    pub cpu: f64,
+    /// Computing the density.
+    pub monitor: f64,
+    /// Estimating interface values.
+    pub interface: f64,
+    /// Solving the mesh equation, `interface` not included.
+    pub mesh: f64,
+    /// Solving the physics.
+    pub pde: f64,
+    /// Observers: history, frames, progress.
+    pub output: f64,
+}
+
+/// What a run had at its disposal.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Parallel {
+    /// Processes.
+    pub ranks: usize,
+    /// Threads of each.
+    pub threads: usize,
+}
+
+/// Steps and their cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct WorkTotal {
+    /// Time steps accepted.
+    pub steps: usize,
+    /// Time steps tried in vain.
+    pub rejected_steps: usize,
+    /// What all of them cost.
+    #[serde(flatten)]
+    pub work: Work,
+}
+
+/// The state of a run at one of the times asked for.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Report {
+    /// Time.
+    pub t: f64,
+    /// Where an exact solution is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<ErrorNorms>,
+    /// Of the mesh.
+    pub quality: Quality,
+    /// Integrals of the solution.
+    pub conserved: Conserved,
+}
+
+/// Error against the exact solution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorNorms {
+    /// Largest over the nodes.
+    pub linf: f64,
+    /// √(Σ e²·area / Σ area), a node's area being a quarter of its cells'.
+    pub l2: f64,
+}
+
+/// What a conservative scheme keeps, up to what flows through the sides.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Conserved {
+    /// ∫u dA of the first unknown.
+    pub mass: f64,
+    /// Its change since the start over its size there (its change itself where it was 0).
+    pub drift: f64,
+}

@@ -1,0 +1,158 @@
+use crate::error::{Error, Result};
+
+/// The times of all steps
+///
+/// Every report time and the end are met exactly: each interval between two of them is divided into equal steps, none
+/// longer than the step asked for. Within an interval t = t_start + n Δt, never a running sum.
+///
+/// # Example
+/// ```
+/// use driftmesh::simulation::Schedule;
+/// let schedule = Schedule::new(0.0, 1.0, 0.3, vec![0.5])?;
+/// assert_eq!(schedule.steps(), 4); // 2 × 0.25 and 2 × 0.25
+/// assert_eq!(schedule.time(2), 0.5);
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    start: f64,
+    reports: Vec<f64>,
+    /// End of each interval, and the number of steps done there.
+    intervals: Vec<(f64, usize)>,
+}
+
+const MAX_STEPS: f64 = 1e9;
+
+impl Schedule {
+    /// From `start` to `end` with steps no longer than `step`, meeting all of `report`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names the key of `[time]` that is not finite, not positive or out of order.
+    pub fn new(start: f64, end: f64, step: f64, report: Vec<f64>) -> Result<Self> {
+        let finite = |key: &str, value: f64| match value.is_finite() {
+            true => Ok(()),
+            false => Err(Error::invalid(key, value, "must be a finite number")),
+        };
+        finite("start", start)?;
+        finite("end", end)?;
+        if end <= start {
+            return Err(Error::invalid("end", end, format!("must come after start = {start}")));
+        }
+        finite("step", step)?;
+        if step <= 0.0 {
+            return Err(Error::invalid("step", step, "must be above 0"));
+        }
+        if (end - start) / step > MAX_STEPS {
+            let rule = format!("that makes more than {MAX_STEPS:.0e} steps; raise it");
+            return Err(Error::invalid("step", step, rule));
+        }
+        let mut reports = report;
+        if let Some(t) = reports.iter().find(|t| !(start..=end).contains(*t)) {
+            return Err(Error::invalid("report", t, format!("must lie between start = {start} and end = {end}")));
+        }
+        reports.sort_by(f64::total_cmp);
+        reports.dedup();
+        let mut intervals: Vec<(f64, usize)> = Vec::new();
+        let mut from = start;
+        for &to in reports.iter().chain([&end]).filter(|&&t| t > start) {
+            if to > from {
+                // a quotient that is whole up to round-off is whole
+                let count = ((to - from) / step - 1e-9).ceil().max(1.0) as usize;
+                let done = intervals.last().map_or(0, |i| i.1);
+                intervals.push((to, done + count));
+                from = to;
+            }
+        }
+        Ok(Self { start, reports, intervals })
+    }
+
+    /// Time of the initial state.
+    pub fn start(&self) -> f64 {
+        self.start
+    }
+
+    /// Number of steps.
+    pub fn steps(&self) -> usize {
+        self.intervals.last().map_or(0, |i| i.1)
+    }
+
+    /// Time after `step` steps.
+    pub fn time(&self, step: usize) -> f64 {
+        let (from, done, to, end) = self.interval(step.saturating_sub(1));
+        if step == 0 {
+            self.start
+        } else if step >= end {
+            to
+        } else {
+            from + (step - done) as f64 * ((to - from) / (end - done) as f64)
+        }
+    }
+
+    /// Length of the step that follows `step` steps; none at the end.
+    pub fn step_from(&self, step: usize) -> Option<f64> {
+        let (from, done, to, end) = self.interval(step);
+        (step < end).then(|| (to - from) / (end - done) as f64)
+    }
+
+    /// True where a report is due.
+    pub fn reports_at(&self, t: f64) -> bool {
+        self.reports.contains(&t)
+    }
+
+    /// The interval that the step after `step` lies in: its start and the steps done there, its end likewise.
+    fn interval(&self, step: usize) -> (f64, usize, f64, usize) {
+        let i = self.intervals.iter().position(|&(_, end)| step < end).unwrap_or(self.intervals.len() - 1);
+        let (from, done) = if i == 0 { (self.start, 0) } else { self.intervals[i - 1] };
+        let (to, end) = self.intervals[i];
+        (from, done, to, end)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Steps never exceed the one asked for, times increase, and every report is met to the last bit.
+        #[test]
+        fn reports_are_met_exactly(start in -2.0..2.0_f64, span in 1e-3..5.0_f64, step in 1e-3..1.0_f64, at in prop::collection::vec(0.0..1.0_f64, 0..4)) {
+            let end = start + span;
+            let report: Vec<f64> = at.iter().map(|s| (start + s * span).clamp(start, end)).collect();
+            let schedule = Schedule::new(start, end, step, report.clone()).unwrap();
+            let times: Vec<f64> = (0..=schedule.steps()).map(|n| schedule.time(n)).collect();
+            prop_assert_eq!(times[0], start);
+            prop_assert_eq!(times[schedule.steps()], end);
+            for n in 0..schedule.steps() {
+                prop_assert!(times[n + 1] > times[n] || span < 1e-9);
+                prop_assert!(schedule.step_from(n).unwrap() <= step * (1.0 + 1e-8));
+            }
+            prop_assert!(schedule.step_from(schedule.steps()).is_none());
+            prop_assert!(report.iter().all(|t| times.contains(t)));
+        }
+    }
+
+    /// 0.25 + n·1e-3 has exactly 1000 steps to 1.25, whatever the quotient rounds to.
+    #[test]
+    fn a_step_that_divides_the_span_is_kept() {
+        let schedule = Schedule::new(0.25, 1.25, 1e-3, vec![0.75, 1.0, 1.25]).unwrap();
+        assert_eq!(schedule.steps(), 1000);
+        assert_eq!(schedule.time(500), 0.75);
+        assert!((schedule.step_from(3).unwrap() - 1e-3).abs() < 1e-18);
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        let key = |start, end, step, report| match Schedule::new(start, end, step, report) {
+            Err(Error::Invalid { key, .. }) => key,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(key(0.0, -1.0, 0.1, vec![]), "end");
+        assert_eq!(key(0.0, 1.0, 0.0, vec![]), "step");
+        assert_eq!(key(0.0, 1.0, 1e-12, vec![]), "step");
+        assert_eq!(key(0.0, 1.0, f64::NAN, vec![]), "step");
+        assert_eq!(key(f64::NAN, 1.0, 0.1, vec![]), "start");
+        assert_eq!(key(0.0, f64::INFINITY, 0.1, vec![]), "end");
+        assert_eq!(key(0.0, 1.0, 0.1, vec![2.0]), "report");
+    }
+}

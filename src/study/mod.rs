@@ -1,0 +1,9 @@
+//! From a study file to a run: text → checked parts → simulation → run directory.
+
+mod moving_mesh;
+mod run;
+mod source;
+
+pub use moving_mesh::{Domain, Grid, Header, MeshTable, MovingMesh, Output, StudyKind, Time};
+pub use run::{Finished, run};
+pub use source::Source;

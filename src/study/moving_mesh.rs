@@ -1,0 +1,258 @@
+use super::Source;
+use crate::density::MonitorKind;
+use crate::error::{Error, Result};
+use crate::geometry::{Lattice, Mesh};
+use crate::meshing::{GeneratorKind, Mmpde};
+use crate::physics::PdeKind;
+use crate::simulation::{Coupling, FramesAt, Schedule, Simulation};
+use serde::{Deserialize, Serialize};
+
+/// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MovingMesh {
+    /// `[study]`.
+    pub study: Header,
+    /// `[domain]`.
+    #[serde(default)]
+    pub domain: Domain,
+    /// `[grid]`.
+    pub grid: Grid,
+    /// `[time]`.
+    pub time: Time,
+    /// `[pde]`.
+    pub pde: PdeKind,
+    /// `[monitor]`.
+    #[serde(default)]
+    pub monitor: MonitorKind,
+    /// `[mesh]`.
+    #[serde(default)]
+    pub mesh: MeshTable,
+    /// `[output]`.
+    #[serde(default)]
+    pub output: Output,
+}
+
+/// `[study]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// Letters, digits, `-`, `_` and `.`; names the run directory.
+    pub name: String,
+    /// What is studied.
+    pub kind: StudyKind,
+}
+
+/// What a study is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StudyKind {
+    /// A PDE in two dimensions on a moving mesh.
+    MovingMesh,
+}
+
+/// `[domain]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Domain {
+    /// Lower corner of the box.
+    pub lower: [f64; 2],
+    /// Upper corner of the box.
+    pub upper: [f64; 2],
+    /// Axes that wrap around.
+    pub periodic: [bool; 2],
+}
+
+impl Default for Domain {
+    fn default() -> Self {
+        Self { lower: [0.0; 2], upper: [1.0; 2], periodic: [false; 2] }
+    }
+}
+
+/// `[grid]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Cells along each axis.
+    pub cells: [usize; 2],
+}
+
+/// `[time]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// Time of the initial state.
+    pub start: f64,
+    /// Time of the last state.
+    pub end: f64,
+    /// Longest step; steps are shortened evenly such that reports and end are met exactly.
+    pub step: f64,
+    /// Times at which `summary.json` reports; the end where none are given.
+    #[serde(default)]
+    pub report: Vec<f64>,
+}
+
+/// `[mesh]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MeshTable {
+    /// τ of the mesh equation, in units of time.
+    pub relaxation: f64,
+    /// Form of the mesh equation.
+    pub form: Form,
+    /// The mesh at the start.
+    pub start: StartMesh,
+    /// How the mesh moves.
+    pub generator: GeneratorKind,
+    /// How mesh and physics alternate.
+    pub coupling: Coupling,
+}
+
+impl Default for MeshTable {
+    fn default() -> Self {
+        Self {
+            relaxation: 1.0,
+            form: Form::Gradient,
+            start: StartMesh::Uniform,
+            generator: GeneratorKind::default(),
+            coupling: Coupling::default(),
+        }
+    }
+}
+
+/// Form of the mesh equation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Form {
+    /// As published: x_t = (1/τ)(∇ρ/ρ·∇x + ∇²x).
+    Gradient,
+}
+
+/// The mesh at the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StartMesh {
+    /// Equal cells.
+    Uniform,
+}
+
+/// `[output]`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// When frames are written; about twenty of them where nothing is said.
+    pub frames: Option<FramesAt>,
+}
+
+/// Memory that a run needs for each node, measured on a run of 1000 × 1000 cells and rounded up.
+const BYTES_PER_NODE: u128 = 2500;
+const FRAMES_BY_DEFAULT: usize = 20;
+
+impl MovingMesh {
+    /// Reads and checks a study, every default filled in.
+    ///
+    /// # Errors
+    /// [`Error::Study`] at the place of the first mistake.
+    pub fn from_source(source: &Source) -> Result<Self> {
+        let mut study: Self = source.parse()?;
+        study.resolve().map_err(|error| source.locate(error))?;
+        Ok(study)
+    }
+
+    /// Checks all settings and fills in the defaults that depend on others.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the dotted key of the first setting out of range.
+    pub fn resolve(&mut self) -> Result<()> {
+        let name = &self.study.name;
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if name.is_empty() || name.len() > 100 || name.starts_with('.') || !name.chars().all(plain) {
+            let rule = "must be 1 to 100 of the characters a-z A-Z 0-9 - _ . and not begin with a dot";
+            return Err(Error::invalid("study.name", format!("{name:?}"), rule));
+        }
+        if self.domain.periodic != [false; 2] {
+            let rule = "every kind of PDE here needs bounded axes; set it to [false, false]";
+            return Err(Error::invalid("domain.periodic", format!("{:?}", self.domain.periodic), rule));
+        }
+        self.check_size()?;
+        self.initial_mesh()?;
+        self.pde.check().map_err(|error| error.within("pde"))?;
+        self.monitor.check().map_err(|error| error.within("monitor"))?;
+        self.equation().check().map_err(|error| error.within("mesh"))?;
+        self.mesh.coupling.check().map_err(|error| error.within("coupling").within("mesh"))?;
+        if self.time.report.is_empty() {
+            self.time.report = vec![self.time.end];
+        }
+        let steps = self.schedule()?.steps();
+        let frames = self.output.frames.get_or_insert(FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)));
+        frames.check().map_err(|error| error.within("output"))
+    }
+
+    /// Memory that the run needs, in bytes.
+    pub fn memory(&self) -> u128 {
+        self.grid.cells.iter().map(|&n| n as u128 + 1).product::<u128>() * BYTES_PER_NODE
+    }
+
+    fn check_size(&self) -> Result<()> {
+        let lattice = Lattice::new(self.grid.cells, self.domain.periodic).map_err(|error| error.within("grid"))?;
+        let there = sysinfo::System::new().map_or(u128::MAX, |mut system| {
+            system.refresh_memory();
+            u128::from(system.total_memory())
+        });
+        let needed = self.memory();
+        if needed > there {
+            let gib = |bytes: u128| bytes as f64 / (1_u64 << 30) as f64;
+            let rule = format!(
+                "{:.1e} nodes need about {:.1} GiB and this machine has {:.1}; lower it",
+                lattice.len() as f64,
+                gib(needed),
+                gib(there)
+            );
+            return Err(Error::invalid("grid.cells", format!("{:?}", self.grid.cells), rule));
+        }
+        Ok(())
+    }
+
+    fn schedule(&self) -> Result<Schedule> {
+        let Time { start, end, step, report } = &self.time;
+        Schedule::new(*start, *end, *step, report.clone()).map_err(|error| error.within("time"))
+    }
+
+    fn equation(&self) -> Mmpde {
+        Mmpde { relaxation: self.mesh.relaxation, gradient: self.monitor.gradient() }
+    }
+
+    /// The mesh that the run starts from.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the grid or the domain makes no mesh.
+    pub fn initial_mesh(&self) -> Result<Mesh<2>> {
+        let lattice = Lattice::new(self.grid.cells, self.domain.periodic).map_err(|error| error.within("grid"))?;
+        Mesh::uniform(lattice, self.domain.lower, self.domain.upper).map_err(|error| error.within("domain"))
+    }
+
+    /// The simulation that this study describes.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the dotted key of a setting out of range.
+    pub fn simulation(&self) -> Result<Simulation> {
+        Ok(Simulation {
+            physics: self.pde.clone().into_physics(),
+            monitor: self.monitor.clone().into_monitor(),
+            generator: self.mesh.generator.clone().into_generator(),
+            equation: self.equation(),
+            coupling: self.mesh.coupling,
+            schedule: self.schedule()?,
+        })
+    }
+
+    /// When frames are written.
+    pub(super) fn frames(&self) -> FramesAt {
+        self.output.frames.clone().unwrap_or(FramesAt::Every(1))
+    }
+
+    /// The study as a file, every default filled in.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a study is plain data")
+    }
+}

@@ -1,0 +1,256 @@
+use crate::error::{Diagnostic, Error, Result};
+use serde::de::DeserializeOwned;
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The text of a study with what the command line sets on top of it
+///
+/// Each `--set` is parsed as TOML of its own, preceded by as many spaces as there is text before it: all places then
+/// count in one range, and a mistake is shown where the user made it.
+#[derive(Debug, Clone)]
+pub struct Source {
+    pieces: Vec<Piece>,
+}
+
+#[derive(Debug, Clone)]
+struct Piece {
+    origin: String,
+    text: String,
+    /// Where it begins in the common range.
+    begins: usize,
+    /// What the parser sees: `text`, completed and preceded by spaces.
+    padded: String,
+}
+
+/// Tables in which `kind` names one of several structures.
+const KINDED: [&str; 3] = ["pde", "monitor", "mesh.generator"];
+/// A study is a page of text; more is some other file.
+const MAX_BYTES: u64 = 1 << 20;
+
+impl Source {
+    /// Reads a study file.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] where there is no such file or its text is not UTF-8.
+    pub fn read(path: &Path) -> Result<Self> {
+        let unreadable = |reason: String| Error::Unreadable { path: path.into(), reason };
+        let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?;
+        if size.is_dir() {
+            return Err(unreadable("it is a directory, not a study file".into()));
+        }
+        if size.len() > MAX_BYTES {
+            return Err(unreadable(format!("it has {} bytes; a study has at most {MAX_BYTES}", size.len())));
+        }
+        let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            let line = error.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
+            unreadable(format!("it is not UTF-8 text (byte {at}, line {line}); save it as UTF-8"))
+        })?;
+        Ok(Self::new(path.display().to_string(), text))
+    }
+
+    /// A study from text; `origin` is its name in messages.
+    pub fn new(origin: impl Into<String>, text: impl Into<String>) -> Self {
+        let text = text.into();
+        Self { pieces: vec![Piece { origin: origin.into(), padded: text.clone(), text, begins: 0 }] }
+    }
+
+    /// Sets one key: `KEY=VALUE`, a dotted key and a TOML value, or a bare word for a string.
+    ///
+    /// # Errors
+    /// [`Error::Study`] where it is not an assignment.
+    pub fn set(&mut self, assignment: &str) -> Result<()> {
+        let begins = self.pieces.iter().map(|p| p.padded.len()).max().unwrap_or(0) + 1;
+        let completed = match assignment.split_once('=') {
+            // the shell has eaten the quotes of a string
+            Some((key, word)) if is_word(word) && DeValue::parse(word.trim()).is_err() => {
+                format!("{key}=\"{}\"", word.trim())
+            }
+            _ => assignment.to_string(),
+        };
+        let padded = " ".repeat(begins) + &completed;
+        let piece = Piece { origin: "--set".into(), text: assignment.into(), begins, padded };
+        self.pieces.push(piece);
+        let help = "write --set KEY=VALUE, such as --set time.step=5e-4";
+        let failed = |message: &str| self.diagnostic(message, begins..begins + assignment.len().max(1), Some(help.into()));
+        let only_assignment = !assignment.trim_start().starts_with(['[', '#']) && assignment.contains('=');
+        match DeTable::parse(&self.pieces[self.pieces.len() - 1].padded) {
+            Ok(table) if only_assignment && table.get_ref().len() == 1 => Ok(()),
+            Ok(_) => Err(failed("this is not one assignment")),
+            Err(error) => Err(failed(error.message())),
+        }
+    }
+
+    /// The study as data.
+    ///
+    /// # Errors
+    /// [`Error::Study`] at the place of the first mistake.
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
+        let mut root = self.merged()?;
+        for path in KINDED {
+            self.name_kind(&mut root, path)?;
+        }
+        let end = self.pieces[0].text.trim_end().len();
+        let table = Spanned::new(0..end, root);
+        T::deserialize(toml::Deserializer::from(table)).map_err(|error| self.explain(&error))
+    }
+
+    /// Turns a setting out of range into a diagnostic at the place where it is set.
+    pub fn locate(&self, error: Error) -> Error {
+        let Error::Invalid { key, value, rule } = &error else { return error };
+        let Ok(root) = self.merged() else { return error };
+        let message = format!("`{key}` is {value}, but {rule}");
+        // the key itself, or the innermost table on the way to it that the study names
+        let mut place = None;
+        let mut table = &root;
+        for part in key.split('.') {
+            let Some((name, value)) = table.get_key_value(part) else { break };
+            place = Some(if value.get_ref().is_table() { name.span() } else { value.span() });
+            match value.get_ref().as_table() {
+                Some(inner) => table = inner,
+                None => break,
+            }
+        }
+        match place {
+            Some(span) => self.diagnostic(&message, span, None),
+            None => error,
+        }
+    }
+
+    /// All pieces as one table, later ones on top.
+    fn merged(&self) -> Result<DeTable<'_>> {
+        let mut root = DeTable::new();
+        for (n, piece) in self.pieces.iter().enumerate() {
+            let table = DeTable::parse(&piece.padded).map_err(|error| self.explain(&error))?;
+            if n == 0 {
+                root = table.into_inner();
+            } else {
+                merge(&mut root, table.into_inner(), self.pieces[0].text.len());
+            }
+        }
+        Ok(root)
+    }
+
+    /// Rewrites `{ kind = "name", … }` at a path to `{ name = { … } }`.
+    fn name_kind(&self, root: &mut DeTable<'_>, path: &str) -> Result<()> {
+        let Some((name, value)) = entry(root, path) else { return Ok(()) };
+        let DeValue::Table(table) = value.get_mut() else { return Ok(()) };
+        let Some((_, kind)) = table.remove_entry("kind") else {
+            let help = format!("add kind = \"…\"; `driftmesh list` shows the kinds of {path}");
+            return Err(self.diagnostic(&format!("`{path}` does not say its kind"), name, Some(help)));
+        };
+        let span = kind.span();
+        let DeValue::String(kind) = kind.into_inner() else {
+            let help = Some("write it as a string, such as kind = \"…\"".to_string());
+            return Err(self.diagnostic(&format!("`{path}.kind` is not a string"), span, help));
+        };
+        let inner = std::mem::take(table);
+        table.insert(Spanned::new(span, kind), Spanned::new(name, DeValue::Table(inner)));
+        Ok(())
+    }
+
+    /// A mistake that the TOML reader found, in this project's words.
+    fn explain(&self, error: &toml::de::Error) -> Error {
+        let message = error.message().trim();
+        let span = error.span().unwrap_or(0..0);
+        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        let unknown = ["unknown field", "unknown variant"].iter().any(|m| message.starts_with(m));
+        if let (true, [found, known @ ..]) = (unknown, quoted.as_slice()) {
+            let what = if message.starts_with("unknown field") { "key" } else { "kind" };
+            let nearest = (known.iter().map(|k| (strsim::damerau_levenshtein(found, k), *k)))
+                .filter(|(distance, k)| *distance <= 2.max(k.len() / 3))
+                .min();
+            let help = match nearest {
+                Some((_, nearest)) => format!("did you mean `{nearest}`?"),
+                None if known.is_empty() => "nothing can be set here".into(),
+                None => format!("known here: {}", known.join(", ")),
+            };
+            return self.diagnostic(&format!("unknown {what} `{found}`"), span, Some(help));
+        }
+        if let (true, Some(missing)) = (message.starts_with("missing field"), quoted.first()) {
+            let whole = span.start == 0 && span.end == self.pieces[0].text.trim_end().len();
+            let message = match whole {
+                true => format!("the study has no [{missing}] table"),
+                false => format!("the key `{missing}` is missing here"),
+            };
+            let span = if whole { last_line(&self.pieces[0].text) } else { span };
+            return self.diagnostic(&message, span, None);
+        }
+        self.diagnostic(message, span, None)
+    }
+
+    /// A message at a place in the common range.
+    fn diagnostic(&self, message: &str, span: Range<usize>, help: Option<String>) -> Error {
+        let piece = self.pieces.iter().rev().find(|p| span.start >= p.begins).unwrap_or(&self.pieces[0]);
+        let clamp = |at: usize| {
+            let mut at = at.saturating_sub(piece.begins).min(piece.text.len());
+            while !piece.text.is_char_boundary(at) {
+                at -= 1;
+            }
+            at
+        };
+        let (start, end) = (clamp(span.start), clamp(span.end));
+        let line_start = piece.text[..start].rfind('\n').map_or(0, |n| n + 1);
+        let line_end = piece.text[start..].find(['\n', '\r']).map_or(piece.text.len(), |n| start + n);
+        let end = end.clamp(start, line_end);
+        Error::Study(Box::new(Diagnostic {
+            message: message.to_string(),
+            origin: piece.origin.clone(),
+            text: piece.text[line_start..line_end].replace('\t', " "),
+            line: piece.text[..start].matches('\n').count() + 1,
+            column: piece.text[line_start..start].chars().count() + 1,
+            width: piece.text[start..end].chars().count().max(1),
+            help,
+        }))
+    }
+}
+
+/// Puts one table over another. A new `kind` drops the keys that the file gave for the old one.
+fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>, file: usize) {
+    for (key, value) in over {
+        let known = under.get(key.get_ref().as_ref());
+        if key.get_ref() == "kind" && known.is_some_and(|k| k.get_ref().as_str() != value.get_ref().as_str()) {
+            let of_file: Vec<String> =
+                (under.iter()).filter(|(k, _)| k.span().start < file).map(|(k, _)| k.get_ref().to_string()).collect();
+            of_file.iter().for_each(|k| drop(under.remove(k.as_str())));
+        }
+        match (under.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut), value.get_ref()) {
+            (Some(DeValue::Table(below)), DeValue::Table(_)) => {
+                if let DeValue::Table(above) = value.into_inner() {
+                    merge(below, above, file);
+                }
+            }
+            _ => {
+                under.remove(key.get_ref().as_ref());
+                under.insert(key, value);
+            }
+        }
+    }
+}
+
+/// The place of the name and the value at a dotted path.
+fn entry<'t, 'a>(table: &'t mut DeTable<'a>, path: &str) -> Option<(Range<usize>, &'t mut Spanned<DeValue<'a>>)> {
+    let (first, rest) = path.split_once('.').map_or((path, None), |(first, rest)| (first, Some(rest)));
+    let name = table.get_key_value(first)?.0.span();
+    let value = table.get_mut(first)?;
+    match (rest, value) {
+        (None, value) => Some((name, value)),
+        (Some(rest), value) => match value.get_mut() {
+            DeValue::Table(inner) => entry(inner, rest),
+            _ => None,
+        },
+    }
+}
+
+fn is_word(text: &str) -> bool {
+    let text = text.trim();
+    !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "-_./".contains(c))
+}
+
+fn last_line(text: &str) -> Range<usize> {
+    let end = text.trim_end().len();
+    text[..end].rfind('\n').map_or(0, |n| n + 1)..end
+}
