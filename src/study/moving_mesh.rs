@@ -201,9 +201,9 @@ impl MovingMesh {
         });
         let needed = self.memory();
         if needed > there {
-            let gib = |bytes: u128| bytes as f64 / (1_u64 << 30) as f64;
+            let gib = |bytes: u128| (bytes as f64 / (1_u64 << 30) as f64).ceil();
             let rule = format!(
-                "{:.1e} nodes need about {:.1} GiB and this machine has {:.1}; lower it",
+                "{:.2e} nodes need about {:.3e} GiB and this machine has {}; lower it",
                 lattice.len() as f64,
                 gib(needed),
                 gib(there)

@@ -26,6 +26,8 @@ struct Piece {
 
 /// Tables in which `kind` names one of several structures.
 const KINDED: [&str; 3] = ["pde", "monitor", "mesh.generator"];
+/// Tables that hold one of several keys.
+const CHOICES: [&str; 2] = ["monitor.strength", "output.frames"];
 /// A study is a page of text; more is some other file.
 const MAX_BYTES: u64 = 1 << 20;
 
@@ -128,7 +130,7 @@ impl Source {
             if n == 0 {
                 root = table.into_inner();
             } else {
-                merge(&mut root, table.into_inner(), self.pieces[0].text.len());
+                merge(&mut root, table.into_inner(), "", self.pieces[0].text.len());
             }
         }
         Ok(root)
@@ -159,7 +161,7 @@ impl Source {
         let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         let unknown = ["unknown field", "unknown variant"].iter().any(|m| message.starts_with(m));
         if let (true, [found, known @ ..]) = (unknown, quoted.as_slice()) {
-            let what = if message.starts_with("unknown field") { "key" } else { "kind" };
+            let what = if message.starts_with("unknown field") { "key" } else { "name" };
             let nearest = (known.iter().map(|k| (strsim::damerau_levenshtein(found, k), *k)))
                 .filter(|(distance, k)| *distance <= 2.max(k.len() / 3))
                 .min();
@@ -179,7 +181,13 @@ impl Source {
             let span = if whole { last_line(&self.pieces[0].text) } else { span };
             return self.diagnostic(&message, span, None);
         }
-        self.diagnostic(message, span, None)
+        let message = if message.starts_with("wanted exactly 1 element") {
+            "exactly one of its keys must be given here".to_string()
+        } else {
+            // Rust's words for what a user calls a number
+            message.replace("expected f64", "expected a number").replace("expected usize", "expected a whole number, 0 or more")
+        };
+        self.diagnostic(&message, span, None)
     }
 
     /// A message at a place in the common range.
@@ -208,26 +216,37 @@ impl Source {
     }
 }
 
-/// Puts one table over another. A new `kind` drops the keys that the file gave for the old one.
-fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>, file: usize) {
+/// Puts one table over another. A new `kind`, or another key of a choice, drops what the file gave for the old one.
+fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>, path: &str, file: usize) {
     for (key, value) in over {
-        let known = under.get(key.get_ref().as_ref());
-        if key.get_ref() == "kind" && known.is_some_and(|k| k.get_ref().as_str() != value.get_ref().as_str()) {
-            let of_file: Vec<String> =
-                (under.iter()).filter(|(k, _)| k.span().start < file).map(|(k, _)| k.get_ref().to_string()).collect();
-            of_file.iter().for_each(|k| drop(under.remove(k.as_str())));
+        let name = key.get_ref().to_string();
+        let known = under.get(name.as_str());
+        let other_kind =
+            name == "kind" && known.is_some_and(|k| k.get_ref().as_str() != value.get_ref().as_str());
+        if other_kind || (CHOICES.contains(&path) && known.is_none()) {
+            drop_before(under, file);
         }
-        match (under.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut), value.get_ref()) {
+        let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+        match (under.get_mut(name.as_str()).map(Spanned::get_mut), value.get_ref()) {
             (Some(DeValue::Table(below)), DeValue::Table(_)) => {
                 if let DeValue::Table(above) = value.into_inner() {
-                    merge(below, above, file);
+                    merge(below, above, &inner, file);
                 }
             }
             _ => {
-                under.remove(key.get_ref().as_ref());
+                under.remove(name.as_str());
                 under.insert(key, value);
             }
         }
+    }
+}
+
+/// Removes the keys that stand before a place.
+fn drop_before(table: &mut DeTable<'_>, place: usize) {
+    let before = table.iter().filter(|(key, _)| key.span().start < place);
+    let names: Vec<String> = before.map(|(key, _)| key.get_ref().to_string()).collect();
+    for name in names {
+        table.remove(name.as_str());
     }
 }
 

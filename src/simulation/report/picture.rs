@@ -71,14 +71,23 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
             let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\" stroke=\"{fill}\"/>", points.join(" "));
         }
     }
-    s.push_str("</g>\n<g fill=\"none\" stroke=\"white\" stroke-opacity=\"0.65\" stroke-width=\"0.7\">\n");
-    let mut polyline = |nodes: &mut dyn Iterator<Item = usize>| {
-        let points: Vec<String> = nodes.map(|k| point(to(x[k]))).collect();
-        let _ = writeln!(s, "<polyline points=\"{}\"/>", points.join(" "));
-    };
-    lines[0].iter().for_each(|&i| polyline(&mut lines[1].iter().map(|&j| at(i, j))));
-    lines[1].iter().for_each(|&j| polyline(&mut lines[0].iter().map(|&i| at(i, j))));
     s.push_str("</g>\n");
+
+    // mesh lines, light on dark colours and dark on light ones
+    let mut paths = [String::new(), String::new()];
+    let mut segment = |a: usize, b: usize| {
+        let light = 0.5 * (u[a] + u[b]) - low < 0.6 * (high - low);
+        let _ = write!(paths[usize::from(light)], "M{}L{}", point(to(x[a])), point(to(x[b])));
+    };
+    for &i in &lines[0] {
+        lines[1].windows(2).for_each(|j| segment(at(i, j[0]), at(i, j[1])));
+    }
+    for &j in &lines[1] {
+        lines[0].windows(2).for_each(|i| segment(at(i[0], j), at(i[1], j)));
+    }
+    for (path, colour) in paths.iter().zip(["black", "white"]) {
+        let _ = writeln!(s, "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"0.5\" stroke-width=\"0.7\"/>");
+    }
 
     axes(&mut s, [lx, ly], [wx, wy], [width, height]);
     colour_bar(&mut s, unknown, low, high, LEFT + width + 24.0, height);

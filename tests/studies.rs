@@ -1,0 +1,116 @@
+//! Every file in `studies/` is rerun against stored norms and work counters.
+//!
+//! The norms are those that two independent implementations agree on (issue tracker: "The spine"), each with the
+//! tolerance that comes with it; the counters are this implementation's own and hold exactly.
+
+use driftmesh::simulation::Summary;
+use driftmesh::study::{MovingMesh, Source, run};
+use std::path::Path;
+
+fn rerun(name: &str) -> (Summary, driftmesh::simulation::State) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(format!("{name}.toml"));
+    let study = MovingMesh::from_source(&Source::read(&file).unwrap()).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let finished = run(&study, &out.path().join("run"), &mut []).unwrap();
+    assert!(finished.failure.is_none(), "{name}: {:?}", finished.failure);
+    (finished.summary, finished.state)
+}
+
+/// Values at the three report times, each within its tolerance, relative.
+fn assert_row(name: &str, what: &str, found: [f64; 3], expected: [f64; 3], tolerance: [f64; 3]) {
+    for k in 0..3 {
+        let off = (found[k] - expected[k]).abs() / expected[k];
+        assert!(off <= tolerance[k], "{name}: {what} is {found:?}, expected {expected:?}, off by {off:.4} at report {k}");
+    }
+}
+
+fn linf(summary: &Summary) -> [f64; 3] {
+    std::array::from_fn(|k| summary.reports[k].error.unwrap().linf)
+}
+
+fn q_max(summary: &Summary) -> [f64; 3] {
+    std::array::from_fn(|k| summary.reports[k].quality.q_max)
+}
+
+fn q_mean(summary: &Summary) -> [f64; 3] {
+    std::array::from_fn(|k| summary.reports[k].quality.q_mean)
+}
+
+fn assert_work(summary: &Summary, newton: usize, solves: usize, iterations: usize) {
+    let work = summary.work.work;
+    let found = [summary.work.steps, work.newton_iterations, work.linear_solves, work.linear_iterations];
+    assert_eq!(found, [1000, newton, solves, iterations], "{}: steps, Newton, solves, iterations", summary.study);
+}
+
+const DIGITS: [f64; 3] = [0.02; 3];
+const Q: [f64; 3] = [0.01; 3];
+
+#[test]
+fn case_b_conservative() {
+    for name in ["burgers", "burgers-b-conservative"] {
+        let (summary, _) = rerun(name);
+        assert_row(name, "l_inf", linf(&summary), [0.0103, 0.0107, 0.0138], DIGITS);
+        assert_row(name, "Q max", q_max(&summary), [2.148, 2.208, 2.639], Q);
+        assert_work(&summary, 0, 0, 0);
+    }
+}
+
+/// Also node (10, 10) to 2e-5 at all three times, from runs that end there, and the smallest corner Jacobian.
+#[test]
+fn case_b_advective() {
+    let name = "burgers-b-advective";
+    let (summary, state) = rerun(name);
+    assert_row(name, "l_inf", linf(&summary), [0.03076, 0.03413, 0.03307], DIGITS);
+    assert_row(name, "Q max", q_max(&summary), [2.126, 2.232, 2.560], Q);
+    assert_row(name, "Q mean", q_mean(&summary), [1.1111, 1.1420, 1.1299], Q);
+    assert!((summary.reports[0].quality.min_scaled_jacobian - 0.16936).abs() < 1e-5);
+    let node = state.mesh.lattice().index([10, 10]);
+    assert!((state.mesh.x()[node][0] - 0.254841).abs() < 2e-5, "{:?}", state.mesh.x()[node]);
+    assert_work(&summary, 0, 0, 0);
+}
+
+/// Chaotic from t = 1 on: round-off moves l_inf and Q by up to 5 %.
+#[test]
+fn case_a_advective() {
+    let name = "burgers-a-advective";
+    let (summary, _) = rerun(name);
+    let tolerance = [0.01, 0.05, 0.05];
+    assert_row(name, "l_inf", linf(&summary), [0.0961, 0.1051, 0.0989], tolerance);
+    assert_row(name, "Q max", q_max(&summary), [1.38, 1.26, 1.76], tolerance);
+    assert_row(name, "Q mean", q_mean(&summary), [1.02, 1.01, 1.04], tolerance);
+    assert_eq!(summary.work.steps, 1000);
+}
+
+#[test]
+fn case_a_smoothed() {
+    let name = "burgers-a-smoothed";
+    let (summary, _) = rerun(name);
+    assert_row(name, "l_inf", linf(&summary), [0.0298, 0.0315, 0.0286], DIGITS);
+    assert_work(&summary, 0, 0, 0);
+}
+
+#[test]
+fn uniform_meshes() {
+    let expected = [
+        ("burgers-uniform-conservative", [0.0898, 0.0898, 0.0947]),
+        ("burgers-uniform-advective", [0.317, 0.321, 0.328]),
+    ];
+    for (name, errors) in expected {
+        let (summary, _) = rerun(name);
+        assert_row(name, "l_inf", linf(&summary), errors, DIGITS);
+        assert_row(name, "Q max", q_max(&summary), [1.0; 3], [1e-12; 3]);
+        assert_row(name, "Q mean", q_mean(&summary), [1.0; 3], [1e-12; 3]);
+        assert_work(&summary, 0, 0, 0);
+    }
+}
+
+/// No study is left out of the tests above.
+#[test]
+fn every_study_is_tested() {
+    let tested = include_str!("studies.rs");
+    for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies")).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let stem = name.strip_suffix(".toml").unwrap_or_else(|| panic!("{name} is not a study"));
+        assert!(tested.contains(&format!("\"{stem}\"")), "{name} has no test");
+    }
+}
