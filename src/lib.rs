@@ -6,6 +6,7 @@ pub mod geometry;
 mod kind;
 pub mod meshing;
 pub mod numerics;
+mod parallel;
 pub mod physics;
 pub mod simulation;
 pub mod study;

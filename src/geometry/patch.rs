@@ -66,6 +66,21 @@ impl<const D: usize> Patch<D> {
         start
     }
 
+    /// The pencil in the q-th row of a padded vector cut into rows of `pencil_len() + 2`; none in rows of the ring.
+    pub fn pencil_in_row(&self, q: usize) -> Option<usize> {
+        let (mut rest, mut pencil, mut stride) = (q, 0, 1);
+        for d in (0..D - 1).rev() {
+            let place = rest % (self.size[d] + 2);
+            if !(1..=self.size[d]).contains(&place) {
+                return None;
+            }
+            pencil += (place - 1) * stride;
+            stride *= self.size[d];
+            rest /= self.size[d] + 2;
+        }
+        Some(pencil)
+    }
+
     /// All runs of unknowns along the last axis, as starts in a padded vector.
     pub fn pencils(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.pencil_count()).map(|p| self.pencil(p))
@@ -73,6 +88,9 @@ impl<const D: usize> Patch<D> {
 
     /// Nodal values as a padded vector, ring included; `jump[d]` is added on wrapping around axis d.
     pub fn gather<const K: usize>(&self, lattice: &Lattice<D>, values: &[[f64; K]], jump: [[f64; K]; D]) -> Vec<[f64; K]> {
+        if (self.origin, self.size.map(|n| n + 2)) == ([1; D], lattice.nodes()) {
+            return values.to_vec(); // all of a bounded lattice
+        }
         let mut padded = Vec::with_capacity(self.padded_len());
         self.for_each_padded(lattice, |index, turns| {
             let mut value = values[index];

@@ -2,6 +2,7 @@ use super::{Motion, Physics, check_finite, curvilinear::Stencils};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, Patch};
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
+use crate::parallel;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
@@ -85,20 +86,18 @@ impl Burgers {
         Field::scalar(mesh.x().iter().map(|&x| self.front(t, x)).collect())
     }
 
-    /// R of one mesh as stencils, for nodes that move with `velocity`.
-    fn right_hand_side<'a>(&self, stencils: &'a Stencils, velocity: &'a [[f64; 2]]) -> impl Iterator<Item = Row> + 'a {
-        let (viscosity, convection) = (self.viscosity, self.convection);
-        (stencils.gradient.iter().zip(&stencils.laplacian)).zip(velocity).map(move |((gradient, laplacian), v)| {
-            let mut linear = laplacian.map(|w| viscosity * w);
-            for (l, g) in linear[1..5].iter_mut().zip(gradient) {
-                *l += v[0] * g[0] + v[1] * g[1];
-            }
-            Row { linear, flux: gradient.map(|g| g[0] + g[1]), convection }
-        })
+    /// R at one node that moves with velocity v.
+    fn row(&self, gradient: &[[f64; 2]; 4], laplacian: &[f64; 9], v: [f64; 2]) -> Row {
+        let mut linear = laplacian.map(|w| self.viscosity * w);
+        for (l, g) in linear[1..5].iter_mut().zip(gradient) {
+            *l += v[0] * g[0] + v[1] * g[1];
+        }
+        Row { linear, flux: gradient.map(|g| g[0] + g[1]), convection: self.convection }
     }
 }
 
 /// R at one node: what is linear in the nine values, and the weights of ∂_x + ∂_y for the convection.
+#[derive(Clone, Copy)]
 struct Row {
     linear: [f64; 9],
     flux: [f64; 4],
@@ -106,6 +105,8 @@ struct Row {
 }
 
 impl Row {
+    const ZERO: Self = Self { linear: [0.0; 9], flux: [0.0; 4], convection: Convection::Conservative };
+
     fn value(&self, u: &[f64; 9]) -> f64 {
         let linear: f64 = self.linear.iter().zip(u).map(|(l, u)| l * u).sum();
         let star = self.flux.iter().zip(&u[1..5]);
@@ -151,12 +152,13 @@ impl Physics for Burgers {
         let [width, height] = new.extent();
         let jump = [[width, 0.0], [0.0, height]];
         let (x_old, x_new) = (patch.gather(lattice, old.x(), jump), patch.gather(lattice, new.x(), jump));
-        let velocity: Vec<[f64; 2]> =
-            patch.places().map(|k| [0, 1].map(|d| (x_new[k][d] - x_old[k][d]) / dt)).collect();
+        let velocity = |k: usize| [0, 1].map(|d| (x_new[k][d] - x_old[k][d]) / dt);
 
         let mut matrix = LatticeMatrix::<2, 9>::zero(patch);
         let offsets = matrix.offsets();
         let around = |u: &[[f64; 1]], k: usize| offsets.map(|o| u[k.wrapping_add_signed(o)][0]);
+        let n = patch.pencil_len();
+        let places = |p: usize| (p * n..(p + 1) * n).zip(patch.pencil(p)..);
 
         // the half of the step that is known
         let stencils_old = match self.newest.take() {
@@ -164,51 +166,62 @@ impl Physics for Burgers {
             _ => Stencils::new(&patch, &x_old),
         };
         let u_old = patch.gather(lattice, u.values().as_chunks::<1>().0, [[0.0]; 2]);
-        let known: Vec<f64> = (self.right_hand_side(&stencils_old, &velocity).zip(patch.places()))
-            .map(|(row, k)| u_old[k][0] + 0.5 * dt * row.value(&around(&u_old, k)))
-            .collect();
+        let mut known = vec![0.0; patch.len()];
+        parallel::for_each_row(&mut known, n, |p, known| {
+            for (known, (i, k)) in known.iter_mut().zip(places(p)) {
+                let row = self.row(&stencils_old.gradient[i], &stencils_old.laplacian[i], velocity(k));
+                *known = u_old[k][0] + 0.5 * dt * row.value(&around(&u_old, k));
+            }
+        });
 
         // the half that is not: new side values around the old ones inside
         let stencils = Stencils::new(&patch, &x_new);
-        let rows: Vec<Row> = self.right_hand_side(&stencils, &velocity).collect();
-        let mut all = self.on_mesh(t + dt, new);
-        patch.scatter(lattice, u_old.as_flattened(), all.values_mut());
-        let mut u_new = patch.gather(lattice, all.values().as_chunks::<1>().0, [[0.0]; 2]);
+        let mut rows = vec![Row::ZERO; patch.len()];
+        parallel::for_each_row(&mut rows, n, |p, rows| {
+            for (row, (i, k)) in rows.iter_mut().zip(places(p)) {
+                *row = self.row(&stencils.gradient[i], &stencils.laplacian[i], velocity(k));
+            }
+        });
+        let mut solution = self.on_mesh(t + dt, new);
+        patch.scatter(lattice, u_old.as_flattened(), solution.values_mut());
+        let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
+
         let size = u_new.iter().fold(1.0_f64, |m, u| m.max(u[0].abs()));
         let mut work = Work::default();
-        loop {
-            let mut residual: Vec<[f64; 1]> = Vec::with_capacity(patch.len());
-            let mut largest = 0.0_f64;
-            for ((row, known), k) in rows.iter().zip(&known).zip(patch.places()) {
-                let r = known - u_new[k][0] + 0.5 * dt * row.value(&around(&u_new, k));
-                largest = if r.abs() <= largest { largest } else { r.abs() };
-                residual.push([r]);
-            }
+        let mut residual = vec![[0.0]; patch.len()];
+        let stalled = loop {
+            parallel::for_each_row(&mut residual, n, |p, residual| {
+                for (residual, (i, k)) in residual.iter_mut().zip(places(p)) {
+                    *residual = [known[i] - u_new[k][0] + 0.5 * dt * rows[i].value(&around(&u_new, k))];
+                }
+            });
+            let largest = residual.iter().fold(0.0_f64, |m, [r]| if r.abs() <= m { m } else { r.abs() });
             if largest <= TOLERANCE * size {
-                break;
+                break None;
             }
-            if work.newton_iterations == MAX_NEWTON || !largest.is_finite() {
-                patch.scatter(lattice, u_new.as_flattened(), all.values_mut());
-                check_finite("u", new, all.values())?;
-                let iterations = work.newton_iterations;
-                return Err(Failure::NewtonStalled { residual: largest, tolerance: TOLERANCE * size, iterations });
+            let iterations = work.newton_iterations;
+            if iterations == MAX_NEWTON || !largest.is_finite() {
+                break Some(Failure::NewtonStalled { residual: largest, tolerance: TOLERANCE * size, iterations });
             }
-            for ((entries, row), k) in matrix.rows.iter_mut().zip(&rows).zip(patch.places()) {
-                *entries = row.derivative(&around(&u_new, k)).map(|d| -0.5 * dt * d);
-                entries[0] += 1.0;
-            }
+            parallel::for_each_row(&mut matrix.rows, n, |p, entries| {
+                for (entries, (i, k)) in entries.iter_mut().zip(places(p)) {
+                    *entries = rows[i].derivative(&around(&u_new, k)).map(|d| -0.5 * dt * d);
+                    entries[0] += 1.0;
+                }
+            });
             let mut correction = vec![[0.0]; patch.padded_len()];
-            let tolerance = [0.1 * TOLERANCE * size];
+            // Newton squares the residual: solving for much less than that is wasted
+            let tolerance = [(0.01 * largest * largest / size).max(0.1 * TOLERANCE * size)];
             work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
             work.linear_solves += 1;
             work.newton_iterations += 1;
             for (u, c) in u_new.iter_mut().zip(&correction) {
                 u[0] += c[0];
             }
-        }
-        patch.scatter(lattice, u_new.as_flattened(), all.values_mut());
-        check_finite("u", new, all.values())?;
+        };
+        patch.scatter(lattice, u_new.as_flattened(), solution.values_mut());
+        check_finite("u", new, solution.values())?;
         self.newest = Some((new.clone(), stencils));
-        Ok((all, work))
+        stalled.map_or(Ok((solution, work)), Err)
     }
 }

@@ -1,4 +1,5 @@
 use crate::geometry::Patch;
+use crate::parallel;
 
 /// Differential operators in x as stencils on the lattice, at every unknown of the whole domain
 ///
@@ -30,38 +31,35 @@ impl Stencils {
     pub fn new(patch: &Patch<2>, x: &[[f64; 2]]) -> Self {
         let [s, _] = patch.padded_strides();
         let n = patch.pencil_len();
-        let mut gradient = Vec::with_capacity(patch.len());
-        let mut laplacian = Vec::with_capacity(patch.len());
-        let ring_below = patch.pencil(0) - s;
-        let mut below: Vec<Face> = (ring_below..ring_below + n).map(|k| face(x, k, s, 1)).collect();
-        for start in patch.pencils() {
+        let mut gradient = vec![[[0.0; 2]; 4]; patch.len()];
+        let mut laplacian = vec![[0.0; 9]; patch.len()];
+        parallel::for_each_row_pair(&mut gradient, n, &mut laplacian, n, |p, gradient, laplacian| {
+            let start = patch.pencil(p);
             let mut south = face(x, start - 1, 1, s);
-            for (k, west) in (start..).zip(&mut below) {
+            for (k, (gradient, laplacian)) in (start..).zip(gradient.iter_mut().zip(laplacian)) {
                 let (xi, eta) = (minus(x[k + s], x[k - s]), minus(x[k + 1], x[k - 1]));
                 let inverse = 1.0 / cross(xi, eta);
                 let above = [eta[1] * inverse, -eta[0] * inverse];
                 let right = [-xi[1] * inverse, xi[0] * inverse];
-                gradient.push([above.map(|v| -v), above, right.map(|v| -v), right]);
+                *gradient = [above.map(|v| -v), above, right.map(|v| -v), right];
 
-                let (east, north) = (face(x, k, s, 1), face(x, k, 1, s));
+                let (west, east, north) = (face(x, k - s, s, 1), face(x, k, s, 1), face(x, k, 1, s));
                 let scale = 4.0 * inverse;
-                laplacian.push(
-                    [
-                        -(west[0] + east[0] + south[0] + north[0]),
-                        west[0] - south[1] + north[1],
-                        east[0] + south[1] - north[1],
-                        south[0] - west[1] + east[1],
-                        north[0] + west[1] - east[1],
-                        -west[1] - south[1],
-                        west[1] + north[1],
-                        east[1] + south[1],
-                        -east[1] - north[1],
-                    ]
-                    .map(|w| w * scale),
-                );
-                (*west, south) = (east, north);
+                *laplacian = [
+                    -(west[0] + east[0] + south[0] + north[0]),
+                    west[0] - south[1] + north[1],
+                    east[0] + south[1] - north[1],
+                    south[0] - west[1] + east[1],
+                    north[0] + west[1] - east[1],
+                    -west[1] - south[1],
+                    west[1] + north[1],
+                    east[1] + south[1],
+                    -east[1] - north[1],
+                ]
+                .map(|w| w * scale);
+                south = north;
             }
-        }
+        });
         Self { gradient, laplacian }
     }
 }

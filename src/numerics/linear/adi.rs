@@ -1,20 +1,26 @@
 use super::LatticeMatrix;
 use crate::geometry::Patch;
+use crate::parallel;
 
-/// Alternating-direction preconditioner of Peaceman and Rachford
+/// Alternating-direction iteration of Peaceman and Rachford
 ///
 /// ```text
-/// A = X + Y ≈ (R + X)(2R)⁻¹(R + Y),   R = diag √(λ_min λ_max)
+/// x ← x + (R + Y)⁻¹ 2R (R + X)⁻¹ (v − A x),   A = X + Y,   R = R_1, …, R_J
 /// ```
 ///
-/// X and Y are the parts of the star along each axis with half of the identity each, and R balances the ends of their
-/// spectra row by row: the condition of the product grows like √(Δt/h²), not like Δt/h² as it would with R = I. Each
-/// factor is a set of tridiagonal systems along the lines of the lattice, eliminated once for many right-hand sides.
-/// In one dimension it is the inverse itself. Corners and couplings around periodic axes are left to the iteration.
+/// X and Y are the parts of the star along each axis with half of the identity each. Sweep j damps best the modes for
+/// which X and Y are near R_j, and the R_j divide the spectrum [λ, κλ] geometrically, row by row: the number J of sweeps
+/// in a cycle grows like ln κ, and a sweep leaves a quarter to a third of the error. Each sweep solves the tridiagonal
+/// systems along all lines of the lattice, axis by axis, eliminated once for all cycles and right-hand sides. In one
+/// dimension a single sweep is the inverse itself. Corners and couplings around periodic axes are left to the residual.
+///
+/// # Source
+/// Wachspress, *The ADI Model Problem*, Springer (2013).
 #[derive(Debug, Clone, Default)]
 pub(super) struct Adi {
-    /// For each axis, at each place of a padded vector.
-    axes: Vec<Vec<Factor>>,
+    /// For each sweep and axis, at each place of a padded vector.
+    factors: Vec<Vec<Factor>>,
+    sweeps: usize,
 }
 
 /// One row of an eliminated line: y_i = scale v_i − before y_{i−1}, then x_i = y_i − after x_{i+1}. Zero on the ring.
@@ -25,88 +31,144 @@ struct Factor {
     after: f64,
 }
 
+/// Part of the spectrum that one sweep takes care of, as the ratio of its ends.
+const RATIO: f64 = 4.0;
+const MAX_SWEEPS: f64 = 10.0;
+
 impl Adi {
     /// Eliminates all lines of a matrix, reusing the memory. False where a pivot is not positive.
     pub fn factorise<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> bool {
         let strides = a.patch.padded_strides();
-        self.axes.resize_with(D, Vec::new);
-        for factors in &mut self.axes {
-            factors.clear();
-            factors.resize(a.patch.padded_len(), Factor::default());
-        }
-        let mut sound = true;
-        for (row, k) in a.rows.iter().zip(a.patch.places()) {
-            // what a row sums to, about 1, is shared between the axes
+        // what a row sums to, about 1, is shared between the axes: the lower end of the spectrum of X and Y
+        let parts = |row: &[f64; S]| {
             let share = row[..=2 * D].iter().sum::<f64>() / D as f64;
             let own: [f64; D] = std::array::from_fn(|d| share - (row[1 + 2 * d] + row[2 + 2 * d]));
-            let largest = own.into_iter().fold(share, f64::max);
-            let balance = if D == 1 { 0.0 } else { (share.max(0.1) * (2.0 * largest - share)).sqrt() };
-            for d in 0..D {
-                let (below, above) = (row[1 + 2 * d], row[2 + 2 * d]);
-                let pivot = own[d] + balance - below * self.axes[d][k - strides[d]].after;
-                let between = if d == 0 { 1.0 } else { 2.0 * balance };
-                sound &= pivot > 1e-8;
-                self.axes[d][k] = Factor { scale: between / pivot, before: below / pivot, after: above / pivot };
+            let lowest = share.max(0.1);
+            (own, lowest, (2.0 * own.into_iter().fold(share, f64::max) - share).max(lowest))
+        };
+        let mut spread = 1.0;
+        for (_, lowest, highest) in a.rows.iter().map(parts) {
+            spread = if highest <= spread * lowest { spread } else { highest / lowest };
+        }
+        self.sweeps = if D == 1 { 1 } else { (spread.ln() / RATIO.ln()).ceil().clamp(1.0, MAX_SWEEPS) as usize };
+        self.factors.resize_with(self.sweeps * D, Vec::new);
+        let mut sound = spread.is_finite();
+        for (sweep, factors) in self.factors.chunks_exact_mut(D).enumerate() {
+            for factors in factors.iter_mut() {
+                factors.clear();
+                factors.resize(a.patch.padded_len(), Factor::default());
+            }
+            let part = spread.powf((sweep as f64 + 0.5) / self.sweeps as f64 - 0.5);
+            for (row, k) in a.rows.iter().zip(a.patch.places()) {
+                let (own, lowest, highest) = parts(row);
+                let r = if D == 1 { 0.0 } else { (lowest * highest).sqrt() * part };
+                for d in 0..D {
+                    let (below, above) = (row[1 + 2 * d], row[2 + 2 * d]);
+                    let pivot = own[d] + r - below * factors[d][k - strides[d]].after;
+                    let (inverse, between) = (1.0 / pivot, if d == 0 { 1.0 } else { 2.0 * r });
+                    sound &= pivot > 1e-8;
+                    factors[d][k] = Factor { scale: between * inverse, before: below * inverse, after: above * inverse };
+                }
             }
         }
         sound
     }
 
-    /// Applies the inverse to the unknowns of a padded vector whose ring is zero.
-    pub fn solve<const D: usize, const K: usize>(&self, patch: &Patch<D>, v: &mut [[f64; K]]) {
-        let strides = patch.padded_strides();
-        for axis in 0..D {
-            let (n, s) = (patch.size[axis], strides[axis]);
-            if s == 1 {
-                // each line waits for itself, so several go side by side
-                let together = 4 * (n + 2);
-                let (mut v, mut f) = (v.chunks_exact_mut(together), self.axes[axis].chunks_exact(together));
-                (&mut v).zip(&mut f).for_each(|(v, f)| lines::<4, K>(v, f, n));
-                let rest = (v.into_remainder().chunks_exact_mut(n + 2)).zip(f.remainder().chunks_exact(n + 2));
-                rest.for_each(|(v, f)| lines::<1, K>(v, f, n));
+    /// Sweeps of a cycle.
+    pub fn sweeps(&self) -> usize {
+        self.sweeps
+    }
+
+    /// Sets x to one cycle for v from x = 0, its ring ready for a product with the matrix.
+    pub fn cycle<const D: usize, const S: usize, const K: usize>(
+        &self,
+        a: &LatticeMatrix<D, S>,
+        v: &[[f64; K]],
+        x: &mut [[f64; K]],
+        scratch: &mut [[f64; K]],
+    ) {
+        for (sweep, factors) in self.factors.chunks_exact(D).enumerate() {
+            if sweep == 0 {
+                x.copy_from_slice(v);
+                solve(&a.patch, factors, x);
             } else {
-                let block = s * (n + 2);
-                for (v, f) in v.chunks_exact_mut(block).zip(self.axes[axis].chunks_exact(block)) {
-                    plane(v, f, n, s);
+                a.difference(v, x, scratch);
+                solve(&a.patch, factors, scratch);
+                for (x, e) in x.iter_mut().zip(scratch.iter()) {
+                    (0..K).for_each(|c| x[c] += e[c]);
                 }
+            }
+            a.patch.wrap(x);
+        }
+    }
+}
+
+/// Both factors of one sweep, on a padded vector whose ring is zero.
+fn solve<const D: usize, const K: usize>(patch: &Patch<D>, factors: &[Vec<Factor>], v: &mut [[f64; K]]) {
+    let strides = patch.padded_strides();
+    for (axis, factors) in factors.iter().enumerate() {
+        let (n, s) = (patch.size[axis], strides[axis]);
+        if s == 1 {
+            // each line waits for itself, so several go side by side
+            let four = 4 * (n + 2);
+            let (fours, rest) = v.split_at_mut(v.len() / four * four);
+            let whole = fours.len();
+            parallel::for_each_row(fours, four, |q, v| along::<4, K>(v, &factors[q * four..][..four], n));
+            for (v, f) in rest.chunks_exact_mut(n + 2).zip(factors[whole..].chunks_exact(n + 2)) {
+                along::<1, K>(v, f, n);
+            }
+        } else {
+            let block = s * (n + 2);
+            for (v, f) in v.chunks_exact_mut(block).zip(factors.chunks_exact(block)) {
+                parallel::for_each_column_group(v, s, |first, rows| across(rows, f, s, first));
             }
         }
     }
 }
 
 /// L lines that are each contiguous in memory.
-fn lines<const L: usize, const K: usize>(v: &mut [[f64; K]], f: &[Factor], n: usize) {
-    let (v, f) = (&mut v[..L * (n + 2)], &f[..L * (n + 2)]);
+fn along<const L: usize, const K: usize>(v: &mut [[f64; K]], f: &[Factor], n: usize) {
+    let len = n + 2;
+    let (v, f) = (&mut v[..L * len], &f[..L * len]);
     let mut carry = [[0.0; K]; L];
     for i in 1..=n {
         for (l, carry) in carry.iter_mut().enumerate() {
-            let k = l * (n + 2) + i;
-            *carry = std::array::from_fn(|c| f[k].scale * v[k][c] - f[k].before * carry[c]);
-            v[k] = *carry;
+            let (v, f) = (&mut v[l * len + i], f[l * len + i]);
+            for c in 0..K {
+                carry[c] = f.scale * v[c] - f.before * carry[c];
+            }
+            *v = *carry;
         }
     }
     carry = [[0.0; K]; L];
     for i in (1..=n).rev() {
         for (l, carry) in carry.iter_mut().enumerate() {
-            let k = l * (n + 2) + i;
-            *carry = std::array::from_fn(|c| v[k][c] - f[k].after * carry[c]);
-            v[k] = *carry;
+            let (v, f) = (&mut v[l * len + i], f[l * len + i]);
+            for c in 0..K {
+                carry[c] = v[c] - f.after * carry[c];
+            }
+            *v = *carry;
         }
     }
 }
 
-/// All lines of one plane, `s` apart in memory, with the loop over lines the inner one.
-fn plane<const K: usize>(v: &mut [[f64; K]], f: &[Factor], n: usize, s: usize) {
+/// Lines across the rows of a plane, all columns of the group at once; factors are `s` apart from row to row.
+fn across<const K: usize>(rows: &mut [&mut [[f64; K]]], f: &[Factor], s: usize, first: usize) {
+    let n = rows.len() - 2;
     for i in 1..=n {
-        let (before, here) = v[(i - 1) * s..(i + 1) * s].split_at_mut(s);
-        for ((v, before), f) in here.iter_mut().zip(before.iter()).zip(&f[i * s..(i + 1) * s]) {
-            *v = std::array::from_fn(|c| f.scale * v[c] - f.before * before[c]);
+        let (before, here) = rows.split_at_mut(i);
+        for ((v, before), f) in here[0].iter_mut().zip(before[i - 1].iter()).zip(&f[i * s + first..]) {
+            for c in 0..K {
+                v[c] = f.scale * v[c] - f.before * before[c];
+            }
         }
     }
     for i in (1..=n).rev() {
-        let (here, after) = v[i * s..(i + 2) * s].split_at_mut(s);
-        for ((v, after), f) in here.iter_mut().zip(after.iter()).zip(&f[i * s..(i + 1) * s]) {
-            *v = std::array::from_fn(|c| v[c] - f.after * after[c]);
+        let (here, after) = rows.split_at_mut(i + 1);
+        for ((v, after), f) in here[i].iter_mut().zip(after[0].iter()).zip(&f[i * s + first..]) {
+            for c in 0..K {
+                v[c] -= f.after * after[c];
+            }
         }
     }
 }

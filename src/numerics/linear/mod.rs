@@ -12,6 +12,7 @@ pub use lu::SparseLu;
 
 use crate::error::Failure;
 use crate::geometry::Patch;
+use crate::parallel;
 
 /// A matrix whose rows couple a node of a patch to itself and its nearest neighbours
 ///
@@ -59,44 +60,48 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
         Self::POINTS.map(|p| (0..D).map(|d| p[d] * strides[d] as isize).sum())
     }
 
-    /// Sets the unknowns of `out` to `combine(A x, their place in rows, their place in a padded vector)`.
-    fn apply<const K: usize>(&self, x: &[[f64; K]], mut out: impl FnMut(usize, usize, [f64; K])) {
+    /// Sets the unknowns of `out` to `f(place in rows, place in a padded vector, A x)`.
+    fn apply<const K: usize>(&self, x: &[[f64; K]], out: &mut [[f64; K]], f: impl Fn(usize, usize, [f64; K]) -> [f64; K] + Sync) {
         let offsets = self.offsets();
         let n = self.patch.pencil_len();
-        for (p, start) in self.patch.pencils().enumerate() {
+        parallel::for_each_row(out, n + 2, |q, out| {
+            let Some(p) = self.patch.pencil_in_row(q) else { return };
             let rows = &self.rows[p * n..(p + 1) * n];
             let neighbours: [&[[f64; K]]; S] = offsets.map(|o| {
-                let first = start.wrapping_add_signed(o);
+                let first = (q * (n + 2) + 1).wrapping_add_signed(o);
                 &x[first..first + n]
             });
-            for (j, row) in rows.iter().enumerate() {
+            for (j, (row, out)) in rows.iter().zip(&mut out[1..=n]).enumerate() {
                 let mut sum = [0.0; K];
                 for s in 0..S {
                     for c in 0..K {
                         sum[c] += row[s] * neighbours[s][j][c];
                     }
                 }
-                out(p * n + j, start + j, sum);
+                *out = f(p * n + j, q * (n + 2) + 1 + j, sum);
             }
-        }
+        });
     }
 
     /// `out` = A x on the unknowns of padded vectors.
     pub fn multiply<const K: usize>(&self, x: &[[f64; K]], out: &mut [[f64; K]]) {
-        self.apply(x, |_, k, ax| out[k] = ax);
+        self.apply(x, out, |_, _, ax| ax);
+    }
+
+    /// `out` = v − A x on the unknowns of padded vectors.
+    fn difference<const K: usize>(&self, v: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) {
+        self.apply(x, out, |_, k, ax| std::array::from_fn(|c| v[k][c] - ax[c]));
     }
 
     /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown; returns the largest |b − A x| of each
     /// right-hand side, NaN where there is one.
     pub fn residual<const K: usize>(&self, b: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) -> [f64; K] {
-        let mut largest = [0.0; K];
-        self.apply(x, |i, k, ax| {
-            for c in 0..K {
-                out[k][c] = b[i][c] - ax[c];
-                largest[c] = larger(largest[c], out[k][c]);
-            }
-        });
-        largest
+        self.apply(x, out, |i, _, ax| std::array::from_fn(|c| b[i][c] - ax[c]));
+        let mut sizes = [0.0; K];
+        for k in self.patch.places() {
+            (0..K).for_each(|c| sizes[c] = larger(sizes[c], out[k][c]));
+        }
+        sizes
     }
 }
 

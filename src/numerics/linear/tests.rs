@@ -56,21 +56,6 @@ fn one_dimension_takes_one_iteration() {
     }
 }
 
-/// A right-hand side gets the same bits alone and beside another one.
-#[test]
-fn right_hand_sides_do_not_disturb_each_other() {
-    let matrix = sample::<5>([17, 13], [false, true], 3.0, 7);
-    let b = wave(matrix.rows.len());
-    let mut both = vec![[0.0; 2]; matrix.patch.padded_len()];
-    Bicgstab::default().solve(&matrix, &b, &mut both, [1e-9; 2]).unwrap();
-    for c in 0..2 {
-        let alone: Vec<[f64; 1]> = b.iter().map(|b| [b[c]]).collect();
-        let mut x = vec![[0.0]; matrix.patch.padded_len()];
-        Bicgstab::default().solve(&matrix, &alone, &mut x, [1e-9]).unwrap();
-        assert!(x.iter().zip(&both).all(|(x, both)| x[0].to_bits() == both[c].to_bits()));
-    }
-}
-
 /// A singular matrix is reported with its residual, never returned as a solution.
 #[test]
 fn a_singular_system_is_refused() {
