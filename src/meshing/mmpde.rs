@@ -22,6 +22,9 @@ pub struct Mmpde {
     pub gradient: Gradient,
 }
 
+/// How exactly mesh equations are solved, as a share of the largest coordinate: far below any cell.
+const EXACTNESS: f64 = 1e-12;
+
 impl Default for Mmpde {
     fn default() -> Self {
         Self { relaxation: 1.0, gradient: Gradient::Central }
@@ -103,8 +106,8 @@ impl<const D: usize> MeshOperator<D> {
     /// Solves the step on one patch, given new values on the ring around it
     ///
     /// `old` and `new` are nodal values on the whole lattice. On entry `new` holds the known values on the ring and a
-    /// guess inside; on success the solution inside, its residual at most `tolerance`. `jump[d]` is added on wrapping
-    /// around axis d.
+    /// guess inside; on success the solution inside, exact to 1e-12 of `size`, the largest coordinate, or to round-off
+    /// where Δt/(τh²) is so large that it is more. `jump[d]` is added on wrapping around axis d.
     ///
     /// # Errors
     /// [`Failure::LinearStalled`].
@@ -115,11 +118,14 @@ impl<const D: usize> MeshOperator<D> {
         new: &mut [[f64; K]],
         jump: [[f64; K]; D],
         solver: &mut impl LinearSolver<D, S, K>,
-        tolerance: [f64; K],
+        size: [f64; K],
     ) -> Result<Work, Failure> {
         let right: Vec<[f64; K]> = patch.nodes(&self.lattice).map(|node| old[node]).collect();
         let mut x = patch.gather(&self.lattice, new, jump);
-        let linear_iterations = solver.solve(&self.matrix(patch), &right, &mut x, tolerance)?;
+        let matrix = self.matrix(patch);
+        let diagonal = matrix.rows.iter().fold(1.0_f64, |m, row| m.max(row[0]));
+        let tolerance = size.map(|size| size * EXACTNESS.max(8.0 * f64::EPSILON * diagonal));
+        let linear_iterations = solver.solve(&matrix, &right, &mut x, tolerance)?;
         patch.scatter(&self.lattice, &x, new);
         Ok(Work { linear_solves: K, linear_iterations, ..Work::default() })
     }

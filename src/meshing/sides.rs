@@ -29,8 +29,7 @@ pub fn move_sides(
             let old: Vec<[f64; 1]> = (0..nodes[along]).map(|i| [mesh.x()[place(i)][along]]).collect();
             let mut new = old.clone();
             let operator = equation.operator(&line, &side_rho, dt)?;
-            let tolerance = [tolerance(mesh)[along]];
-            work += operator.solve::<3, 1>(Patch::whole(&line), &old, &mut new, jump, solver, tolerance)?;
+            work += operator.solve::<3, 1>(Patch::whole(&line), &old, &mut new, jump, solver, [size(mesh)[along]])?;
             for (i, [value]) in new.into_iter().enumerate() {
                 x[place(i)][along] = value;
             }
@@ -39,7 +38,7 @@ pub fn move_sides(
     Ok(work)
 }
 
-/// How exactly mesh equations are solved: 1e-12 of the largest coordinate, far below any cell.
-pub(super) fn tolerance(mesh: &Mesh<2>) -> [f64; 2] {
-    std::array::from_fn(|d| 1e-12 * mesh.lower()[d].abs().max(mesh.upper()[d].abs()))
+/// The largest coordinate along each axis.
+pub(super) fn size(mesh: &Mesh<2>) -> [f64; 2] {
+    std::array::from_fn(|d| mesh.lower()[d].abs().max(mesh.upper()[d].abs()))
 }

@@ -1,4 +1,4 @@
-use super::{MeshGenerator, Mmpde, move_sides, sides::tolerance};
+use super::{MeshGenerator, Mmpde, move_sides, sides::size};
 use crate::error::{Failure, Result};
 use crate::geometry::{Mesh, Patch};
 use crate::numerics::linear::Robust;
@@ -23,7 +23,7 @@ impl MeshGenerator for Whole {
         let mut x = mesh.x().to_vec();
         let mut work = move_sides(equation, mesh, rho, dt, &mut x, &mut self.line)?;
         let jump = [[width, 0.0], [0.0, height]];
-        work += operator.solve::<5, 2>(Patch::whole(lattice), mesh.x(), &mut x, jump, &mut self.plane, tolerance(mesh))?;
+        work += operator.solve::<5, 2>(Patch::whole(lattice), mesh.x(), &mut x, jump, &mut self.plane, size(mesh))?;
         Ok((mesh.moved(x)?, work))
     }
 }
