@@ -59,6 +59,6 @@ fn main() -> ExitCode {
     };
     match outcome {
         Ok(code) => code,
-        Err(error) => terminal::complain(&error, None),
+        Err(error) => terminal::complain(&error, error.help(), None),
     }
 }

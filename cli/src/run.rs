@@ -47,8 +47,8 @@ impl Run {
         match finished.failure {
             None => Ok(ExitCode::SUCCESS),
             Some(error) => {
-                let note = format!("the frames up to the last good state (step {}) are in {}", finished.state.step, out.display());
-                Ok(terminal::complain(&error, Some(&note)))
+                let note = format!("everything up to the last good state (step {}) is in {}", finished.state.step, out.display());
+                Ok(terminal::complain(&error, study.remedy(&error), Some(note)))
             }
         }
     }

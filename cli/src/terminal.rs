@@ -9,14 +9,13 @@ pub fn say(text: impl std::fmt::Display) {
     let _ = writeln!(stdout(), "{text}");
 }
 
-/// Prints an error with its remedy, and says how the program ends.
-pub fn complain(error: &Error, note: Option<&str>) -> ExitCode {
+/// Prints an error with its remedy and a note, and says how the program ends.
+pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> ExitCode {
     let mut text = format!("error: {error}\n");
-    if let Some(help) = error.help() {
-        text.push_str(&format!("  help: {help}\n"));
-    }
-    if let Some(note) = note {
-        text.push_str(&format!("  note: {note}\n"));
+    for (title, words) in [("help", help), ("note", note)] {
+        if let Some(words) = words {
+            text.push_str(&format!("  {title}: {words}\n"));
+        }
     }
     let _ = stderr().write_all(text.as_bytes());
     ExitCode::from(if error.is_failure() { 1 } else { 2 })

@@ -251,6 +251,21 @@ impl MovingMesh {
         self.output.frames.clone().unwrap_or(FramesAt::Every(1))
     }
 
+    /// The remedy for an error, with the present value behind each key that it names.
+    pub fn remedy(&self, error: &Error) -> Option<String> {
+        let table = toml::Table::try_from(self).ok()?;
+        let present = |key: &str| {
+            let (section, name) = key.split_once('.')?;
+            table.get(section)?.get(name).map(|value| format!("{key} (now {value})"))
+        };
+        let help = error.help()?;
+        let words = help.split(' ').map(|word| {
+            let key = word.trim_end_matches(',');
+            present(key).map_or(word.to_string(), |text| text + &word[key.len()..])
+        });
+        Some(words.collect::<Vec<_>>().join(" "))
+    }
+
     /// The study as a file, every default filled in.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a study is plain data")

@@ -1,0 +1,337 @@
+//! The program as a user meets it: exit status, words on the terminal, and what is on the disk afterwards.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const STUDY: &str = include_str!("../../studies/burgers.toml");
+
+struct Sandbox {
+    directory: tempfile::TempDir,
+}
+
+impl Sandbox {
+    /// A directory with `study.toml`, a short run on a coarse grid.
+    fn new() -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let short = STUDY.replace("[40, 40]", "[12, 10]").replace("[0.75, 1.0, 1.25]", "[0.26, 0.27]");
+        let short = short.replace("end = 1.25", "end = 0.27").replace("every = 50", "every = 8");
+        std::fs::write(directory.path().join("study.toml"), short).unwrap();
+        Self { directory }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    fn call(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_driftmesh")).args(arguments).current_dir(self.directory.path()).output().unwrap()
+    }
+
+    /// Runs the study with settings, into `out`.
+    fn run(&self, set: &[&str]) -> Output {
+        let mut arguments = vec!["run", "study.toml", "--out", "out"];
+        set.iter().for_each(|assignment| arguments.extend(["--set", assignment]));
+        self.call(&arguments)
+    }
+}
+
+fn words(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[track_caller]
+fn assert_refused(sandbox: &Sandbox, output: &Output, expected: &[&str]) {
+    let words = words(output);
+    assert_eq!(output.status.code(), Some(2), "{words}");
+    assert!(words.starts_with("error: ") && words.matches("error: ").count() == 1, "one error: {words}");
+    assert!(!words.contains("panicked"), "{words}");
+    for part in expected {
+        assert!(words.contains(part), "{part:?} is not in\n{words}");
+    }
+    assert!(!sandbox.path("out").exists(), "something was written");
+}
+
+fn entries(directory: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        std::fs::read_dir(directory).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// A run leaves everything that the contract names, and says where.
+#[test]
+fn a_run_leaves_its_directory() {
+    let sandbox = Sandbox::new();
+    let output = sandbox.run(&[]);
+    assert!(output.status.success(), "{}", words(&output));
+    let said = String::from_utf8(output.stdout).unwrap();
+    for part in ["l_inf", "0.2600", "0.2700", "20 steps", "out/mesh.png", "run      out"] {
+        assert!(said.contains(part), "{part:?} is not in\n{said}");
+    }
+    let expected =
+        ["final.npz", "frames", "history.csv", "mesh.png", "mesh.svg", "run.pvd", "study.toml", "summary.json"];
+    assert_eq!(entries(&sandbox.path("out")), expected);
+    // the first state, steps 8 and 16, and the last
+    assert_eq!(entries(&sandbox.path("out/frames")).len(), 4);
+    let history = std::fs::read_to_string(sandbox.path("out/history.csv")).unwrap();
+    assert_eq!(history.lines().count(), 1 + 21);
+
+    let text = std::fs::read_to_string(sandbox.path("out/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(summary["schema"], 1);
+    assert_eq!(summary["status"], "completed");
+    assert_eq!(summary["work"]["steps"], 20);
+    for path in [
+        "/seconds/wall", "/seconds/cpu", "/seconds/monitor", "/seconds/interface", "/seconds/mesh", "/seconds/pde",
+        "/seconds/output", "/parallel/ranks", "/parallel/threads", "/work/rejected_steps", "/work/linear_solves",
+        "/work/newton_iterations", "/work/path_steps", "/reports/0/t", "/reports/1/error/linf", "/reports/1/error/l2",
+        "/reports/1/quality/q_max", "/reports/1/quality/q_mean", "/reports/1/quality/min_scaled_jacobian",
+        "/reports/1/quality/equidistribution", "/reports/1/conserved/mass", "/reports/1/conserved/drift",
+    ] {
+        assert!(summary.pointer(path).is_some_and(serde_json::Value::is_number), "{path}");
+    }
+    // the resolved study is itself a study, and gives the same run
+    let again = sandbox.call(&["run", "out/study.toml", "--out", "again", "--quiet"]);
+    assert!(again.status.success() && again.stdout.is_empty() && again.stderr.is_empty());
+    let bytes = |name: &str| std::fs::read(sandbox.path(name)).unwrap();
+    assert_eq!(bytes("out/final.npz"), bytes("again/final.npz"));
+}
+
+/// Numbers do not depend on the number of threads: a mesh large enough to be shared has the same bits on 1 and 2.
+#[test]
+fn threads_do_not_change_a_bit() {
+    let sandbox = Sandbox::new();
+    for threads in ["1", "2"] {
+        let set = ["--set", "grid.cells=[150,140]", "--set", "time.end=0.256", "--set", "time.report=[0.256]"];
+        let arguments = [&["run", "study.toml", "--quiet", "--threads", threads, "--out", threads], &set[..]].concat();
+        assert!(sandbox.call(&arguments).status.success());
+    }
+    for file in ["final.npz", "frames/step-000006.vtu", "mesh.svg", "mesh.png"] {
+        let [one, two] = ["1", "2"].map(|threads| std::fs::read(sandbox.path(threads).join(file)).unwrap());
+        assert!(one == two, "{file} differs");
+    }
+}
+
+/// Settings out of range: the key, the value, the place, exit 2, nothing written.
+#[test]
+fn bad_settings_are_refused_by_name() {
+    let cases: &[(&str, &[&str])] = &[
+        ("pde.viscosity=-0.005", &["`pde.viscosity` is -0.005", "above 0", "--set:1:15", "^^^^^^"]),
+        ("pde.viscosity=nan", &["`pde.viscosity` is NaN", "finite"]),
+        ("grid.cells=[0,40]", &["`grid.cells` is [0, 40]", "at least 2"]),
+        ("grid.cells=[1000000000,1000000000]", &["`grid.cells`", "GiB", "lower it"]),
+        ("grid.cells=[18446744073709551615,3]", &["--set:1"]),
+        ("grid.cells=[9223372036854775807,3]", &["`grid.cells`"]),
+        ("time.end=0.1", &["`time.end` is 0.1", "after start = 0.25"]),
+        ("time.end=inf", &["`time.end` is inf", "finite"]),
+        ("time.step=0", &["`time.step` is 0", "above 0"]),
+        ("time.step=nan", &["`time.step` is NaN"]),
+        ("time.step=1e-300", &["`time.step`", "steps; raise it"]),
+        ("time.report=[3.0]", &["`time.report` is 3", "between"]),
+        ("monitor.strength.relative=-1", &["`monitor.strength.relative` is -1"]),
+        ("monitor.strength.absolute=nan", &["`monitor.strength.absolute` is NaN"]),
+        ("monitor.smoothing=1000000", &["`monitor.smoothing`", "at most"]),
+        ("mesh.relaxation=0", &["`mesh.relaxation` is 0"]),
+        ("mesh.coupling.iterations=0", &["`mesh.coupling.iterations` is 0"]),
+        ("mesh.coupling.mesh_steps=0", &["`mesh.coupling.mesh_steps` is 0"]),
+        ("domain.upper=[0.0,1.0]", &["`domain.upper`", "above lower"]),
+        ("domain.periodic=[true,false]", &["`domain.periodic`", "bounded"]),
+        ("study.name=\"../x\"", &["`study.name`"]),
+        ("output.frames.every=0", &["`output.frames.every` is 0"]),
+        ("output.frames.times=[nan]", &["`output.frames.times`", "finite"]),
+        // wrong types and names
+        ("pde.viscosty=1", &["unknown key `viscosty`", "did you mean `viscosity`?"]),
+        ("pdes.viscosity=1", &["unknown key `pdes`", "did you mean `pde`?"]),
+        ("mesh.generator.kind=hole", &["unknown name `hole`", "did you mean `whole`?"]),
+        ("study.kind=stefan", &["unknown name `stefan`", "moving-mesh"]),
+        ("pde.convection=advectiv", &["did you mean `advective`?"]),
+        ("time.step=\"fast\"", &["expected a number"]),
+        ("grid.cells=40", &["expected an array of length 2"]),
+        ("grid.cells=[-40,40]", &["expected a whole number"]),
+        ("monitor.kind=3", &["`monitor.kind` is not a string"]),
+        // not assignments
+        ("time.step", &["--set KEY=VALUE"]),
+        ("=1", &["--set KEY=VALUE"]),
+        ("", &["--set KEY=VALUE"]),
+        ("[time]", &["not one assignment"]),
+        ("a=1\nb=2", &["not one assignment"]),
+    ];
+    let sandbox = Sandbox::new();
+    for (set, expected) in cases {
+        assert_refused(&sandbox, &sandbox.run(&[set]), expected);
+    }
+}
+
+/// Mistakes in the file itself are shown with their line and a caret.
+#[test]
+fn bad_files_are_refused_at_their_place() {
+    let study = std::fs::read_to_string(Sandbox::new().path("study.toml")).unwrap();
+    let without = |table: &str| {
+        let start = study.find(&format!("[{table}]")).unwrap();
+        let end = study[start + 1..].find("\n[").map_or(study.len(), |n| start + 1 + n);
+        format!("{}{}", &study[..start], &study[end..])
+    };
+    let cases: Vec<(Vec<u8>, &[&str])> = vec![
+        (study.replace("viscosity", "viscocity").into(), &["study.toml:21:1", "viscocity = 0.005", "did you mean `viscosity`?"]),
+        (study.replace("smoothing = 2", "smoothing = two").into(), &["study.toml:27:13", "^"]),
+        (without("time").into(), &["the study has no [time] table"]),
+        (without("pde").into(), &["the study has no [pde] table"]),
+        (without("grid").into(), &["the study has no [grid] table"]),
+        (without("study").into(), &["the study has no [study] table"]),
+        (study.replace("step = 1e-3", "").into(), &["`step` is missing"]),
+        (study.replace("kind = \"burgers\"\n", "").into(), &["`pde` does not say its kind", "driftmesh list"]),
+        (study.replace("[time]", "[time").into(), &["study.toml:1"]),
+        (study.replace("{ relative = 30.0 }", "{ relative = 30.0, absolute = 1.0 }").into(), &["exactly one of its keys"]),
+        (study.replace("start = 0.25", "start = 0.25\nstart = 0.25").into(), &["duplicate key"]),
+        (study.replace("# Burgers", "# é\tü\n\t\n# Burgers").replace("end = 0.27", "\tend = 0.1  # für später").into(), &["`time.end` is 0.1"]),
+        (vec![], &["the study has no [study] table"]),
+        (b"name = \"\xff\xfe\"".to_vec(), &["not UTF-8", "byte 8, line 1"]),
+        (vec![0; 100], &["study.toml:1:1"]),
+        (vec![b' '; 2_000_000], &["2000000 bytes"]),
+        (b"a=".repeat(10_000), &["study.toml:1"]),
+        (b"[".repeat(100_000), &["study.toml:1"]),
+    ];
+    for (bytes, expected) in cases {
+        let sandbox = Sandbox::new();
+        std::fs::write(sandbox.path("study.toml"), bytes).unwrap();
+        assert_refused(&sandbox, &sandbox.run(&[]), expected);
+    }
+}
+
+#[test]
+fn unreadable_files_are_refused() {
+    let sandbox = Sandbox::new();
+    assert_refused(&sandbox, &sandbox.call(&["run", "nowhere.toml", "--out", "out"]), &["cannot read nowhere.toml"]);
+    assert_refused(&sandbox, &sandbox.call(&["run", ".", "--out", "out"]), &["it is a directory"]);
+}
+
+#[test]
+fn wrong_command_lines_end_with_2() {
+    let sandbox = Sandbox::new();
+    for arguments in [
+        &["run"][..], &["walk"], &["run", "study.toml", "--threads", "0"], &["run", "study.toml", "--fast"],
+        &["list", "cars"], &["check"], &[],
+    ] {
+        let output = sandbox.call(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", words(&output));
+    }
+}
+
+/// A directory that no run of ours wrote is refused and left as it is; one of ours is replaced, other files kept.
+#[test]
+fn only_our_own_directories_are_replaced() {
+    let sandbox = Sandbox::new();
+    std::fs::create_dir(sandbox.path("mine")).unwrap();
+    std::fs::write(sandbox.path("mine/thesis.tex"), "years of work").unwrap();
+    std::fs::write(sandbox.path("mine/summary.json"), "{\"figures\": 3}").unwrap();
+    let refused = sandbox.call(&["run", "study.toml", "--out", "mine"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(words(&refused).contains("mine is not empty and was not written by driftmesh"), "{}", words(&refused));
+    assert_eq!(entries(&sandbox.path("mine")), ["summary.json", "thesis.tex"]);
+    let refused = sandbox.call(&["run", "study.toml", "--out", "study.toml"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", words(&refused));
+
+    assert!(sandbox.run(&[]).status.success());
+    std::fs::write(sandbox.path("out/notes.txt"), "kept").unwrap();
+    assert!(sandbox.run(&["time.end=0.26", "time.report=[0.26]"]).status.success());
+    assert_eq!(std::fs::read_to_string(sandbox.path("out/notes.txt")).unwrap(), "kept");
+    assert_eq!(entries(&sandbox.path("out/frames")).len(), 3, "old frames are gone");
+}
+
+/// A mesh that folds: exit 1, the named error with the present settings, everything so far kept.
+#[test]
+fn a_folded_mesh_is_named_and_the_frames_are_kept() {
+    let sandbox = Sandbox::new();
+    let set = ["monitor.strength.relative=3000", "monitor.smoothing=0", "grid.cells=[40,40]", "output.frames.every=1"];
+    let output = sandbox.run(&set);
+    assert_eq!(output.status.code(), Some(1));
+    let words = words(&output);
+    for part in ["the mesh folded: cell (", "at t = 0.25", "(step ", "monitor.smoothing (now 0)", "time.step (now 0.001)", "last good state"] {
+        assert!(words.contains(part), "{part:?} is not in\n{words}");
+    }
+    let text = std::fs::read_to_string(sandbox.path("out/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(summary["status"], "failed");
+    assert_eq!(summary["error"]["kind"], "mesh-folded");
+    let steps = summary["work"]["steps"].as_u64().unwrap() as usize;
+    assert!(steps > 0);
+    assert_eq!(entries(&sandbox.path("out/frames")).len(), steps + 1);
+    assert!(sandbox.path("out/final.npz").exists());
+}
+
+/// A solution that cannot be computed, and one that is not finite from the start.
+#[test]
+fn a_lost_solution_is_named() {
+    let sandbox = Sandbox::new();
+    let output = sandbox.run(&["mesh.generator.kind=fixed", "pde.viscosity=1e-6", "time.step=1.0", "time.end=9.0", "time.report=[9.0]"]);
+    assert_eq!(output.status.code(), Some(1), "{}", words(&output));
+    assert!(words(&output).contains("Newton's method stalled"), "{}", words(&output));
+    let output = sandbox.run(&["domain.upper=[1e-200,1.0]"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(words(&output).contains("(step 0): the mesh density is NaN at node"), "{}", words(&output));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_directory_that_cannot_be_written_is_named() {
+    let sandbox = Sandbox::new();
+    let output = sandbox.call(&["run", "study.toml", "--out", "/proc/driftmesh"]);
+    assert_eq!(output.status.code(), Some(1), "{}", words(&output));
+    assert!(words(&output).contains("cannot write /proc/driftmesh"), "{}", words(&output));
+}
+
+/// What `check` prints is the study with every default, and runs.
+#[test]
+fn check_prints_a_complete_study() {
+    let sandbox = Sandbox::new();
+    let output = sandbox.call(&["check", "study.toml", "--set", "time.step=5e-4", "--set", "mesh.generator.kind=fixed"]);
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in ["step = 0.0005", "gradient = \"central\"", "mesh_steps = 1", "kind = \"fixed\"", "MiB of memory"] {
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
+    }
+    std::fs::write(sandbox.path("checked.toml"), text).unwrap();
+    assert!(sandbox.call(&["check", "checked.toml"]).status.success());
+    assert_refused(&sandbox, &sandbox.call(&["check", "study.toml", "--set", "time.step=0"]), &["`time.step`"]);
+}
+
+/// A choice set on the command line replaces the one in the file; a new kind drops the keys of the old one.
+#[test]
+fn settings_override_choices() {
+    let sandbox = Sandbox::new();
+    let output = sandbox.call(&["check", "study.toml", "--set", "monitor.strength.absolute=5", "--set", "output.frames.times=[0.26]"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("absolute = 5.0") && !text.contains("relative"), "{text}");
+    assert!(text.contains("times = [0.26]") && !text.contains("every"), "{text}");
+}
+
+#[test]
+fn list_names_every_kind() {
+    let sandbox = Sandbox::new();
+    let all = String::from_utf8(sandbox.call(&["list"]).stdout).unwrap();
+    for part in ["pdes (pde.kind)", "burgers", "arclength", "whole", "fixed"] {
+        assert!(all.contains(part), "{part:?} is not in\n{all}");
+    }
+    let generators = String::from_utf8(sandbox.call(&["list", "generators"]).stdout).unwrap();
+    assert!(generators.contains("whole") && !generators.contains("burgers"));
+}
+
+/// A reader that closes the pipe early is no reason to panic.
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_is_quiet() {
+    let sandbox = Sandbox::new();
+    let command = format!("'{}' list | true; '{0}' run study.toml --out out | true", env!("CARGO_BIN_EXE_driftmesh"));
+    let output = Command::new("sh").args(["-c", &command]).current_dir(sandbox.directory.path()).output().unwrap();
+    assert!(!words(&output).contains("panicked"), "{}", words(&output));
+}
+
+/// Every verb's help shows a real example.
+#[test]
+fn help_shows_an_example() {
+    let sandbox = Sandbox::new();
+    for verb in ["run", "check", "list"] {
+        let help = String::from_utf8(sandbox.call(&[verb, "--help"]).stdout).unwrap();
+        assert!(help.contains(&format!("Example:\n  driftmesh {verb} ")), "{help}");
+    }
+}
