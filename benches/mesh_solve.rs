@@ -67,7 +67,10 @@ fn main() {
             direct.solve(&matrix, &right, &mut y, TOLERANCE).unwrap();
         });
         let difference = x.as_flattened().iter().zip(y.as_flattened()).fold(0.0_f64, |m, (x, y)| m.max((x - y).abs()));
-        println!("{:>6} {step:>12.3} {solve:>12.3} {lu:>12.3} {iterations:>6} {difference:>12.1e}", format!("{}²", n + 1));
+        println!(
+            "{:>6} {step:>12.3} {solve:>12.3} {lu:>12.3} {iterations:>6} {difference:>12.1e}",
+            format!("{}²", n + 1)
+        );
         if let (Some(file), 112) = (&export, n) {
             write(file, &operator.matrix(patch), &right, &padded, &x, solve);
         }

@@ -45,7 +45,9 @@ pub enum Failure {
         iterations: usize,
     },
     /// A linear system was not solved to its tolerance by any solver at hand.
-    #[error("a linear system of {unknowns} unknowns was not solved: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed")]
+    #[error(
+        "a linear system of {unknowns} unknowns was not solved: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed"
+    )]
     LinearStalled {
         /// Size of the system.
         unknowns: usize,

@@ -8,6 +8,7 @@
 macro_rules! kinds {
     ($(#[$attribute:meta])* $enum:ident { $($kind:literal = $type:ident: $line:literal),+ $(,)? }) => {
         $(#[$attribute])*
+        #[allow(clippy::large_enum_variant)] // one value a study
         #[derive(Debug, Clone, serde::Deserialize)]
         pub enum $enum {
             $(

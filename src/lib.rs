@@ -1,16 +1,59 @@
 //! Moving meshes for time-dependent partial differential equations.
+//!
+//! A moving mesh keeps its number of points and its connections and *moves* the points to where a thin feature of the
+//! solution is. [`simulation::Simulation`] couples the three parts that any such method has, each behind one trait:
+//!
+//! | part | trait | here |
+//! |---|---|---|
+//! | where the mesh should be fine | [`density::Monitor`] | [`density::Arclength`] |
+//! | how the mesh follows | [`meshing::MeshGenerator`] | [`meshing::Whole`], [`meshing::Fixed`] |
+//! | what is solved on it | [`physics::Physics`] | [`physics::Burgers`] |
+//!
+//! # A tour
+//!
+//! The parts also work alone: here a mesh is moved to the data of somebody else's solver.
+//!
+//! ```
+//! use driftmesh::density::{Arclength, Monitor};
+//! use driftmesh::geometry::{Lattice, Mesh, quality};
+//! use driftmesh::meshing::{MeshGenerator, Mmpde, Whole};
+//!
+//! let mut mesh = Mesh::uniform(Lattice::bounded([40, 40])?, [0.0, 0.0], [1.0, 1.0])?;
+//! let front = |[x, y]: [f64; 2]| (40.0 * (x + y - 1.0)).tanh();
+//! let (monitor, mut generator) = (Arclength::default(), Whole::default());
+//! let equation = Mmpde { relaxation: 0.1, ..Mmpde::default() };
+//! for _ in 0..50 {
+//!     let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
+//!     let rho = monitor.density(&mesh, &u)?;
+//!     (mesh, _) = generator.step(&equation, &mesh, &rho, 1e-3)?;
+//! }
+//! let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
+//! let q = quality(&mesh, &monitor.density(&mesh, &u)?);
+//! assert!(q.min_scaled_jacobian > 0.0 && q.equidistribution < 2.0);
+//! # Ok::<(), driftmesh::Error>(())
+//! ```
+//!
+//! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
+//!
+//! Modules, lowest floor first: [`error`], [`geometry`], [`numerics`], then [`density`], [`meshing`] and [`physics`],
+//! then [`simulation`], then [`study`].
+
+pub mod error;
+mod kind;
+mod parallel;
+mod work;
+
+pub mod geometry;
+
+pub mod numerics;
 
 pub mod density;
-pub mod error;
-pub mod geometry;
-mod kind;
 pub mod meshing;
-pub mod numerics;
-mod parallel;
 pub mod physics;
+
 pub mod simulation;
+
 pub mod study;
-mod work;
 
 pub use error::{Error, Failure, Result};
 pub use work::Work;

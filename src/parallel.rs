@@ -75,9 +75,8 @@ mod tests {
         for len in [100, WORTHWHILE - 1, WORTHWHILE, 100_001] {
             let term = |k: usize| (k as f64 * 0.7).sin() * 10_f64.powi((k % 7) as i32);
             let total = || sum::<1>(len, |range| [range.map(term).sum()]);
-            let [one, four] = [1, 4].map(|n| {
-                rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(total)
-            });
+            let [one, four] =
+                [1, 4].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(total));
             assert_eq!(one[0].to_bits(), four[0].to_bits());
         }
     }

@@ -1,26 +1,43 @@
 //! Every file in `studies/` is rerun against stored norms and work counters.
 //!
-//! The norms are those that two independent implementations agree on (issue tracker: "The spine"), each with the
-//! tolerance that comes with it; the counters are this implementation's own and hold exactly.
+//! The norms are those on which two other implementations agree, each with the tolerance that comes with it; the counters are this implementation's own and hold exactly.
 
-use driftmesh::simulation::Summary;
+use driftmesh::simulation::{Event, Observer, Snapshot, Summary};
 use driftmesh::study::{MovingMesh, Source, run};
 use std::path::Path;
 
-fn rerun(name: &str) -> (Summary, driftmesh::simulation::State) {
+/// Follows x of node (10, 10).
+#[derive(Default)]
+struct Node {
+    history: Vec<(f64, f64)>,
+}
+
+impl Observer for Node {
+    fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
+        let mesh = &snapshot.state.mesh;
+        self.history.push((snapshot.state.t, mesh.x()[mesh.lattice().index([10, 10])][0]));
+        Ok(())
+    }
+}
+
+fn rerun(name: &str) -> (Summary, Node) {
+    let mut node = Node::default();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(format!("{name}.toml"));
     let study = MovingMesh::from_source(&Source::read(&file).unwrap()).unwrap();
     let out = tempfile::tempdir().unwrap();
-    let finished = run(&study, &out.path().join("run"), &mut []).unwrap();
+    let finished = run(&study, &out.path().join("run"), &mut [&mut node]).unwrap();
     assert!(finished.failure.is_none(), "{name}: {:?}", finished.failure);
-    (finished.summary, finished.state)
+    (finished.summary, node)
 }
 
 /// Values at the three report times, each within its tolerance, relative.
 fn assert_row(name: &str, what: &str, found: [f64; 3], expected: [f64; 3], tolerance: [f64; 3]) {
     for k in 0..3 {
         let off = (found[k] - expected[k]).abs() / expected[k];
-        assert!(off <= tolerance[k], "{name}: {what} is {found:?}, expected {expected:?}, off by {off:.4} at report {k}");
+        assert!(
+            off <= tolerance[k],
+            "{name}: {what} is {found:?}, expected {expected:?}, off by {off:.4} at report {k}"
+        );
     }
 }
 
@@ -36,10 +53,17 @@ fn q_mean(summary: &Summary) -> [f64; 3] {
     std::array::from_fn(|k| summary.reports[k].quality.q_mean)
 }
 
+/// Counters: steps, Newton iterations and solves to the one; linear iterations to 1 %, since they turn on the last bit
+/// of a residual and `exp` differs in it from system to system.
 fn assert_work(summary: &Summary, newton: usize, solves: usize, iterations: usize) {
     let work = summary.work.work;
-    let found = [summary.work.steps, work.newton_iterations, work.linear_solves, work.linear_iterations];
-    assert_eq!(found, [1000, newton, solves, iterations], "{}: steps, Newton, solves, iterations", summary.study);
+    let name = &summary.study;
+    assert_eq!([summary.work.steps, work.newton_iterations, work.linear_solves], [1000, newton, solves], "{name}");
+    assert!(
+        work.linear_iterations.abs_diff(iterations) * 100 <= iterations,
+        "{name}: {} iterations",
+        work.linear_iterations
+    );
 }
 
 const DIGITS: [f64; 3] = [0.02; 3];
@@ -51,22 +75,24 @@ fn case_b_conservative() {
         let (summary, _) = rerun(name);
         assert_row(name, "l_inf", linf(&summary), [0.0103, 0.0107, 0.0138], DIGITS);
         assert_row(name, "Q max", q_max(&summary), [2.148, 2.208, 2.639], Q);
-        assert_work(&summary, 0, 0, 0);
+        assert_work(&summary, 2001, 8001, 23465);
     }
 }
 
-/// Also node (10, 10) to 2e-5 at all three times, from runs that end there, and the smallest corner Jacobian.
+/// Also node (10, 10) to 2e-5 at all three times, and the smallest corner Jacobian.
 #[test]
 fn case_b_advective() {
     let name = "burgers-b-advective";
-    let (summary, state) = rerun(name);
+    let (summary, node) = rerun(name);
     assert_row(name, "l_inf", linf(&summary), [0.03076, 0.03413, 0.03307], DIGITS);
     assert_row(name, "Q max", q_max(&summary), [2.126, 2.232, 2.560], Q);
     assert_row(name, "Q mean", q_mean(&summary), [1.1111, 1.1420, 1.1299], Q);
     assert!((summary.reports[0].quality.min_scaled_jacobian - 0.16936).abs() < 1e-5);
-    let node = state.mesh.lattice().index([10, 10]);
-    assert!((state.mesh.x()[node][0] - 0.254841).abs() < 2e-5, "{:?}", state.mesh.x()[node]);
-    assert_work(&summary, 0, 0, 0);
+    for (t, expected) in [(0.75, 0.256858), (1.0, 0.270088), (1.25, 0.254841)] {
+        let x = node.history.iter().find(|(time, _)| *time == t).unwrap().1;
+        assert!((x - expected).abs() < 2e-5, "x of node (10, 10) at t = {t} is {x}, expected {expected}");
+    }
+    assert_work(&summary, 2001, 8001, 23724);
 }
 
 /// Chaotic from t = 1 on: round-off moves l_inf and Q by up to 5 %.
@@ -86,7 +112,7 @@ fn case_a_smoothed() {
     let name = "burgers-a-smoothed";
     let (summary, _) = rerun(name);
     assert_row(name, "l_inf", linf(&summary), [0.0298, 0.0315, 0.0286], DIGITS);
-    assert_work(&summary, 0, 0, 0);
+    assert_work(&summary, 2000, 8000, 21855);
 }
 
 #[test]
@@ -100,7 +126,7 @@ fn uniform_meshes() {
         assert_row(name, "l_inf", linf(&summary), errors, DIGITS);
         assert_row(name, "Q max", q_max(&summary), [1.0; 3], [1e-12; 3]);
         assert_row(name, "Q mean", q_mean(&summary), [1.0; 3], [1e-12; 3]);
-        assert_work(&summary, 0, 0, 0);
+        assert_work(&summary, 2000, 2000, 3000);
     }
 }
 

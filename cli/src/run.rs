@@ -47,7 +47,11 @@ impl Run {
         match finished.failure {
             None => Ok(ExitCode::SUCCESS),
             Some(error) => {
-                let note = format!("everything up to the last good state (step {}) is in {}", finished.state.step, out.display());
+                let note = format!(
+                    "everything up to the last good state (step {}) is in {}",
+                    finished.state.step,
+                    out.display()
+                );
                 Ok(terminal::complain(&error, study.remedy(&error), Some(note)))
             }
         }

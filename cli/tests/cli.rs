@@ -24,7 +24,11 @@ impl Sandbox {
     }
 
     fn call(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_driftmesh")).args(arguments).current_dir(self.directory.path()).output().unwrap()
+        Command::new(env!("CARGO_BIN_EXE_driftmesh"))
+            .args(arguments)
+            .current_dir(self.directory.path())
+            .output()
+            .unwrap()
     }
 
     /// Runs the study with settings, into `out`.
@@ -82,11 +86,28 @@ fn a_run_leaves_its_directory() {
     assert_eq!(summary["status"], "completed");
     assert_eq!(summary["work"]["steps"], 20);
     for path in [
-        "/seconds/wall", "/seconds/cpu", "/seconds/monitor", "/seconds/interface", "/seconds/mesh", "/seconds/pde",
-        "/seconds/output", "/parallel/ranks", "/parallel/threads", "/work/rejected_steps", "/work/linear_solves",
-        "/work/newton_iterations", "/work/path_steps", "/reports/0/t", "/reports/1/error/linf", "/reports/1/error/l2",
-        "/reports/1/quality/q_max", "/reports/1/quality/q_mean", "/reports/1/quality/min_scaled_jacobian",
-        "/reports/1/quality/equidistribution", "/reports/1/conserved/mass", "/reports/1/conserved/drift",
+        "/seconds/wall",
+        "/seconds/cpu",
+        "/seconds/monitor",
+        "/seconds/interface",
+        "/seconds/mesh",
+        "/seconds/pde",
+        "/seconds/output",
+        "/parallel/ranks",
+        "/parallel/threads",
+        "/work/rejected_steps",
+        "/work/linear_solves",
+        "/work/newton_iterations",
+        "/work/path_steps",
+        "/reports/0/t",
+        "/reports/1/error/linf",
+        "/reports/1/error/l2",
+        "/reports/1/quality/q_max",
+        "/reports/1/quality/q_mean",
+        "/reports/1/quality/min_scaled_jacobian",
+        "/reports/1/quality/equidistribution",
+        "/reports/1/conserved/mass",
+        "/reports/1/conserved/drift",
     ] {
         assert!(summary.pointer(path).is_some_and(serde_json::Value::is_number), "{path}");
     }
@@ -172,7 +193,10 @@ fn bad_files_are_refused_at_their_place() {
         format!("{}{}", &study[..start], &study[end..])
     };
     let cases: Vec<(Vec<u8>, &[&str])> = vec![
-        (study.replace("viscosity", "viscocity").into(), &["study.toml:21:1", "viscocity = 0.005", "did you mean `viscosity`?"]),
+        (
+            study.replace("viscosity", "viscocity").into(),
+            &["study.toml:21:1", "viscocity = 0.005", "did you mean `viscosity`?"],
+        ),
         (study.replace("smoothing = 2", "smoothing = two").into(), &["study.toml:27:13", "^"]),
         (without("time").into(), &["the study has no [time] table"]),
         (without("pde").into(), &["the study has no [pde] table"]),
@@ -181,9 +205,18 @@ fn bad_files_are_refused_at_their_place() {
         (study.replace("step = 1e-3", "").into(), &["`step` is missing"]),
         (study.replace("kind = \"burgers\"\n", "").into(), &["`pde` does not say its kind", "driftmesh list"]),
         (study.replace("[time]", "[time").into(), &["study.toml:1"]),
-        (study.replace("{ relative = 30.0 }", "{ relative = 30.0, absolute = 1.0 }").into(), &["exactly one of its keys"]),
+        (
+            study.replace("{ relative = 30.0 }", "{ relative = 30.0, absolute = 1.0 }").into(),
+            &["exactly one of its keys"],
+        ),
         (study.replace("start = 0.25", "start = 0.25\nstart = 0.25").into(), &["duplicate key"]),
-        (study.replace("# Burgers", "# é\tü\n\t\n# Burgers").replace("end = 0.27", "\tend = 0.1  # für später").into(), &["`time.end` is 0.1"]),
+        (
+            study
+                .replace("# Burgers", "# é\tü\n\t\n# Burgers")
+                .replace("end = 0.27", "\tend = 0.1  # für später")
+                .into(),
+            &["`time.end` is 0.1"],
+        ),
         (vec![], &["the study has no [study] table"]),
         (b"name = \"\xff\xfe\"".to_vec(), &["not UTF-8", "byte 8, line 1"]),
         (vec![0; 100], &["study.toml:1:1"]),
@@ -209,8 +242,13 @@ fn unreadable_files_are_refused() {
 fn wrong_command_lines_end_with_2() {
     let sandbox = Sandbox::new();
     for arguments in [
-        &["run"][..], &["walk"], &["run", "study.toml", "--threads", "0"], &["run", "study.toml", "--fast"],
-        &["list", "cars"], &["check"], &[],
+        &["run"][..],
+        &["walk"],
+        &["run", "study.toml", "--threads", "0"],
+        &["run", "study.toml", "--fast"],
+        &["list", "cars"],
+        &["check"],
+        &[],
     ] {
         let output = sandbox.call(arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", words(&output));
@@ -246,7 +284,14 @@ fn a_folded_mesh_is_named_and_the_frames_are_kept() {
     let output = sandbox.run(&set);
     assert_eq!(output.status.code(), Some(1));
     let words = words(&output);
-    for part in ["the mesh folded: cell (", "at t = 0.25", "(step ", "monitor.smoothing (now 0)", "time.step (now 0.001)", "last good state"] {
+    for part in [
+        "the mesh folded: cell (",
+        "at t = 0.25",
+        "(step ",
+        "monitor.smoothing (now 0)",
+        "time.step (now 0.001)",
+        "last good state",
+    ] {
         assert!(words.contains(part), "{part:?} is not in\n{words}");
     }
     let text = std::fs::read_to_string(sandbox.path("out/summary.json")).unwrap();
@@ -263,7 +308,13 @@ fn a_folded_mesh_is_named_and_the_frames_are_kept() {
 #[test]
 fn a_lost_solution_is_named() {
     let sandbox = Sandbox::new();
-    let output = sandbox.run(&["mesh.generator.kind=fixed", "pde.viscosity=1e-6", "time.step=1.0", "time.end=9.0", "time.report=[9.0]"]);
+    let output = sandbox.run(&[
+        "mesh.generator.kind=fixed",
+        "pde.viscosity=1e-6",
+        "time.step=1.0",
+        "time.end=9.0",
+        "time.report=[9.0]",
+    ]);
     assert_eq!(output.status.code(), Some(1), "{}", words(&output));
     assert!(words(&output).contains("Newton's method stalled"), "{}", words(&output));
     let output = sandbox.run(&["domain.upper=[1e-200,1.0]"]);
@@ -284,7 +335,8 @@ fn a_directory_that_cannot_be_written_is_named() {
 #[test]
 fn check_prints_a_complete_study() {
     let sandbox = Sandbox::new();
-    let output = sandbox.call(&["check", "study.toml", "--set", "time.step=5e-4", "--set", "mesh.generator.kind=fixed"]);
+    let output =
+        sandbox.call(&["check", "study.toml", "--set", "time.step=5e-4", "--set", "mesh.generator.kind=fixed"]);
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
     for part in ["step = 0.0005", "gradient = \"central\"", "mesh_steps = 1", "kind = \"fixed\"", "MiB of memory"] {
@@ -299,7 +351,14 @@ fn check_prints_a_complete_study() {
 #[test]
 fn settings_override_choices() {
     let sandbox = Sandbox::new();
-    let output = sandbox.call(&["check", "study.toml", "--set", "monitor.strength.absolute=5", "--set", "output.frames.times=[0.26]"]);
+    let output = sandbox.call(&[
+        "check",
+        "study.toml",
+        "--set",
+        "monitor.strength.absolute=5",
+        "--set",
+        "output.frames.times=[0.26]",
+    ]);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("absolute = 5.0") && !text.contains("relative"), "{text}");
     assert!(text.contains("times = [0.26]") && !text.contains("every"), "{text}");

@@ -79,8 +79,7 @@ impl Arclength {
 
 impl Monitor for Arclength {
     fn density(&self, mesh: &Mesh<2>, u: &[f64]) -> Result<Vec<f64>, Failure> {
-        let slope2: Vec<f64> =
-            Metrics::new(mesh).gradient(u).into_iter().map(|[gx, gy]| gx * gx + gy * gy).collect();
+        let slope2: Vec<f64> = Metrics::new(mesh).gradient(u).into_iter().map(|[gx, gy]| gx * gx + gy * gy).collect();
         let alpha = match self.strength {
             Strength::Absolute(alpha) => alpha,
             Strength::Relative(strength) => {

@@ -22,7 +22,8 @@ pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: 
         for (f, out) in source.chunks_exact(s * n).zip(values.chunks_exact_mut(s * n)) {
             let ends = if lattice.periodic()[axis] { [n - 1, 0] } else { [0, n - 1] };
             let mut set = |i: usize, below: usize, above: usize| {
-                let (f, b, a) = (&f[i * s..(i + 1) * s], &f[below * s..(below + 1) * s], &f[above * s..(above + 1) * s]);
+                let (f, b, a) =
+                    (&f[i * s..(i + 1) * s], &f[below * s..(below + 1) * s], &f[above * s..(above + 1) * s]);
                 for (((out, f), b), a) in out[i * s..(i + 1) * s].iter_mut().zip(f).zip(b).zip(a) {
                     *out = 0.25 * (b + 2.0 * f + a);
                 }

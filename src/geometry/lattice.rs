@@ -95,7 +95,9 @@ impl<const D: usize> Lattice<D> {
         if self.periodic.iter().all(|p| !p) {
             return Cow::Borrowed(values);
         }
-        Cow::Owned(self.closed_nodes().map(|node| values[self.index(std::array::from_fn(|d| node[d] % nodes[d]))]).collect())
+        Cow::Owned(
+            self.closed_nodes().map(|node| values[self.index(std::array::from_fn(|d| node[d] % nodes[d]))]).collect(),
+        )
     }
 
     /// Position in memory of a node.

@@ -58,7 +58,8 @@ impl Cells<'_> {
         let cells = self.mesh.lattice().cells().map(|n| n as isize);
         let periodic = self.mesh.lattice().periodic();
         let exists = |cell: [isize; 2]| (0..2).all(|d| periodic[d] || (0..cells[d]).contains(&cell[d]));
-        let mut cell: [isize; 2] = std::array::from_fn(|d| if periodic[d] { start[d] } else { start[d].min(cells[d] - 1) });
+        let mut cell: [isize; 2] =
+            std::array::from_fn(|d| if periodic[d] { start[d] } else { start[d].min(cells[d] - 1) });
         // Convex cells are crossed at most once each; the bound only guards against a mesh that is not valid.
         for _ in 0..2 * (cells[0] + cells[1]) {
             let [a, b, c, d] = self.corners(cell).map(|c| c.1);
@@ -85,9 +86,8 @@ impl Cells<'_> {
     fn triangle(&self, point: [f64; 2], cell: [isize; 2]) -> Triangle {
         let [a, b, c, d] = self.corners(cell);
         let (p, q, r) = if outside(point, a.1, c.1) >= 0.0 { (a, b, c) } else { (a, c, d) };
-        let double_area = |u: [f64; 2], v: [f64; 2], w: [f64; 2]| {
-            (v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0])
-        };
+        let double_area =
+            |u: [f64; 2], v: [f64; 2], w: [f64; 2]| (v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0]);
         let raw = [(q, r), (r, p), (p, q)].map(|(u, v)| double_area(u.1, v.1, point).max(0.0));
         let sum: f64 = raw.iter().sum();
         ([p.0, q.0, r.0], raw.map(|w| w / sum))

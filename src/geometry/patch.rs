@@ -87,7 +87,12 @@ impl<const D: usize> Patch<D> {
     }
 
     /// Nodal values as a padded vector, ring included; `jump[d]` is added on wrapping around axis d.
-    pub fn gather<const K: usize>(&self, lattice: &Lattice<D>, values: &[[f64; K]], jump: [[f64; K]; D]) -> Vec<[f64; K]> {
+    pub fn gather<const K: usize>(
+        &self,
+        lattice: &Lattice<D>,
+        values: &[[f64; K]],
+        jump: [[f64; K]; D],
+    ) -> Vec<[f64; K]> {
         if (self.origin, self.size.map(|n| n + 2)) == ([1; D], lattice.nodes()) {
             return values.to_vec(); // all of a bounded lattice
         }

@@ -168,7 +168,8 @@ mod tests {
     #[test]
     fn node_areas_add_up_to_the_box() {
         let mesh = square(5);
-        let moved = mesh.moved(mesh.x().iter().map(|&[x, y]| [x * x, (y + 0.2 * x * (1.0 - y) * y)]).collect()).unwrap();
+        let moved =
+            mesh.moved(mesh.x().iter().map(|&[x, y]| [x * x, (y + 0.2 * x * (1.0 - y) * y)]).collect()).unwrap();
         assert!((node_areas(&moved).iter().sum::<f64>() - 1.0).abs() < 1e-14);
         assert!((cell_areas(&moved).iter().sum::<f64>() - 1.0).abs() < 1e-14);
     }

@@ -47,7 +47,12 @@ impl Mmpde {
     ///
     /// # Errors
     /// [`Failure::WrongLength`] where ρ does not fit the lattice.
-    pub fn operator<const D: usize>(&self, lattice: &Lattice<D>, rho: &[f64], dt: f64) -> Result<MeshOperator<D>, Failure> {
+    pub fn operator<const D: usize>(
+        &self,
+        lattice: &Lattice<D>,
+        rho: &[f64],
+        dt: f64,
+    ) -> Result<MeshOperator<D>, Failure> {
         if rho.len() != lattice.len() {
             return Err(Failure::WrongLength { what: "the density", found: rho.len(), expected: lattice.len() });
         }

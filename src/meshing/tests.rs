@@ -91,7 +91,8 @@ fn the_mesh_equation_is_second_order_in_space() {
             let rho: Vec<f64> = start.x().iter().map(|&[s, r]| 1.0 / (slope(s) * slope(r))).collect();
             let equation = Mmpde { relaxation: 1.0, gradient };
             // three steps of 100 relaxation times leave 1e-9 of the start
-            let steady = (0..3).fold(start.clone(), |m, _| Whole::default().step(&equation, &m, &rho, 100.0).unwrap().0);
+            let steady =
+                (0..3).fold(start.clone(), |m, _| Whole::default().step(&equation, &m, &rho, 100.0).unwrap().0);
             let exact: Vec<[f64; 2]> = start.x().iter().map(|&[s, r]| [g(s), g(r)]).collect();
             largest_difference(&steady, &start.moved(exact).unwrap())
         };
@@ -118,7 +119,7 @@ fn the_mesh_equation_is_first_order_in_time() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
-    /// A step is the solution of its own system, checked against a sparse LU, and a residual bounds its error.
+    /// A step is the solution of its own system, checked against a sparse LU.
     #[test]
     fn a_step_solves_its_system(n in 4_usize..30, m in 4_usize..30, px: bool, py: bool, height in 0.0..50.0_f64, log_dt in -4.0..0.0_f64) {
         let start = mesh([n, m], [px, py]);
@@ -131,12 +132,18 @@ proptest! {
         let patch = Patch::whole(lattice);
         let matrix: LatticeMatrix<2, 5> = equation.operator(lattice, &rho, dt).unwrap().matrix(patch);
         let right: Vec<[f64; 2]> = patch.nodes(lattice).map(|k| start.x()[k]).collect();
+        // the direct solver starts from the old mesh between the new sides
+        let nodes = lattice.nodes();
+        let side = |k: usize| (0..2).any(|d| !lattice.periodic()[d] && [0, nodes[d] - 1].contains(&lattice.node(k)[d]));
+        let guess: Vec<[f64; 2]> =
+            (0..lattice.len()).map(|k| if side(k) { moved.x()[k] } else { start.x()[k] }).collect();
         let [w, h] = start.extent();
-        let mut x = patch.gather(lattice, moved.x(), [[w, 0.0], [0.0, h]]);
-        let found = x.clone();
-        SparseLu::default().solve(&matrix, &right, &mut x, [1e-14; 2]).or_else(|_| Ok::<_, Failure>(0)).unwrap();
-        for (a, b) in found.as_flattened().iter().zip(x.as_flattened()) {
-            prop_assert!((a - b).abs() < 1e-11);
+        let mut x = patch.gather(lattice, &guess, [[w, 0.0], [0.0, h]]);
+        SparseLu::default().solve(&matrix, &right, &mut x, [1e-10; 2]).unwrap();
+        for (node, place) in patch.nodes(lattice).zip(patch.places()) {
+            for (a, b) in moved.x()[node].iter().zip(x[place]) {
+                prop_assert!((a - b).abs() < 2e-10);
+            }
         }
     }
 }

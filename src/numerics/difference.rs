@@ -132,7 +132,8 @@ mod tests {
     #[test]
     fn linear_fields_have_their_exact_gradient_on_distorted_meshes() {
         let mesh = Mesh::uniform(Lattice::bounded([9, 7]).unwrap(), [0.0, -1.0], [2.0, 1.0]).unwrap();
-        let mesh = mesh.moved(mesh.x().iter().map(|&[x, y]| [x + 0.1 * (3.0 * y).sin(), y + 0.2 * x * x]).collect()).unwrap();
+        let mesh =
+            mesh.moved(mesh.x().iter().map(|&[x, y]| [x + 0.1 * (3.0 * y).sin(), y + 0.2 * x * x]).collect()).unwrap();
         let u: Vec<f64> = mesh.x().iter().map(|[x, y]| 4.0 * x - 3.0 * y).collect();
         for g in Metrics::new(&mesh).gradient(&u) {
             assert!((g[0] - 4.0).abs() < 1e-11 && (g[1] + 3.0).abs() < 1e-11, "{g:?}");

@@ -63,7 +63,10 @@ pub(super) fn advance(
                 let rho = carried.as_ref().unwrap_or(&rho);
                 let (moved, cost) = generator.step(equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
                 check_unfolded(&moved)?;
-                (mesh, work) = (moved, { work += cost; work });
+                (mesh, work) = (moved, {
+                    work += cost;
+                    work
+                });
             }
             Ok::<_, Failure>(mesh)
         })?;

@@ -77,7 +77,8 @@ impl Source {
         let piece = Piece { origin: "--set".into(), text: assignment.into(), begins, padded };
         self.pieces.push(piece);
         let help = "write --set KEY=VALUE, such as --set time.step=5e-4";
-        let failed = |message: &str| self.diagnostic(message, begins..begins + assignment.len().max(1), Some(help.into()));
+        let failed =
+            |message: &str| self.diagnostic(message, begins..begins + assignment.len().max(1), Some(help.into()));
         let only_assignment = !assignment.trim_start().starts_with(['[', '#']) && assignment.contains('=');
         match DeTable::parse(&self.pieces[self.pieces.len() - 1].padded) {
             Ok(table) if only_assignment && table.get_ref().len() == 1 => Ok(()),
@@ -185,7 +186,9 @@ impl Source {
             "exactly one of its keys must be given here".to_string()
         } else {
             // Rust's words for what a user calls a number
-            message.replace("expected f64", "expected a number").replace("expected usize", "expected a whole number, 0 or more")
+            message
+                .replace("expected f64", "expected a number")
+                .replace("expected usize", "expected a whole number, 0 or more")
         };
         self.diagnostic(&message, span, None)
     }
@@ -221,8 +224,7 @@ fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>, path: &str, file: usize
     for (key, value) in over {
         let name = key.get_ref().to_string();
         let known = under.get(name.as_str());
-        let other_kind =
-            name == "kind" && known.is_some_and(|k| k.get_ref().as_str() != value.get_ref().as_str());
+        let other_kind = name == "kind" && known.is_some_and(|k| k.get_ref().as_str() != value.get_ref().as_str());
         if other_kind || (CHOICES.contains(&path) && known.is_none()) {
             drop_before(under, file);
         }

@@ -67,7 +67,8 @@ impl Adi {
                     let pivot = own[d] + r - below * factors[d][k - strides[d]].after;
                     let (inverse, between) = (1.0 / pivot, if d == 0 { 1.0 } else { 2.0 * r });
                     sound &= pivot > 1e-8;
-                    factors[d][k] = Factor { scale: between * inverse, before: below * inverse, after: above * inverse };
+                    factors[d][k] =
+                        Factor { scale: between * inverse, before: below * inverse, after: above * inverse };
                 }
             }
         }

@@ -86,9 +86,13 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for S
                 for (x, e) in x.iter_mut().zip(&correction) {
                     (0..K).for_each(|c| x[c] += e[c]);
                 }
-                sizes = a.residual(b, x, &mut r);
+                let before = std::mem::replace(&mut sizes, a.residual(b, x, &mut r));
                 if solved(sizes, tolerance) {
                     return Ok(0);
+                }
+                if !sizes.iter().all(|size| size.is_finite()) {
+                    sizes = before; // the matrix is singular
+                    break;
                 }
             }
         }

@@ -61,7 +61,12 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
     }
 
     /// Sets the unknowns of `out` to `f(place in rows, place in a padded vector, A x)`.
-    fn apply<const K: usize>(&self, x: &[[f64; K]], out: &mut [[f64; K]], f: impl Fn(usize, usize, [f64; K]) -> [f64; K] + Sync) {
+    fn apply<const K: usize>(
+        &self,
+        x: &[[f64; K]],
+        out: &mut [[f64; K]],
+        f: impl Fn(usize, usize, [f64; K]) -> [f64; K] + Sync,
+    ) {
         let offsets = self.offsets();
         let n = self.patch.pencil_len();
         parallel::for_each_row(out, n + 2, |q, out| {

@@ -82,9 +82,8 @@ impl Frames {
         let document = vtu::document(lattice.cells(), &state.mesh.closed(), &fields);
         write_file(&self.directory.join(&name), document.as_bytes())?;
         self.written.push((state.t, name));
-        let entries: String = (self.written.iter())
-            .map(|(t, name)| format!("<DataSet timestep=\"{t}\" file=\"{name}\"/>\n"))
-            .collect();
+        let entries: String =
+            (self.written.iter()).map(|(t, name)| format!("<DataSet timestep=\"{t}\" file=\"{name}\"/>\n")).collect();
         let series = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
              <Collection>\n{entries}</Collection>\n</VTKFile>\n"

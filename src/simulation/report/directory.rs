@@ -43,7 +43,8 @@ impl RunDirectory {
     /// As [`RunDirectory::check`], or [`Error::Unwritable`].
     pub fn claim(path: &Path) -> Result<Self> {
         Self::check(path)?;
-        let unwritable = |path: &Path, error: std::io::Error| Error::Unwritable { path: path.into(), reason: error.to_string() };
+        let unwritable =
+            |path: &Path, error: std::io::Error| Error::Unwritable { path: path.into(), reason: error.to_string() };
         std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))?;
         for name in OURS {
             let old = path.join(name);

@@ -86,7 +86,10 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
         lines[0].windows(2).for_each(|i| segment(at(i[0], j), at(i[1], j)));
     }
     for (path, colour) in paths.iter().zip(["black", "white"]) {
-        let _ = writeln!(s, "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"0.5\" stroke-width=\"0.7\"/>");
+        let _ = writeln!(
+            s,
+            "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"0.5\" stroke-width=\"0.7\"/>"
+        );
     }
 
     axes(&mut s, [lx, ly], [wx, wy], [width, height]);
@@ -103,14 +106,24 @@ fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, height]: [f64
     );
     for (value, label) in ticks(lower[0], lower[0] + extent[0]) {
         let x = LEFT + (value - lower[0]) / extent[0] * width;
-        let _ = writeln!(s, "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>", bottom + 20.0);
+        let _ = writeln!(
+            s,
+            "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
+            bottom + 20.0
+        );
     }
     for (value, label) in ticks(lower[1], lower[1] + extent[1]) {
         let y = bottom - (value - lower[1]) / extent[1] * height;
-        let _ = writeln!(s, "<path d=\"M{LEFT} {y:.1}h-5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>", LEFT - 9.0, y + 4.5);
+        let _ = writeln!(
+            s,
+            "<path d=\"M{LEFT} {y:.1}h-5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+            LEFT - 9.0,
+            y + 4.5
+        );
     }
     let (x, y) = (LEFT + 0.5 * width, TOP + 0.5 * height);
-    let _ = writeln!(s, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">x</text>", bottom + 44.0);
+    let _ =
+        writeln!(s, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">x</text>", bottom + 44.0);
     let _ = writeln!(s, "<text x=\"20\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">y</text>", y + 5.0);
 }
 
@@ -120,14 +133,30 @@ fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: f64, height
     for k in 0..BANDS {
         let y = TOP + height - (k + 1) as f64 * band;
         let fill = colour((k as f64 + 0.5) / BANDS as f64);
-        let _ = writeln!(s, "<rect x=\"{x:.1}\" y=\"{y:.2}\" width=\"16\" height=\"{:.2}\" fill=\"{fill}\"/>", band + 0.3);
+        let _ =
+            writeln!(s, "<rect x=\"{x:.1}\" y=\"{y:.2}\" width=\"16\" height=\"{:.2}\" fill=\"{fill}\"/>", band + 0.3);
     }
-    let _ = writeln!(s, "<rect x=\"{x:.1}\" y=\"{TOP}\" width=\"16\" height=\"{height:.1}\" fill=\"none\" stroke=\"#222\"/>");
+    let _ = writeln!(
+        s,
+        "<rect x=\"{x:.1}\" y=\"{TOP}\" width=\"16\" height=\"{height:.1}\" fill=\"none\" stroke=\"#222\"/>"
+    );
     for (value, label) in ticks(low, high) {
         let y = if high > low { TOP + height - (value - low) / (high - low) * height } else { TOP + 0.5 * height };
-        let _ = writeln!(s, "<path d=\"M{:.1} {y:.1}h5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\">{label}</text>", x + 16.0, x + 25.0, y + 4.5);
+        let _ = writeln!(
+            s,
+            "<path d=\"M{:.1} {y:.1}h5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\">{label}</text>",
+            x + 16.0,
+            x + 25.0,
+            y + 4.5
+        );
     }
-    let _ = writeln!(s, "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">{}</text>", x + 8.0, TOP - 12.0, escape(unknown));
+    let _ = writeln!(
+        s,
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">{}</text>",
+        x + 8.0,
+        TOP - 12.0,
+        escape(unknown)
+    );
 }
 
 /// Round values 1, 2 or 5 times a power of ten apart, four to nine of them, with their labels.

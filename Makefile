@@ -1,0 +1,35 @@
+# CI runs exactly these. Everything in Rust is built with the release profile, once.
+CARGO ?= cargo
+PYTHON ?= python3
+VENV := .venv
+
+.PHONY: check test slow bench docs
+
+# Formatting, lints and documentation, without a warning.
+check:
+	$(CARGO) fmt --all -- --check
+	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --workspace --no-deps
+
+# All tests that take seconds.
+test: $(VENV)/ready
+	$(CARGO) build --release --workspace
+	$(CARGO) test --release --workspace
+	$(VENV)/bin/python -m pytest -q tests/python
+
+# Tests that take minutes. None needs to yet: everything runs in `test`.
+slow: test
+
+# Speeds, as ratios measured in one run.
+bench: $(VENV)/ready
+	$(CARGO) bench -p driftmesh --bench case_b
+	$(VENV)/bin/python benches/mesh_solve.py
+
+# The library's documentation, in target/doc.
+docs:
+	$(CARGO) doc --release --workspace --no-deps
+
+$(VENV)/ready: tests/python/requirements.txt
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --requirement tests/python/requirements.txt
+	touch $@

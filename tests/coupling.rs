@@ -1,0 +1,102 @@
+//! M^kP and (MP)^l, with a density that is a known function of x and physics that stands still or moves.
+
+use driftmesh::density::{Arclength, Monitor};
+use driftmesh::geometry::{Field, Lattice, Mesh};
+use driftmesh::meshing::{Mmpde, Whole};
+use driftmesh::physics::{Burgers, Convection, Motion, Physics};
+use driftmesh::simulation::{Coupling, Record, Schedule, Simulation, State};
+use driftmesh::{Failure, Work};
+
+/// A bump at the centre, whatever u is.
+struct Bump;
+
+impl Monitor for Bump {
+    fn density(&self, mesh: &Mesh<2>, _u: &[f64]) -> Result<Vec<f64>, Failure> {
+        Ok(mesh.x().iter().map(|[x, y]| 1.0 + 5.0 * (-30.0 * ((x - 0.5).powi(2) + (y - 0.5).powi(2))).exp()).collect())
+    }
+}
+
+/// Nothing happens.
+struct Still;
+
+impl Physics for Still {
+    fn unknowns(&self) -> Vec<String> {
+        vec!["u".into()]
+    }
+
+    fn initial(&self, _t: f64, mesh: &Mesh<2>) -> Field {
+        Field::scalar(vec![0.0; mesh.x().len()])
+    }
+
+    fn step(&mut self, _motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
+        Ok((u.clone(), Work::default()))
+    }
+}
+
+fn simulate(
+    physics: Box<dyn Physics>,
+    monitor: Box<dyn Monitor>,
+    coupling: Coupling,
+    start: f64,
+    end: f64,
+    dt: f64,
+) -> (State, Record) {
+    let mut simulation = Simulation {
+        physics,
+        monitor,
+        generator: Box::new(Whole::default()),
+        equation: Mmpde { relaxation: 0.2, ..Mmpde::default() },
+        coupling,
+        schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),
+    };
+    let mesh = Mesh::uniform(Lattice::bounded([20, 20]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+    let mut state = simulation.start(mesh).unwrap();
+    let mut record = Record::default();
+    simulation.run(&mut state, &mut record, &mut []).unwrap();
+    (state, record)
+}
+
+fn largest_difference(a: &State, b: &State) -> f64 {
+    let pairs = a.mesh.x().as_flattened().iter().zip(b.mesh.x().as_flattened());
+    pairs.fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}
+
+/// Sub-steps carry ρ(x) along: eight of them come at least four times closer to the mesh of very small steps.
+#[test]
+fn mesh_sub_steps_follow_the_density_in_x() {
+    let run = |mesh_steps, dt| {
+        let coupling = Coupling { mesh_steps, iterations: 1 };
+        simulate(Box::new(Still), Box::new(Bump), coupling, 0.0, 0.02, dt).0
+    };
+    let reference = run(1, 1e-5);
+    let [one, eight] = [1, 8].map(|k| largest_difference(&run(k, 0.01), &reference));
+    assert!(eight < 0.25 * one, "M⁸P is {eight:.2e} away, MP {one:.2e}");
+}
+
+/// One sub-step is MP itself, and each costs one mesh solve.
+#[test]
+fn work_counts_sub_steps_and_iterations() {
+    let solves = |mesh_steps, iterations| {
+        let coupling = Coupling { mesh_steps, iterations };
+        simulate(Box::new(Still), Box::new(Bump), coupling, 0.0, 0.05, 0.01).1.work.work.linear_solves
+    };
+    // five steps, each four sides and two coordinates
+    assert_eq!(solves(1, 1), 30);
+    assert_eq!(solves(3, 1), 90);
+    assert_eq!(solves(1, 2), 60);
+    assert_eq!(solves(3, 2), 180);
+}
+
+/// (MP)^l converges to the simultaneous solution: further iterations change the mesh less and less.
+#[test]
+fn iterations_converge_to_the_simultaneous_solution() {
+    let run = |iterations| {
+        let coupling = Coupling { mesh_steps: 1, iterations };
+        let physics = Box::new(Burgers::new(0.02, Convection::Conservative).unwrap());
+        simulate(physics, Box::new(Arclength::default()), coupling, 0.25, 0.35, 0.01).0
+    };
+    let states = [1, 2, 3, 4].map(run);
+    let changes: Vec<f64> = states.windows(2).map(|pair| largest_difference(&pair[0], &pair[1])).collect();
+    assert!(changes[0] > 1e-4, "the coupling does nothing: {changes:?}");
+    assert!(changes[1] < changes[0] && changes[2] < 0.25 * changes[0], "{changes:?}");
+}

@@ -1,0 +1,130 @@
+//! Every variant of the library's errors, triggered once and read.
+
+use driftmesh::density::{Arclength, Monitor};
+use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
+use driftmesh::meshing::{MeshGenerator, Mmpde, Whole};
+use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
+use driftmesh::physics::{Burgers, Convection, Motion, Physics};
+use driftmesh::simulation::{RunDirectory, Schedule};
+use driftmesh::study::{MovingMesh, Source};
+use driftmesh::{Error, Failure};
+
+fn mesh() -> Mesh<2> {
+    Mesh::uniform(Lattice::bounded([8, 8]).unwrap(), [0.0; 2], [1.0; 2]).unwrap()
+}
+
+/// The message, the remedy and the exit status of an error.
+fn assert_says(error: impl Into<Error>, message: &[&str], help: Option<&str>, failure: bool) {
+    let error = error.into();
+    for part in message {
+        assert!(error.to_string().contains(part), "{part:?} is not in {error}");
+    }
+    match (help, error.help()) {
+        (Some(part), Some(said)) => assert!(said.contains(part), "{part:?} is not in {said}"),
+        (None, None) => {}
+        (wanted, said) => panic!("help is {said:?}, wanted {wanted:?}"),
+    }
+    assert_eq!(error.is_failure(), failure);
+}
+
+#[test]
+fn folded() {
+    let mut x = mesh().x().to_vec();
+    x[40] = [0.9, 0.9];
+    let error = check_unfolded(&mesh().moved(x).unwrap()).unwrap_err();
+    assert_eq!(error.name(), "mesh-folded");
+    assert_says(error, &["the mesh folded: cell (", "scaled Jacobian -"], Some("monitor.smoothing"), true);
+}
+
+#[test]
+fn non_finite() {
+    let mut u = vec![0.0; 81];
+    u[10] = f64::NAN;
+    let error = Arclength::default().density(&mesh(), &u).unwrap_err();
+    assert_eq!(error.name(), "non-finite");
+    assert_says(error, &["the mesh density is NaN at node (0, 0)"], Some("time.step"), true);
+
+    let mut burgers = Burgers::new(0.01, Convection::Conservative).unwrap();
+    let motion = Motion { t: 0.0, dt: 1e-3, old: &mesh(), new: &mesh() };
+    let error = burgers.step(motion, &Field::scalar(u)).unwrap_err();
+    assert_says(error, &["u is NaN at node (1, 1), x = 0.1250, y = 0.1250"], Some("time.step"), true);
+}
+
+#[test]
+fn newton_stalled() {
+    let mut burgers = Burgers::new(1e-6, Convection::Conservative).unwrap();
+    let u = burgers.initial(0.5, &mesh());
+    let motion = Motion { t: 0.5, dt: 10.0, old: &mesh(), new: &mesh() };
+    let error = burgers.step(motion, &u).unwrap_err();
+    assert_eq!(error.name(), "newton-stalled");
+    assert_says(error, &["Newton's method stalled: residual", "iterations"], Some("time.step"), true);
+}
+
+#[test]
+fn linear_stalled() {
+    let singular = LatticeMatrix::<2, 5>::zero(Patch { origin: [1; 2], size: [3; 2], wraps: [false; 2] });
+    let error = Robust::default().solve(&singular, &[[1.0]; 9], &mut [[0.0]; 25], [1e-9]).unwrap_err();
+    assert_eq!(error.name(), "linear-stalled");
+    assert_says(error, &["linear system of 9 unknowns", "residual 1.0e0"], Some("mesh.relaxation"), true);
+}
+
+#[test]
+fn wrong_length() {
+    let error = Whole::default().step(&Mmpde::default(), &mesh(), &[1.0; 3], 1e-3).unwrap_err();
+    assert_eq!(error.name(), "wrong-length");
+    assert_says(error, &["the density has 3 values, but the lattice has 81 nodes"], Some("lattice order"), true);
+    assert!(matches!(mesh().moved(vec![]).unwrap_err(), Failure::WrongLength { found: 0, expected: 81, .. }));
+}
+
+#[test]
+fn failed_at_a_moment() {
+    let failure = check_unfolded(&mesh().moved(vec![[f64::NAN; 2]; 81]).unwrap()).unwrap_err();
+    let moment = Some(driftmesh::error::Moment { t: 0.312, step: 62 });
+    assert_says(
+        Error::Failed { failure, moment },
+        &["at t = 0.312000 (step 62): the mesh is NaN"],
+        Some("time.step"),
+        true,
+    );
+}
+
+#[test]
+fn invalid() {
+    assert_says(Burgers::new(-1.0, Convection::Advective).unwrap_err(), &["`viscosity` is -1, but must"], None, false);
+    assert_says(Lattice::bounded([1, 5]).unwrap_err(), &["`cells` is [1, 5]", "at least 2"], None, false);
+    assert_says(Lattice::bounded([usize::MAX, 5]).unwrap_err(), &["cannot be counted"], None, false);
+    assert_says(Schedule::new(1.0, 0.0, 0.1, vec![]).unwrap_err(), &["`end` is 0"], None, false);
+}
+
+#[test]
+fn study() {
+    let mut source = Source::new("my.toml", include_str!("../studies/burgers.toml"));
+    source.set("pde.viscosty=1").unwrap();
+    let error = MovingMesh::from_source(&source).unwrap_err();
+    assert_says(
+        error,
+        &["unknown key `viscosty`", "--set:1:5", "    ^^^^^^^^"],
+        Some("did you mean `viscosity`?"),
+        false,
+    );
+}
+
+#[test]
+fn unreadable() {
+    let error = Source::read(std::path::Path::new("no/such/study.toml")).unwrap_err();
+    assert_says(error, &["cannot read no/such/study.toml"], None, false);
+}
+
+#[test]
+fn unwritable_and_foreign() {
+    let place = tempfile::tempdir().unwrap();
+    std::fs::write(place.path().join("file"), "").unwrap();
+    let error = RunDirectory::claim(&place.path().join("file/below")).unwrap_err();
+    assert!(matches!(error, Error::Unwritable { .. } | Error::Unreadable { .. }), "{error}");
+    let claimed = RunDirectory::claim(&place.path().join("mine")).unwrap();
+    std::fs::remove_dir(claimed.path()).unwrap();
+    assert_says(claimed.write("summary.json", b"{}").unwrap_err(), &["cannot write", "summary.json"], None, true);
+
+    let error = RunDirectory::check(place.path()).unwrap_err();
+    assert_says(error, &["is not empty and was not written by driftmesh", "file"], Some("--out"), false);
+}
