@@ -10,7 +10,7 @@ use std::process::ExitCode;
 pub struct Run {
     #[command(flatten)]
     study: StudyArgs,
-    /// Directory for the results; out/<study name> where nothing is said.
+    /// Directory for the results; `out/NAME` where nothing is said.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads to use; all cores where nothing is said. Results do not depend on it.
