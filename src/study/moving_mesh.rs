@@ -144,8 +144,8 @@ pub struct Output {
     pub frames: Option<FramesAt>,
 }
 
-/// Memory that a run needs for each node, measured on a run of 1000 × 1000 cells and rounded up.
-const BYTES_PER_NODE: u128 = 2500;
+/// Memory that a run needs for each node: 1350 bytes measured at 1000 × 1000 cells, and a reserve.
+const BYTES_PER_NODE: u128 = 1600;
 const FRAMES_BY_DEFAULT: usize = 20;
 
 impl MovingMesh {
