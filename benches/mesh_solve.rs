@@ -3,7 +3,7 @@
 //! `cargo bench --bench mesh_solve` prints milliseconds, best of many. With a file name after `--` it also writes the
 //! system there as `.npz` for `benches/mesh_solve.py`, which sets scipy beside it.
 
-use driftmesh::geometry::{Lattice, Mesh, Patch};
+use driftmesh::geometry::Patch;
 use driftmesh::meshing::{MeshGenerator, Mmpde, Whole};
 use driftmesh::numerics::linear::{Bicgstab, LatticeMatrix, LinearSolver, SparseLu};
 use driftmesh::simulation::{Record, State};
@@ -46,7 +46,8 @@ fn main() {
         let patch = Patch::whole(&lattice);
         // the sides at their new places
         let (moved, _) = Whole::default().step(&Mmpde::default(), &state.mesh, &state.rho, DT).unwrap();
-        let guess = with_sides(&state.mesh, &moved);
+        let mut guess = state.mesh.x().to_vec();
+        lattice.sides().for_each(|k| guess[k] = moved.x()[k]);
         let right: Vec<[f64; 2]> = patch.nodes(&lattice).map(|k| state.mesh.x()[k]).collect();
         let padded = patch.gather(&lattice, &guess, [[0.0; 2]; 2]);
 
@@ -75,18 +76,6 @@ fn main() {
             write(file, &operator.matrix(patch), &right, &padded, &x, solve);
         }
     }
-}
-
-/// The old mesh with the sides of the new one.
-fn with_sides(old: &Mesh<2>, new: &Mesh<2>) -> Vec<[f64; 2]> {
-    let nodes = old.lattice().nodes();
-    let lattice: &Lattice<2> = old.lattice();
-    (0..lattice.len())
-        .map(|k| {
-            let on_side = (0..2).any(|d| [0, nodes[d] - 1].contains(&lattice.node(k)[d]));
-            if on_side { new.x()[k] } else { old.x()[k] }
-        })
-        .collect()
 }
 
 /// Rows, right-hand sides, known values (padded), our solution and its milliseconds.

@@ -100,6 +100,24 @@ impl<const D: usize> Lattice<D> {
         )
     }
 
+    /// Positions in memory of all nodes on bounded sides, axis by axis; a corner comes once for each of its sides.
+    ///
+    /// # Example
+    /// ```
+    /// let lattice = driftmesh::geometry::Lattice::new([2, 2], [false, true])?; // 3 × 2 nodes
+    /// assert_eq!(lattice.sides().collect::<Vec<_>>(), [0, 1, 4, 5]);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn sides(&self) -> impl Iterator<Item = usize> + use<D> {
+        let (nodes, strides, len, periodic) = (self.nodes(), self.strides(), self.len(), self.periodic);
+        (0..D).filter(move |&d| !periodic[d]).flat_map(move |d| {
+            let block = strides[d] * nodes[d];
+            let ends = [0, strides[d] * (nodes[d] - 1)];
+            let runs = ends.into_iter().flat_map(move |end| (0..len / block).map(move |b| b * block + end));
+            runs.flat_map(move |start| start..start + strides[d])
+        })
+    }
+
     /// Position in memory of a node.
     pub fn index(&self, node: [usize; D]) -> usize {
         node.iter().zip(self.strides()).map(|(i, s)| i * s).sum()

@@ -133,10 +133,8 @@ proptest! {
         let matrix: LatticeMatrix<2, 5> = equation.operator(lattice, &rho, dt).unwrap().matrix(patch);
         let right: Vec<[f64; 2]> = patch.nodes(lattice).map(|k| start.x()[k]).collect();
         // the direct solver starts from the old mesh between the new sides
-        let nodes = lattice.nodes();
-        let side = |k: usize| (0..2).any(|d| !lattice.periodic()[d] && [0, nodes[d] - 1].contains(&lattice.node(k)[d]));
-        let guess: Vec<[f64; 2]> =
-            (0..lattice.len()).map(|k| if side(k) { moved.x()[k] } else { start.x()[k] }).collect();
+        let mut guess = start.x().to_vec();
+        lattice.sides().for_each(|k| guess[k] = moved.x()[k]);
         let [w, h] = start.extent();
         let mut x = patch.gather(lattice, &guess, [[w, 0.0], [0.0, h]]);
         SparseLu::default().solve(&matrix, &right, &mut x, [1e-10; 2]).unwrap();

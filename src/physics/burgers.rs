@@ -182,8 +182,10 @@ impl Physics for Burgers {
                 *row = self.row(&stencils.gradient[i], &stencils.laplacian[i], velocity(k));
             }
         });
-        let mut solution = self.on_mesh(t + dt, new);
-        patch.scatter(lattice, u_old.as_flattened(), solution.values_mut());
+        let mut solution = u.clone();
+        for k in lattice.sides() {
+            solution.values_mut()[k] = self.front(t + dt, new.x()[k]);
+        }
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 
         let size = u_new.iter().fold(1.0_f64, |m, u| m.max(u[0].abs()));

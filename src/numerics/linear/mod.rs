@@ -98,13 +98,13 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
         self.apply(x, out, |_, k, ax| std::array::from_fn(|c| v[k][c] - ax[c]));
     }
 
-    /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown; returns the largest |b − A x| of each
+    /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown and the ring of `out` zero; returns the largest |b − A x| of each
     /// right-hand side, NaN where there is one.
     pub fn residual<const K: usize>(&self, b: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) -> [f64; K] {
         self.apply(x, out, |i, _, ax| std::array::from_fn(|c| b[i][c] - ax[c]));
         let mut sizes = [0.0; K];
-        for k in self.patch.places() {
-            (0..K).for_each(|c| sizes[c] = larger(sizes[c], out[k][c]));
+        for r in out {
+            (0..K).for_each(|c| sizes[c] = larger(sizes[c], r[c]));
         }
         sizes
     }
