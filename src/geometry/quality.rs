@@ -135,7 +135,8 @@ pub fn check_unfolded(mesh: &Mesh<2>) -> Result<(), Failure> {
     let mut worst: Option<(f64, [usize; 2], [f64; 2])> = None;
     for_each_cell(mesh, |cell, _, corners| {
         for (jacobian, x) in corner_jacobians(corners).into_iter().zip(corners) {
-            if jacobian <= worst.map_or(0.0, |w| w.0) {
+            // not `<=`: a Jacobian that overflowed to NaN is not positive either
+            if jacobian.is_nan() || jacobian <= worst.map_or(0.0, |w| w.0) {
                 worst = Some((jacobian, cell, x));
             }
         }

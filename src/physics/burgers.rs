@@ -1,6 +1,7 @@
 use super::{Motion, Physics, check_finite, curvilinear::Stencils};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, Patch};
+use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use crate::parallel;
 use crate::work::Work;
@@ -188,7 +189,7 @@ impl Physics for Burgers {
         }
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 
-        let size = u_new.iter().fold(1.0_f64, |m, u| m.max(u[0].abs()));
+        let size = u_new.iter().fold(1.0, |m, [u]| larger(m, *u));
         let mut work = Work::default();
         let mut residual = vec![[0.0]; patch.len()];
         let stalled = loop {
@@ -197,7 +198,7 @@ impl Physics for Burgers {
                     *residual = [known[i] - u_new[k][0] + 0.5 * dt * rows[i].value(&around(&u_new, k))];
                 }
             });
-            let largest = residual.iter().fold(0.0_f64, |m, [r]| if r.abs() <= m { m } else { r.abs() });
+            let largest = residual.iter().fold(0.0, |m, [r]| larger(m, *r));
             if largest <= TOLERANCE * size {
                 break None;
             }

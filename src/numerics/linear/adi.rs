@@ -1,4 +1,4 @@
-use super::LatticeMatrix;
+use super::{LatticeMatrix, larger};
 use crate::geometry::Patch;
 use crate::parallel;
 
@@ -48,7 +48,7 @@ impl Adi {
         };
         let mut spread = 1.0;
         for (_, lowest, highest) in a.rows.iter().map(parts) {
-            spread = if highest <= spread * lowest { spread } else { highest / lowest };
+            spread = larger(spread, highest / lowest);
         }
         self.sweeps = if D == 1 { 1 } else { (spread.ln() / RATIO.ln()).ceil().clamp(1.0, MAX_SWEEPS) as usize };
         self.factors.resize_with(self.sweeps * D, Vec::new);

@@ -10,6 +10,7 @@ mod lu;
 pub use bicgstab::Bicgstab;
 pub use lu::SparseLu;
 
+use super::larger;
 use crate::error::Failure;
 use crate::geometry::Patch;
 use crate::parallel;
@@ -108,11 +109,6 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
         }
         sizes
     }
-}
-
-/// max(m, |r|) that keeps a NaN.
-fn larger(m: f64, r: f64) -> f64 {
-    if r.abs() <= m { m } else { r.abs() }
 }
 
 /// True where every right-hand side has met its tolerance; false where one is NaN.
