@@ -13,7 +13,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Failure {
     /// A mesh cell has a corner whose Jacobian is not positive.
-    #[error("the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {:.4}, y = {:.4}", cell[0], cell[1], x[0], x[1])]
+    #[error("the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {}, y = {}", cell[0], cell[1], short(x[0]), short(x[1]))]
     Folded {
         /// Indices of the cell along ξ and η.
         cell: [usize; 2],
@@ -23,7 +23,7 @@ pub enum Failure {
         x: [f64; 2],
     },
     /// A quantity stopped being finite.
-    #[error("{what} is {value} at node ({}, {}), x = {:.4}, y = {:.4}", node[0], node[1], x[0], x[1])]
+    #[error("{what} is {value} at node ({}, {}), x = {}, y = {}", node[0], node[1], short(x[0]), short(x[1]))]
     NonFinite {
         /// The quantity, in the reader's words.
         what: &'static str,
@@ -152,6 +152,11 @@ pub enum Error {
         /// Something found in it.
         found: String,
     },
+}
+
+/// A coordinate in a few characters, whatever its size.
+fn short(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e6).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.3e}") }
 }
 
 fn at(moment: &Option<Moment>) -> String {
