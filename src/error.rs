@@ -144,6 +144,12 @@ pub enum Error {
         /// Why.
         reason: String,
     },
+    /// Another run is writing to the output directory.
+    #[error("another run is writing to {}", path.display())]
+    Busy {
+        /// The directory.
+        path: PathBuf,
+    },
     /// The output directory holds something that no run of ours wrote.
     #[error("{} is not empty and was not written by driftmesh (it holds {found})", path.display())]
     ForeignDirectory {
@@ -172,7 +178,13 @@ impl From<Failure> for Error {
 impl Error {
     /// A setting out of range.
     pub fn invalid(key: impl Into<String>, value: impl std::fmt::Display, rule: impl Into<String>) -> Self {
-        Self::Invalid { key: key.into(), value: value.to_string(), rule: rule.into() }
+        let text = value.to_string();
+        // very large and very small numbers as powers of ten
+        let value = match text.parse::<f64>() {
+            Ok(number) if text.len() > 14 => format!("{number:e}"),
+            _ => text,
+        };
+        Self::Invalid { key: key.into(), value, rule: rule.into() }
     }
 
     /// The same error with its key seen from one table further out: `viscosity` becomes `pde.viscosity`.
@@ -188,6 +200,7 @@ impl Error {
         match self {
             Self::Failed { failure, .. } => Some(failure.help().into()),
             Self::Study(diagnostic) => diagnostic.help.clone(),
+            Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
             Self::ForeignDirectory { .. } => Some("name another directory with --out, or empty this one".into()),
             Self::Invalid { .. } | Self::Unreadable { .. } | Self::Unwritable { .. } => None,
         }
@@ -206,12 +219,14 @@ pub struct Diagnostic {
     pub message: String,
     /// Name of the text: a file, or `--set`.
     pub origin: String,
-    /// The line, without its end.
+    /// The line, without its end; of a very long line the part around the place.
     pub text: String,
     /// Line number from 1.
     pub line: usize,
     /// Column of the first marked character, from 1, in characters.
     pub column: usize,
+    /// Where that character stands in `text`, from 1.
+    pub caret: usize,
     /// Number of marked characters, at least 1.
     pub width: usize,
     /// The remedy.
@@ -226,6 +241,6 @@ impl std::fmt::Display for Diagnostic {
         writeln!(f, "{gutter}--> {}:{}:{}", self.origin, self.line, self.column)?;
         writeln!(f, "{gutter} |")?;
         writeln!(f, "{number} | {}", self.text)?;
-        write!(f, "{gutter} | {}{}", " ".repeat(self.column - 1), "^".repeat(self.width))
+        write!(f, "{gutter} | {}{}", " ".repeat(self.caret - 1), "^".repeat(self.width))
     }
 }

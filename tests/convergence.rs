@@ -55,6 +55,21 @@ fn physics_is_second_order_in_space() {
     }
 }
 
+/// A step whose first residual is far above one, and one where round-off alone exceeds the usual tolerance: Newton
+/// converges in a few iterations all the same.
+#[test]
+fn newton_converges_from_large_residuals_and_down_to_round_off() {
+    for (viscosity, n) in [(1.0, 160), (1000.0, 40)] {
+        let mut burgers = Burgers::new(viscosity, Convection::Conservative).unwrap();
+        let mesh = Mesh::uniform(Lattice::bounded([n, n]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+        let u = burgers.initial(0.25, &mesh);
+        let motion = Motion { t: 0.25, dt: 0.25, old: &mesh, new: &mesh };
+        let (u, work) = burgers.step(motion, &u).unwrap();
+        assert!(work.newton_iterations <= 4, "ν = {viscosity}: {work:?}");
+        assert!(largest_difference(&u, &burgers.exact(0.5, &mesh).unwrap()) < 1e-4);
+    }
+}
+
 /// Against very small steps on the same fixed distorted mesh, so that only time is seen.
 #[test]
 fn physics_is_second_order_in_time() {

@@ -116,14 +116,20 @@ fn unreadable() {
 }
 
 #[test]
-fn unwritable_and_foreign() {
+fn unwritable_busy_and_foreign() {
     let place = tempfile::tempdir().unwrap();
     std::fs::write(place.path().join("file"), "").unwrap();
     let error = RunDirectory::claim(&place.path().join("file/below")).unwrap_err();
     assert!(matches!(error, Error::Unwritable { .. } | Error::Unreadable { .. }), "{error}");
     let claimed = RunDirectory::claim(&place.path().join("mine")).unwrap();
-    std::fs::remove_dir(claimed.path()).unwrap();
+    std::fs::remove_dir_all(claimed.path()).unwrap();
     assert_says(claimed.write("summary.json", b"{}").unwrap_err(), &["cannot write", "summary.json"], None, true);
+
+    let held = RunDirectory::claim(&place.path().join("held")).unwrap();
+    let error = RunDirectory::claim(held.path()).unwrap_err();
+    assert_says(error, &["another run is writing to", "held"], Some("--out"), false);
+    drop(held);
+    RunDirectory::claim(&place.path().join("held")).unwrap();
 
     let error = RunDirectory::check(place.path()).unwrap_err();
     assert_says(error, &["is not empty and was not written by driftmesh", "file"], Some("--out"), false);

@@ -38,7 +38,10 @@ impl Run {
             study::run(&study, &out, watchers)
         };
         progress.clear();
-        let finished = finished?;
+        let finished = match finished {
+            Ok(finished) => finished,
+            Err(error) => return Ok(terminal::complain(&error, study.remedy(&error).or_else(|| error.help()), None)),
+        };
         if !self.quiet {
             terminal::say(table(&finished.summary));
             terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));

@@ -147,7 +147,7 @@ fn bad_settings_are_refused_by_name() {
         ("time.end=inf", &["`time.end` is inf", "finite"]),
         ("time.step=0", &["`time.step` is 0", "above 0"]),
         ("time.step=nan", &["`time.step` is NaN"]),
-        ("time.step=1e-300", &["`time.step`", "steps; raise it"]),
+        ("time.step=1e-11", &["`time.step`", "steps; raise it"]),
         ("time.report=[3.0]", &["`time.report` is 3", "between"]),
         ("monitor.strength.relative=-1", &["`monitor.strength.relative` is -1"]),
         ("monitor.strength.absolute=nan", &["`monitor.strength.absolute` is NaN"]),
@@ -156,6 +156,13 @@ fn bad_settings_are_refused_by_name() {
         ("mesh.coupling.iterations=0", &["`mesh.coupling.iterations` is 0"]),
         ("mesh.coupling.mesh_steps=0", &["`mesh.coupling.mesh_steps` is 0"]),
         ("domain.upper=[0.0,1.0]", &["`domain.upper`", "above lower"]),
+        ("grid.cells=[40,40,40]", &["an array of length 2, found 3"]),
+        ("domain.lower=[0.0,0.0,9.0]", &["an array of length 2, found 3"]),
+        ("time=[0.25,0.3,0.001,[]]", &["`time` is an array, not a table"]),
+        ("domain.lower=[nan,0.0]", &["`domain.lower`", "finite"]),
+        ("domain.upper=[1e-200,1.0]", &["`domain.upper`", "cannot be told apart"]),
+        ("domain.upper=[1e300,1.0]", &["`domain.upper` is [1e300, 1.0]", "cannot be told apart"]),
+        ("time.step=1e-13", &["`time.step`", "raise it"]),
         ("domain.periodic=[true,false]", &["`domain.periodic`", "bounded"]),
         ("study.name=\"../x\"", &["`study.name`"]),
         ("output.frames.every=0", &["`output.frames.every` is 0"]),
@@ -220,7 +227,7 @@ fn bad_files_are_refused_at_their_place() {
         (vec![], &["the study has no [study] table"]),
         (b"name = \"\xff\xfe\"".to_vec(), &["not UTF-8", "byte 8, line 1"]),
         (vec![0; 100], &["study.toml:1:1"]),
-        (vec![b' '; 2_000_000], &["2000000 bytes"]),
+        (vec![b' '; 2_000_000], &["more than 1048576 bytes"]),
         (b"a=".repeat(10_000), &["study.toml:1"]),
         (b"[".repeat(100_000), &["study.toml:1"]),
     ];
@@ -271,9 +278,21 @@ fn only_our_own_directories_are_replaced() {
 
     assert!(sandbox.run(&[]).status.success());
     std::fs::write(sandbox.path("out/notes.txt"), "kept").unwrap();
+    std::fs::write(sandbox.path("out/frames/notes.txt"), "kept too").unwrap();
     assert!(sandbox.run(&["time.end=0.26", "time.report=[0.26]"]).status.success());
     assert_eq!(std::fs::read_to_string(sandbox.path("out/notes.txt")).unwrap(), "kept");
-    assert_eq!(entries(&sandbox.path("out/frames")).len(), 3, "old frames are gone");
+    assert_eq!(std::fs::read_to_string(sandbox.path("out/frames/notes.txt")).unwrap(), "kept too");
+    assert_eq!(entries(&sandbox.path("out/frames")).len(), 1 + 3, "old frames are gone");
+
+    // what a run that was killed before its first summary leaves is ours; what another one is writing to is not
+    std::fs::create_dir(sandbox.path("killed")).unwrap();
+    let lock = std::fs::File::create(sandbox.path("killed/run.lock")).unwrap();
+    lock.lock().unwrap();
+    let busy = sandbox.call(&["run", "study.toml", "--out", "killed"]);
+    assert_eq!(busy.status.code(), Some(2));
+    assert!(words(&busy).contains("another run is writing to killed"), "{}", words(&busy));
+    drop(lock);
+    assert!(sandbox.call(&["run", "study.toml", "--out", "killed"]).status.success());
 }
 
 /// A mesh that folds: exit 1, the named error with the present settings, everything so far kept.
@@ -317,9 +336,13 @@ fn a_lost_solution_is_named() {
     ]);
     assert_eq!(output.status.code(), Some(1), "{}", words(&output));
     assert!(words(&output).contains("Newton's method stalled"), "{}", words(&output));
-    let output = sandbox.run(&["domain.upper=[1e-200,1.0]"]);
+    // a failure at the start replaces what an earlier run left, and says so
+    assert!(sandbox.run(&[]).status.success());
+    let output = sandbox.run(&["monitor.strength.absolute=1e308", "pde.viscosity=1e-6"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(words(&output).contains("(step 0): the mesh density is NaN at node"), "{}", words(&output));
+    assert!(words(&output).contains("(step 0): the mesh density is inf at node"), "{}", words(&output));
+    let summary = std::fs::read_to_string(sandbox.path("out/summary.json")).unwrap();
+    assert!(summary.contains("\"failed\"") && summary.contains("non-finite"), "{summary}");
 }
 
 #[cfg(unix)]

@@ -55,7 +55,7 @@ impl Default for Arclength {
 }
 
 /// More passes than this leave nothing of ρ on any lattice that fits a machine.
-const MAX_SMOOTHING: usize = 10_000;
+const MAX_SMOOTHING: usize = 1000;
 
 impl Arclength {
     /// Refuses settings out of range.

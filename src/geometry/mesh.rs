@@ -30,11 +30,22 @@ impl<const D: usize> Mesh<D> {
     /// The uniform mesh of the box from `lower` to `upper`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless `lower < upper` along every axis and both are finite.
+    /// [`Error::Invalid`] unless `lower < upper` along every axis, both are finite, and cells between them are far
+    /// larger than round-off.
     pub fn uniform(lattice: Lattice<D>, lower: [f64; D], upper: [f64; D]) -> Result<Self> {
         for d in 0..D {
-            if !(lower[d].is_finite() && upper[d].is_finite() && lower[d] < upper[d]) {
+            if !lower[d].is_finite() {
+                return Err(Error::invalid("lower", format!("{lower:?}"), "must be finite along every axis"));
+            }
+            if !(upper[d].is_finite() && lower[d] < upper[d]) {
                 let rule = format!("must be finite and above lower = {lower:?} along every axis");
+                return Err(Error::invalid("upper", format!("{upper:?}"), rule));
+            }
+            // cells must be told apart from round-off, and areas from zero and infinity
+            let (extent, size) = (upper[d] - lower[d], lower[d].abs().max(upper[d].abs()));
+            if extent / (lattice.cells()[d] as f64) < 1e-12 * size || !(1e-100..1e100).contains(&extent) {
+                let rule =
+                    format!("between lower = {lower:?} and it, cells cannot be told apart; move or scale the box");
                 return Err(Error::invalid("upper", format!("{upper:?}"), rule));
             }
         }

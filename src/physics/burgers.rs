@@ -190,6 +190,9 @@ impl Physics for Burgers {
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 
         let size = u_new.iter().fold(1.0, |m, [u]| larger(m, *u));
+        // where Δt·ν/h² is large, round-off alone leaves more than the tolerance
+        let stiffest = rows.iter().fold(0.0, |m, row| larger(m, row.linear.iter().map(|l| l.abs()).sum()));
+        let wanted = size * TOLERANCE.max(8.0 * f64::EPSILON * (1.0 + dt * stiffest));
         let mut work = Work::default();
         let mut residual = vec![[0.0]; patch.len()];
         let stalled = loop {
@@ -199,12 +202,12 @@ impl Physics for Burgers {
                 }
             });
             let largest = residual.iter().fold(0.0, |m, [r]| larger(m, *r));
-            if largest <= TOLERANCE * size {
+            if largest <= wanted {
                 break None;
             }
             let iterations = work.newton_iterations;
             if iterations == MAX_NEWTON || !largest.is_finite() {
-                break Some(Failure::NewtonStalled { residual: largest, tolerance: TOLERANCE * size, iterations });
+                break Some(Failure::NewtonStalled { residual: largest, tolerance: wanted, iterations });
             }
             parallel::for_each_row(&mut matrix.rows, n, |p, entries| {
                 for (entries, (i, k)) in entries.iter_mut().zip(places(p)) {
@@ -214,7 +217,7 @@ impl Physics for Burgers {
             });
             let mut correction = vec![[0.0]; patch.padded_len()];
             // Newton squares the residual: solving for much less than that is wasted
-            let tolerance = [(0.01 * largest * largest / size).max(0.1 * TOLERANCE * size)];
+            let tolerance = [(0.01 * largest * (largest / size).min(1.0)).max(0.1 * wanted)];
             work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
             work.linear_solves += 1;
             work.newton_iterations += 1;

@@ -42,6 +42,11 @@ impl Schedule {
         if step <= 0.0 {
             return Err(Error::invalid("step", step, "must be above 0"));
         }
+        let resolution = 1e-12 * start.abs().max(end.abs());
+        if step < resolution {
+            let rule = format!("near t = {end:e} times are told apart only down to {resolution:.0e}; raise it");
+            return Err(Error::invalid("step", step, rule));
+        }
         if (end - start) / step > MAX_STEPS {
             let rule = format!("that makes more than {MAX_STEPS:.0e} steps; raise it");
             return Err(Error::invalid("step", step, rule));
@@ -149,7 +154,8 @@ mod tests {
         };
         assert_eq!(key(0.0, -1.0, 0.1, vec![]), "end");
         assert_eq!(key(0.0, 1.0, 0.0, vec![]), "step");
-        assert_eq!(key(0.0, 1.0, 1e-12, vec![]), "step");
+        assert_eq!(key(0.0, 1.0, 1e-11, vec![]), "step");
+        assert_eq!(key(1e15, 1e15 + 1.0, 0.01, vec![]), "step");
         assert_eq!(key(0.0, 1.0, f64::NAN, vec![]), "step");
         assert_eq!(key(f64::NAN, 1.0, 0.1, vec![]), "start");
         assert_eq!(key(0.0, f64::INFINITY, 0.1, vec![]), "end");

@@ -5,7 +5,7 @@ use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{GeneratorKind, Mmpde};
 use crate::physics::PdeKind;
 use crate::simulation::{Coupling, FramesAt, Schedule, Simulation};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de};
 
 /// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -56,10 +56,13 @@ pub enum StudyKind {
 #[serde(deny_unknown_fields, default)]
 pub struct Domain {
     /// Lower corner of the box.
+    #[serde(deserialize_with = "pair")]
     pub lower: [f64; 2],
     /// Upper corner of the box.
+    #[serde(deserialize_with = "pair")]
     pub upper: [f64; 2],
     /// Axes that wrap around.
+    #[serde(deserialize_with = "pair")]
     pub periodic: [bool; 2],
 }
 
@@ -74,6 +77,7 @@ impl Default for Domain {
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// Cells along each axis.
+    #[serde(deserialize_with = "pair")]
     pub cells: [usize; 2],
 }
 
@@ -142,6 +146,13 @@ pub enum StartMesh {
 pub struct Output {
     /// When frames are written; about twenty of them where nothing is said.
     pub frames: Option<FramesAt>,
+}
+
+/// An array of exactly two entries; serde's own arrays take the first two of more.
+fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<[T; 2], D::Error> {
+    let entries = Vec::<T>::deserialize(deserializer)?;
+    <[T; 2]>::try_from(entries)
+        .map_err(|entries| de::Error::custom(format!("expected an array of length 2, found {}", entries.len())))
 }
 
 /// Memory that a run needs for each node: 1350 bytes measured at 1000 × 1000 cells, and a reserve.

@@ -19,17 +19,17 @@ pub struct Finished {
 
 /// Runs a study into a directory, with further observers watching
 ///
-/// A numerical failure is not an error of this function: everything up to the last good state is written as for a
-/// completed run, and [`Finished::failure`] says what happened.
+/// A failure after the start is not an error of this function: everything up to the last good state is written as for
+/// a completed run, and [`Finished::failure`] says what happened. `summary.json` tells the same.
 ///
 /// # Errors
-/// [`Error::Invalid`] or [`Error::ForeignDirectory`] before anything is written; [`Error::Unwritable`] where the
-/// directory cannot be written.
+/// [`Error::Invalid`], [`Error::ForeignDirectory`] or [`Error::Busy`] before anything is written; [`Error::Failed`] where
+/// the initial state cannot be computed; [`Error::Unwritable`] where the directory cannot be written.
 pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<Finished> {
     let mut study = study.clone();
     study.resolve()?;
     let mut simulation = study.simulation()?;
-    let mut state = simulation.start(study.initial_mesh()?)?;
+    let mesh = study.initial_mesh()?;
     let unknowns = simulation.physics.unknowns();
 
     let directory = RunDirectory::claim(directory)?;
@@ -47,33 +47,50 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     };
     directory.write("study.toml", study.to_toml().as_bytes())?;
     directory.write_summary(&summary)?;
-    let mut history = History::create(&directory.path().join("history.csv"))?;
-    let mut frames = Frames::create(directory.path(), study.frames())?;
-
     let mut record = Record::default();
-    let mut observers: Vec<&mut dyn Observer> = vec![&mut history, &mut frames];
-    watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
-    let failure = simulation.run(&mut state, &mut record, &mut observers).err();
+    let outcome = simulation.start(mesh).and_then(|mut state| {
+        let mut history = History::create(&directory.path().join("history.csv"))?;
+        let mut frames = Frames::create(directory.path(), study.frames())?;
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut history, &mut frames];
+        watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
+        let failure = simulation.run(&mut state, &mut record, &mut observers).err();
+        let output = Instant::now();
+        let kept = keep(&study, &directory, &unknowns, &state, &mut frames);
+        let spent = output.elapsed().as_secs_f64();
+        record.seconds.output += spent;
+        record.seconds.wall += spent;
+        // what went wrong first is what is reported
+        match (failure, kept) {
+            (None, Err(error)) => Err(error),
+            (failure, _) => Ok((state, failure)),
+        }
+    });
 
-    let output = Instant::now();
-    if failure.is_some() {
-        frames.write(&unknowns, &state)?; // the last good state
-    }
-    directory.write("final.npz", &final_arrays(&unknowns, &state))?;
-    let picture = draw(&format!("{}, t = {}", study.study.name, rounded(state.t)), &unknowns[0], &state);
-    directory.write("mesh.svg", picture.svg.as_bytes())?;
-    directory.write("mesh.png", &picture.png)?;
-    let spent = output.elapsed().as_secs_f64();
-    record.seconds.output += spent;
-    record.seconds.wall += spent;
-
+    let failure = outcome.as_ref().map_or_else(Some, |(_, failure)| failure.as_ref());
     summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
-    summary.error = failure.as_ref().map(Failed::from);
+    summary.error = failure.map(Failed::from);
     summary.seconds = record.seconds;
     summary.work = record.work;
     summary.reports = record.reports;
-    directory.write_summary(&summary)?;
+    let written = directory.write_summary(&summary);
+    let (state, failure) = outcome?;
+    written?;
     Ok(Finished { summary, state, failure })
+}
+
+/// Writes the last good state: as a frame, as arrays, as a picture.
+fn keep(
+    study: &MovingMesh,
+    directory: &RunDirectory,
+    unknowns: &[String],
+    state: &State,
+    frames: &mut Frames,
+) -> Result<()> {
+    frames.write(unknowns, state)?;
+    directory.write("final.npz", &final_arrays(unknowns, state))?;
+    let picture = draw(&format!("{}, t = {}", study.study.name, rounded(state.t)), &unknowns[0], state);
+    directory.write("mesh.svg", picture.svg.as_bytes())?;
+    directory.write("mesh.png", &picture.png)
 }
 
 /// A time without the tail that binary fractions have.

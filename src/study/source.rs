@@ -1,5 +1,6 @@
 use crate::error::{Diagnostic, Error, Result};
 use serde::de::DeserializeOwned;
+use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -28,6 +29,8 @@ struct Piece {
 const KINDED: [&str; 3] = ["pde", "monitor", "mesh.generator"];
 /// Tables that hold one of several keys.
 const CHOICES: [&str; 2] = ["monitor.strength", "output.frames"];
+/// Characters of a line that are shown.
+const SHOWN: usize = 160;
 /// A study is a page of text; more is some other file.
 const MAX_BYTES: u64 = 1 << 20;
 
@@ -38,14 +41,15 @@ impl Source {
     /// [`Error::Unreadable`] where there is no such file or its text is not UTF-8.
     pub fn read(path: &Path) -> Result<Self> {
         let unreadable = |reason: String| Error::Unreadable { path: path.into(), reason };
-        let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?;
-        if size.is_dir() {
+        if path.is_dir() {
             return Err(unreadable("it is a directory, not a study file".into()));
         }
-        if size.len() > MAX_BYTES {
-            return Err(unreadable(format!("it has {} bytes; a study has at most {MAX_BYTES}", size.len())));
+        let mut bytes = Vec::new();
+        let read = std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
+        read.map_err(|error| unreadable(error.to_string()))?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(unreadable(format!("it has more than {MAX_BYTES} bytes, which no study has")));
         }
-        let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
             let line = error.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
@@ -93,6 +97,12 @@ impl Source {
     /// [`Error::Study`] at the place of the first mistake.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         let mut root = self.merged()?;
+        let sections: Vec<String> = root.iter().map(|(name, _)| name.get_ref().to_string()).collect();
+        for path in sections.iter().map(String::as_str).chain(KINDED).chain(CHOICES).chain(["mesh.coupling"]) {
+            if let Some((_, value)) = entry(&mut root, path).filter(|(_, value)| value.get_ref().is_array()) {
+                return Err(self.diagnostic(&format!("`{path}` is an array, not a table"), value.span(), None));
+            }
+        }
         for path in KINDED {
             self.name_kind(&mut root, path)?;
         }
@@ -207,15 +217,30 @@ impl Source {
         let line_start = piece.text[..start].rfind('\n').map_or(0, |n| n + 1);
         let line_end = piece.text[start..].find(['\n', '\r']).map_or(piece.text.len(), |n| start + n);
         let end = end.clamp(start, line_end);
+        let column = piece.text[line_start..start].chars().count() + 1;
+        // a very long line is shown around the place only
+        let skipped = column.saturating_sub(SHOWN / 2).saturating_sub(1);
+        let text: String = piece.text[line_start..line_end].chars().skip(skipped).take(SHOWN).map(printable).collect();
+        let width = piece.text[start..end].chars().count();
         Error::Study(Box::new(Diagnostic {
-            message: message.to_string(),
+            message: message.chars().map(printable).collect(),
             origin: piece.origin.clone(),
-            text: piece.text[line_start..line_end].replace('\t', " "),
             line: piece.text[..start].matches('\n').count() + 1,
-            column: piece.text[line_start..start].chars().count() + 1,
-            width: piece.text[start..end].chars().count().max(1),
+            column,
+            caret: column - skipped,
+            width: width.min((text.chars().count() + skipped + 1).saturating_sub(column)).max(1),
+            text,
             help,
         }))
+    }
+}
+
+/// A control character, a tab too, would move what is printed after it.
+fn printable(c: char) -> char {
+    match c {
+        '\t' => ' ',
+        c if c.is_control() => '\u{fffd}',
+        c => c,
     }
 }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// `history.csv`: one row a step.
+/// `history.csv`: one row for the initial state and one a step; iterations and seconds are totals since the start.
 #[derive(Debug)]
 pub struct History {
     path: PathBuf,
@@ -41,25 +41,25 @@ impl History {
 
 impl Observer for History {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        let written = match event {
-            Event::Finished => self.writer.flush().map_err(|error| error.to_string()),
-            Event::Started | Event::Stepped => {
-                let work = snapshot.work.work;
-                let row = Row {
-                    t: snapshot.state.t,
-                    dt: snapshot.dt,
-                    min_scaled_jacobian: snapshot.quality.min_scaled_jacobian,
-                    q_max: snapshot.quality.q_max,
-                    q_mean: snapshot.quality.q_mean,
-                    error_linf: snapshot.error.map(|e| e.linf),
-                    error_l2: snapshot.error.map(|e| e.l2),
-                    linear_iterations: work.linear_iterations,
-                    newton_iterations: work.newton_iterations,
-                    seconds: snapshot.seconds,
-                };
-                self.writer.serialize(row).map_err(|error| error.to_string())
-            }
+        if event == Event::Finished {
+            return Ok(());
+        }
+        let work = snapshot.work.work;
+        let row = Row {
+            t: snapshot.state.t,
+            dt: snapshot.dt,
+            min_scaled_jacobian: snapshot.quality.min_scaled_jacobian,
+            q_max: snapshot.quality.q_max,
+            q_mean: snapshot.quality.q_mean,
+            error_linf: snapshot.error.map(|e| e.linf),
+            error_l2: snapshot.error.map(|e| e.l2),
+            linear_iterations: work.linear_iterations,
+            newton_iterations: work.newton_iterations,
+            seconds: snapshot.seconds,
         };
+        // row by row, so that a run that is killed leaves whole rows
+        let written = self.writer.serialize(row).map_err(|error| error.to_string());
+        let written = written.and_then(|()| self.writer.flush().map_err(|error| error.to_string()));
         written.map_err(|reason| Error::Unwritable { path: self.path.clone(), reason })
     }
 }

@@ -1,19 +1,24 @@
 use super::Summary;
 use crate::error::{Error, Result};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// The directory of one run
 ///
 /// Claimed before anything is computed. It may be new, empty, or what an earlier run of ours left: then the files that
 /// runs write are removed, and nothing else. Any other directory is refused.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct RunDirectory {
     path: PathBuf,
+    /// Held while the run writes.
+    lock: File,
 }
 
+/// Present and locked while a run writes.
+const LOCK: &str = "run.lock";
+
 /// Everything that a run may write.
-const OURS: [&str; 8] =
-    ["summary.json", "study.toml", "history.csv", "run.pvd", "final.npz", "mesh.png", "mesh.svg", "frames"];
+const OURS: [&str; 7] = ["summary.json", "study.toml", "history.csv", "run.pvd", "final.npz", "mesh.png", "mesh.svg"];
 
 impl RunDirectory {
     /// Refuses a directory that [`RunDirectory::claim`] would refuse, touching nothing.
@@ -46,15 +51,17 @@ impl RunDirectory {
         let unwritable =
             |path: &Path, error: std::io::Error| Error::Unwritable { path: path.into(), reason: error.to_string() };
         std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))?;
-        for name in OURS {
-            let old = path.join(name);
-            let removed = if old.is_dir() { std::fs::remove_dir_all(&old) } else { std::fs::remove_file(&old) };
-            match removed {
+        let lock = File::create(path.join(LOCK)).map_err(|error| unwritable(path, error))?;
+        lock.try_lock().map_err(|_| Error::Busy { path: path.into() })?;
+        let frames = std::fs::read_dir(path.join("frames")).into_iter().flatten().flatten().map(|entry| entry.path());
+        let old_frames = frames.filter(|frame| is_frame(frame));
+        for old in OURS.into_iter().map(|name| path.join(name)).chain(old_frames) {
+            match std::fs::remove_file(&old) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(unwritable(&old, error)),
                 _ => {}
             }
         }
-        Ok(Self { path: path.into() })
+        Ok(Self { path: path.into(), lock })
     }
 
     /// Where it is.
@@ -81,8 +88,23 @@ impl RunDirectory {
     }
 }
 
-/// True if a run of ours wrote this directory: its summary says so.
+impl Drop for RunDirectory {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(self.path.join(LOCK));
+        let _ = self.lock.unlock();
+    }
+}
+
+fn is_frame(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    name.starts_with("step-") && name.ends_with(".vtu")
+}
+
+/// True if a run of ours wrote this directory: its summary says so, or the lock of a run that was killed before.
 fn wrote(path: &Path) -> bool {
+    if path.join(LOCK).is_file() {
+        return true;
+    }
     let Ok(text) = std::fs::read_to_string(path.join("summary.json")) else { return false };
     let Ok(summary) = serde_json::from_str::<serde_json::Value>(&text) else { return false };
     summary["schema"].is_u64() && summary["study"].is_string() && path.join("study.toml").is_file()
