@@ -158,7 +158,9 @@ fn bad_settings_are_refused_by_name() {
         ("domain.upper=[0.0,1.0]", &["`domain.upper`", "above lower"]),
         ("grid.cells=[40,40,40]", &["an array of length 2, found 3"]),
         ("domain.lower=[0.0,0.0,9.0]", &["an array of length 2, found 3"]),
-        ("time=[0.25,0.3,0.001,[]]", &["`time` is an array, not a table"]),
+        ("time=[0.25,0.3,0.001,[]]", &["`time` must be a table, but this is of type array"]),
+        ("monitor.strength={relative=1,absolute=2}", &["exactly one of its keys", "--set:1"]),
+        ("mesh.generator=whole", &["`mesh.generator` must be a table, but this is of type string"]),
         ("domain.lower=[nan,0.0]", &["`domain.lower`", "finite"]),
         ("domain.upper=[1e-200,1.0]", &["`domain.upper`", "cannot be told apart"]),
         ("domain.upper=[1e300,1.0]", &["`domain.upper` is [1e300, 1.0]", "cannot be told apart"]),
@@ -174,7 +176,7 @@ fn bad_settings_are_refused_by_name() {
         ("study.kind=stefan", &["unknown name `stefan`", "moving-mesh"]),
         ("pde.convection=advectiv", &["did you mean `advective`?"]),
         ("time.step=\"fast\"", &["expected a number"]),
-        ("grid.cells=40", &["expected an array of length 2"]),
+        ("grid.cells=40", &["integer `40`, expected an array"]),
         ("grid.cells=[-40,40]", &["expected a whole number"]),
         ("monitor.kind=3", &["`monitor.kind` is not a string"]),
         // not assignments
@@ -377,6 +379,8 @@ fn settings_override_choices() {
     let output = sandbox.call(&[
         "check",
         "study.toml",
+        "--set",
+        "monitor.strength.relative=7",
         "--set",
         "monitor.strength.absolute=5",
         "--set",

@@ -99,8 +99,9 @@ impl Source {
         let mut root = self.merged()?;
         let sections: Vec<String> = root.iter().map(|(name, _)| name.get_ref().to_string()).collect();
         for path in sections.iter().map(String::as_str).chain(KINDED).chain(CHOICES).chain(["mesh.coupling"]) {
-            if let Some((_, value)) = entry(&mut root, path).filter(|(_, value)| value.get_ref().is_array()) {
-                return Err(self.diagnostic(&format!("`{path}` is an array, not a table"), value.span(), None));
+            if let Some((_, value)) = entry(&mut root, path).filter(|(_, value)| !value.get_ref().is_table()) {
+                let message = format!("`{path}` must be a table, but this is of type {}", value.get_ref().type_str());
+                return Err(self.diagnostic(&message, value.span(), None));
             }
         }
         for path in KINDED {
@@ -199,6 +200,9 @@ impl Source {
             message
                 .replace("expected f64", "expected a number")
                 .replace("expected usize", "expected a whole number, 0 or more")
+                .replace("a sequence", "an array")
+                .replace("a map", "a table")
+                .replace("invalid type: map", "invalid type: table")
         };
         self.diagnostic(&message, span, None)
     }
@@ -244,18 +248,17 @@ fn printable(c: char) -> char {
     }
 }
 
-/// Puts one table over another. A new `kind`, or another key of a choice, drops what the file gave for the old one.
+/// Puts one table over another. A new `kind` drops what the file gave for the old one; a choice is replaced whole.
 fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>, path: &str, file: usize) {
     for (key, value) in over {
         let name = key.get_ref().to_string();
         let known = under.get(name.as_str());
-        let other_kind = name == "kind" && known.is_some_and(|k| k.get_ref().as_str() != value.get_ref().as_str());
-        if other_kind || (CHOICES.contains(&path) && known.is_none()) {
+        if name == "kind" && known.is_some_and(|k| k.get_ref().as_str() != value.get_ref().as_str()) {
             drop_before(under, file);
         }
         let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
         match (under.get_mut(name.as_str()).map(Spanned::get_mut), value.get_ref()) {
-            (Some(DeValue::Table(below)), DeValue::Table(_)) => {
+            (Some(DeValue::Table(below)), DeValue::Table(_)) if !CHOICES.contains(&inner.as_str()) => {
                 if let DeValue::Table(above) = value.into_inner() {
                     merge(below, above, &inner, file);
                 }
