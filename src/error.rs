@@ -86,9 +86,8 @@ impl Failure {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Folded { .. } => "raise monitor.smoothing, lower monitor.strength or lower time.step",
-            Self::NonFinite { .. } | Self::NewtonStalled { .. } => {
-                "lower time.step, refine grid.cells or raise monitor.smoothing"
-            }
+            Self::NonFinite { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
+            Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => "lower time.step or raise mesh.relaxation",
             Self::WrongLength { .. } => "give one value a node, in lattice order",
         }
