@@ -5,8 +5,8 @@ use crate::parallel;
 /// Alternating-direction cycles, and BiCGSTAB preconditioned by them where they are slow, for all right-hand sides at
 /// once
 ///
-/// A mesh equation takes one or two cycles of 8 to 24 sweeps in all, for any Δt/h². Corners, strong convection and
-/// periodic axes call for the Krylov method. An iteration is a product with the matrix.
+/// A mesh equation takes a few cycles, whose sweeps grow with the logarithm of Δt/h² (`make bench` counts them). Corners,
+/// strong convection and periodic axes call for the Krylov method. An iteration is a sweep.
 ///
 /// # Source
 /// Peaceman and Rachford (1955); van der Vorst, *Bi-CGSTAB: a fast and smoothly converging variant of Bi-CG* (1992).
