@@ -58,6 +58,44 @@ pub enum Failure {
         /// Iterations done.
         iterations: usize,
     },
+    /// The density is so steep that the weights of the mesh equation are no probabilities.
+    #[error("the density is too steep for random walks: |b|h = {skew:.3} at node {}, x = {}, and must be at most 2", tuple(node.iter()), tuple(x.iter().map(|&x| short(x))))]
+    SteepDensity {
+        /// Largest |b|h of the node.
+        skew: f64,
+        /// Indices of the node.
+        node: Vec<usize>,
+        /// Where the node is.
+        x: Vec<f64>,
+    },
+    /// Interface values are so noisy that cells can fold.
+    #[error("interface values are too noisy: standard error {noise:.1e}, shortest edge of the mesh {edge:.1e}, Δt/(τh²) = {stiffness:.3}")]
+    NoisyInterface {
+        /// Root mean square of the standard errors.
+        noise: f64,
+        /// Shortest edge of the mesh.
+        edge: f64,
+        /// Δt/(τh²), the larger of both axes.
+        stiffness: f64,
+    },
+    /// The Schwarz iteration did not reach its tolerance.
+    #[error("the Schwarz iteration stalled: change {change:.1e} after {iterations} iterations, {tolerance:.0e} needed")]
+    SchwarzStalled {
+        /// Largest change in the last iteration.
+        change: f64,
+        /// What was asked for.
+        tolerance: f64,
+        /// Iterations done.
+        iterations: usize,
+    },
+    /// A lattice cannot be divided into so many subdomains.
+    #[error("{subdomains:?} subdomains do not fit {cells:?} cells")]
+    Subdomains {
+        /// Asked for along each axis.
+        subdomains: [usize; 2],
+        /// Cells along each axis.
+        cells: [usize; 2],
+    },
     /// An array does not fit the lattice it is given with.
     #[error("{what} has {found} values, but the lattice has {expected} nodes")]
     WrongLength {
@@ -78,6 +116,10 @@ impl Failure {
             Self::NonFinite { .. } => "non-finite",
             Self::NewtonStalled { .. } => "newton-stalled",
             Self::LinearStalled { .. } => "linear-stalled",
+            Self::SteepDensity { .. } => "steep-density",
+            Self::NoisyInterface { .. } => "noisy-interface",
+            Self::SchwarzStalled { .. } => "schwarz-stalled",
+            Self::Subdomains { .. } => "subdomains",
             Self::WrongLength { .. } => "wrong-length",
         }
     }
@@ -89,6 +131,12 @@ impl Failure {
             Self::NonFinite { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => "lower time.step or raise mesh.relaxation",
+            Self::SteepDensity { .. } => "set monitor.gradient = \"safe\", which bounds |b|h, or raise monitor.smoothing",
+            Self::NoisyInterface { .. } => {
+                "raise mesh.generator.estimator.walks or its sweeps (paths for monte-carlo), or set them to \"auto\""
+            }
+            Self::SchwarzStalled { .. } => "raise mesh.generator.overlap or lower time.step",
+            Self::Subdomains { .. } => "give every axis between one subdomain and one a cell",
             Self::WrongLength { .. } => "give one value a node, in lattice order",
         }
     }
@@ -157,6 +205,11 @@ pub enum Error {
         /// Something found in it.
         found: String,
     },
+}
+
+/// Items in parentheses.
+fn tuple(items: impl Iterator<Item = impl std::fmt::Display>) -> String {
+    format!("({})", items.map(|item| item.to_string()).collect::<Vec<_>>().join(", "))
 }
 
 /// A coordinate in a few characters, whatever its size.

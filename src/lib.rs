@@ -6,7 +6,7 @@
 //! | part | trait | here |
 //! |---|---|---|
 //! | where the mesh should be fine | [`density::Monitor`] | [`density::Arclength`] |
-//! | how the mesh follows | [`meshing::MeshGenerator`] | [`meshing::Whole`], [`meshing::Fixed`] |
+//! | how the mesh follows | [`meshing::MeshGenerator`] | [`meshing::Stochastic`], [`meshing::Schwarz`], [`meshing::Whole`] |
 //! | what is solved on it | [`physics::Physics`] | [`physics::Burgers`] |
 //!
 //! # A tour
@@ -24,11 +24,11 @@
 //! let equation = Mmpde { relaxation: 0.1, ..Mmpde::default() };
 //! for _ in 0..50 {
 //!     let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
-//!     let rho = monitor.density(&mesh, &u)?;
-//!     (mesh, _) = generator.step(&equation, &mesh, &rho, 1e-3)?;
+//!     let rho = monitor.density(&mesh, &u, None)?;
+//!     mesh = generator.step(&equation, &mesh, &rho, 1e-3)?.mesh;
 //! }
 //! let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
-//! let q = quality(&mesh, &monitor.density(&mesh, &u)?);
+//! let q = quality(&mesh, &monitor.density(&mesh, &u, None)?);
 //! assert!(q.min_scaled_jacobian > 0.0 && q.equidistribution < 2.0);
 //! # Ok::<(), driftmesh::Error>(())
 //! ```
@@ -41,6 +41,8 @@
 pub mod error;
 mod kind;
 mod parallel;
+mod random;
+mod setting;
 mod work;
 
 pub mod geometry;
@@ -55,5 +57,9 @@ pub mod simulation;
 
 pub mod study;
 
+pub mod reproduce;
+
+
 pub use error::{Error, Failure, Result};
+pub use setting::Auto;
 pub use work::Work;

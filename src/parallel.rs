@@ -34,6 +34,16 @@ pub(crate) fn for_each_row_pair<A: Send, B: Send>(
     }
 }
 
+/// `f` of every item, in order; for work that is worth handing out item by item.
+pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    items.par_iter().map(f).collect()
+}
+
+/// The same for items that change.
+pub(crate) fn map_mut<T: Send, R: Send>(items: &mut [T], f: impl Fn(&mut T) -> R + Sync + Send) -> Vec<R> {
+    items.par_iter_mut().map(f).collect()
+}
+
 /// Sum over all pieces of `len` elements of `f(range)`, in order.
 pub(crate) fn sum<const K: usize>(len: usize, f: impl Fn(std::ops::Range<usize>) -> [f64; K] + Sync) -> [f64; K] {
     let add = |mut total: [f64; K], part: [f64; K]| {

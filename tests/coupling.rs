@@ -11,7 +11,7 @@ use driftmesh::{Failure, Work};
 struct Bump;
 
 impl Monitor for Bump {
-    fn density(&self, mesh: &Mesh<2>, _u: &[f64]) -> Result<Vec<f64>, Failure> {
+    fn density(&self, mesh: &Mesh<2>, _u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
         Ok(mesh.x().iter().map(|[x, y]| 1.0 + 5.0 * (-30.0 * ((x - 0.5).powi(2) + (y - 0.5).powi(2))).exp()).collect())
     }
 }

@@ -40,7 +40,7 @@ fn folded() {
 fn non_finite() {
     let mut u = vec![0.0; 81];
     u[10] = f64::NAN;
-    let error = Arclength::default().density(&mesh(), &u).unwrap_err();
+    let error = Arclength::default().density(&mesh(), &u, None).unwrap_err();
     assert_eq!(error.name(), "non-finite");
     assert_says(error, &["the mesh density is NaN at node (0, 0)"], Some("time.step"), true);
 

@@ -1,6 +1,6 @@
 use crate::terminal::say;
 use clap::{Args, ValueEnum};
-use driftmesh::{density::MonitorKind, meshing::GeneratorKind, physics::PdeKind};
+use driftmesh::{density::MonitorKind, meshing::{EstimatorKind, GeneratorKind}, physics::PdeKind};
 use std::process::ExitCode;
 
 #[derive(Args)]
@@ -14,6 +14,7 @@ enum Topic {
     Pdes,
     Monitors,
     Generators,
+    Estimators,
 }
 
 impl List {
@@ -22,6 +23,7 @@ impl List {
             (Topic::Pdes, "pdes", "pde.kind", PdeKind::KINDS),
             (Topic::Monitors, "monitors", "monitor.kind", MonitorKind::KINDS),
             (Topic::Generators, "generators", "mesh.generator.kind", GeneratorKind::KINDS),
+            (Topic::Estimators, "estimators", "mesh.generator.estimator.kind", EstimatorKind::KINDS),
         ];
         for (topic, title, key, kinds) in topics {
             if self.topic.is_none_or(|only| only == topic) {

@@ -3,6 +3,7 @@
 mod check;
 mod list;
 mod progress;
+mod reproduce;
 mod run;
 mod terminal;
 
@@ -30,6 +31,9 @@ enum Verb {
     /// List every kind that a study may name.
     #[command(after_help = "Example:\n  driftmesh list generators")]
     List(list::List),
+    /// Rerun published tables and figures: ours beside theirs.
+    #[command(after_help = "Example:\n  driftmesh reproduce interface-study --quick")]
+    Reproduce(reproduce::Reproduce),
 }
 
 /// A study file and what is set on top of it.
@@ -56,6 +60,7 @@ fn main() -> ExitCode {
         Verb::Run(run) => run.execute(),
         Verb::Check(check) => check.execute(),
         Verb::List(list) => list.execute(),
+        Verb::Reproduce(reproduce) => reproduce.execute(),
     };
     match outcome {
         Ok(code) => code,

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 /// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 1.0])?;
 /// let ramp: Vec<f64> = mesh.x().iter().map(|x| 2.0 * x[0]).collect();
 /// // a ramp of slope 2 with α = 2 has ρ = √(1 + 2·2²) = 3
-/// let rho = Arclength { strength: Strength::Absolute(2.0), ..Arclength::default() }.density(&mesh, &ramp)?;
+/// let rho = Arclength { strength: Strength::Absolute(2.0), ..Arclength::default() }.density(&mesh, &ramp, None)?;
 /// assert!(rho.iter().all(|r| (r - 3.0).abs() < 1e-14));
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
@@ -78,8 +78,16 @@ impl Arclength {
 }
 
 impl Monitor for Arclength {
-    fn density(&self, mesh: &Mesh<2>, u: &[f64]) -> Result<Vec<f64>, Failure> {
-        let slope2: Vec<f64> = Metrics::new(mesh).gradient(u).into_iter().map(|[gx, gy]| gx * gx + gy * gy).collect();
+    fn density(&self, mesh: &Mesh<2>, u: &[f64], gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
+        let differenced: Vec<[f64; 2]>;
+        let gradient = match gradient {
+            Some(exact) => exact,
+            None => {
+                differenced = Metrics::new(mesh).gradient(u);
+                &differenced
+            }
+        };
+        let slope2: Vec<f64> = gradient.iter().map(|[gx, gy]| gx * gx + gy * gy).collect();
         let alpha = match self.strength {
             Strength::Absolute(alpha) => alpha,
             Strength::Relative(strength) => {

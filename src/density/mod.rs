@@ -15,11 +15,12 @@ use crate::numerics::difference::Gradient;
 
 /// Where a mesh should be fine, decided from the solution on the mesh it has.
 pub trait Monitor: Send {
-    /// ρ at every node from one value of u a node, both in lattice order.
+    /// ρ at every node from one value of u a node, both in lattice order; with ∇u where it is known exactly, so that it
+    /// need not be differenced.
     ///
     /// # Errors
     /// [`Failure::NonFinite`] names the first node where ρ is not a finite number.
-    fn density(&self, mesh: &Mesh<2>, u: &[f64]) -> Result<Vec<f64>, Failure>;
+    fn density(&self, mesh: &Mesh<2>, u: &[f64], gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure>;
 }
 
 kinds! {

@@ -111,4 +111,27 @@ impl<const D: usize> Mesh<D> {
     pub fn extent(&self) -> [f64; D] {
         std::array::from_fn(|d| self.upper[d] - self.lower[d])
     }
+
+    /// Length of the shortest edge between neighbouring nodes.
+    pub fn shortest_edge(&self) -> f64 {
+        let (lattice, extent) = (&self.lattice, self.extent());
+        let (nodes, strides) = (lattice.nodes(), lattice.strides());
+        let mut shortest = f64::INFINITY;
+        for (k, x) in self.x.iter().enumerate() {
+            let node = lattice.node(k);
+            for d in 0..D {
+                let (next, jump) = match node[d] + 1 < nodes[d] {
+                    true => (k + strides[d], 0.0),
+                    false if lattice.periodic()[d] => (k - node[d] * strides[d], extent[d]),
+                    false => continue,
+                };
+                let length2: f64 = (0..D)
+                    .map(|c| self.x[next][c] + if c == d { jump } else { 0.0 } - x[c])
+                    .map(|side| side * side)
+                    .sum();
+                shortest = shortest.min(length2);
+            }
+        }
+        shortest.sqrt()
+    }
 }

@@ -13,4 +13,4 @@ pub(crate) use lattice::strides;
 pub use locate::interpolate;
 pub use mesh::Mesh;
 pub use patch::Patch;
-pub use quality::{Quality, cell_areas, check_unfolded, node_areas, quality};
+pub use quality::{Comparison, Quality, cell_areas, check_unfolded, compare, node_areas, quality};

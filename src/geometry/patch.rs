@@ -137,15 +137,26 @@ impl<const D: usize> Patch<D> {
 
     /// Indices of the nodes of the unknowns, last axis fastest.
     pub fn nodes(&self, lattice: &Lattice<D>) -> impl Iterator<Item = usize> {
-        let (strides, n) = (lattice.strides(), self.pencil_len());
+        self.entries(lattice).map(|(node, _)| node)
+    }
+
+    /// For each unknown its node, and on which axes it lies beyond the seam of the lattice, one period from there.
+    pub fn entries(&self, lattice: &Lattice<D>) -> impl Iterator<Item = (usize, [bool; D])> {
+        let (strides, nodes, last) = (lattice.strides(), lattice.nodes(), D - 1);
         (0..self.pencil_count()).flat_map(move |p| {
             let mut rest = p;
-            let mut first = self.origin[D - 1];
-            for d in (0..D - 1).rev() {
-                first += (rest % self.size[d] + self.origin[d]) * strides[d];
+            let (mut first, mut beyond) = (0, [false; D]);
+            for d in (0..last).rev() {
+                let i = rest % self.size[d] + self.origin[d];
+                beyond[d] = i >= nodes[d];
+                first += if beyond[d] { i - nodes[d] } else { i } * strides[d];
                 rest /= self.size[d];
             }
-            first..first + n
+            (self.origin[last]..self.origin[last] + self.size[last]).map(move |j| {
+                let mut beyond = beyond;
+                beyond[last] = j >= nodes[last];
+                (first + if beyond[last] { j - nodes[last] } else { j }, beyond)
+            })
         })
     }
 
@@ -154,10 +165,19 @@ impl<const D: usize> Patch<D> {
         self.pencils().flat_map(|start| start..start + self.pencil_len())
     }
 
-    /// Writes the unknowns of a padded vector back to their nodes.
-    pub fn scatter<T: Copy>(&self, lattice: &Lattice<D>, padded: &[T], values: &mut [T]) {
-        for (node, place) in self.nodes(lattice).zip(self.places()) {
+    /// Writes the unknowns of a padded vector back to their nodes: the inverse of [`gather`](Self::gather).
+    pub fn scatter<const K: usize>(
+        &self,
+        lattice: &Lattice<D>,
+        padded: &[[f64; K]],
+        values: &mut [[f64; K]],
+        jump: [[f64; K]; D],
+    ) {
+        for ((node, beyond), place) in self.entries(lattice).zip(self.places()) {
             values[node] = padded[place];
+            for d in (0..D).filter(|&d| beyond[d]) {
+                (0..K).for_each(|c| values[node][c] -= jump[d][c]);
+            }
         }
     }
 

@@ -102,10 +102,7 @@ pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
     let (mut q_max, mut q_sum, mut j_min) = (0.0_f64, 0.0, f64::INFINITY);
     let (mut share_max, mut share_sum, mut count) = (0.0_f64, 0.0, 0.0);
     for_each_cell(mesh, |_, nodes, corners| {
-        let [a, b, c, d] = corners;
-        let e = [0, 1].map(|k| 0.5 * (b[k] - a[k] + c[k] - d[k]));
-        let f = [0, 1].map(|k| 0.5 * (d[k] - a[k] + c[k] - b[k]));
-        let q = 0.5 * (e[0] * e[0] + e[1] * e[1] + f[0] * f[0] + f[1] * f[1]) / cross(e, f).abs();
+        let q = shape(corners);
         let share = 0.25 * nodes.iter().map(|&k| rho[k]).sum::<f64>() * area(corners);
         q_max = q_max.max(q);
         q_sum += q;
@@ -120,6 +117,54 @@ pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
         min_scaled_jacobian: j_min / uniform_jacobian(mesh),
         equidistribution: share_max * count / share_sum,
     }
+}
+
+/// How a mesh compares with a reference over the same lattice.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Comparison {
+    /// Largest Q of the reference over largest Q of the mesh.
+    pub r_max: f64,
+    /// The same for the means.
+    pub r_mean: f64,
+    /// Largest Q of the reference over Q of the mesh in one cell.
+    pub cell_max: f64,
+    /// √ of the mean over the nodes of the squared distance.
+    pub mesh_rms: f64,
+}
+
+/// Compares a mesh with a reference.
+///
+/// # Source
+/// Section 3.7 of Bihlo, Haynes and Walsh (2015).
+///
+/// # Panics
+/// If the two meshes have different lattices.
+pub fn compare(mesh: &Mesh<2>, reference: &Mesh<2>) -> Comparison {
+    assert_eq!(mesh.lattice(), reference.lattice(), "both meshes need the same lattice");
+    let [ours, theirs] = [mesh, reference].map(cell_qualities);
+    let max = |q: &[f64]| q.iter().copied().fold(0.0, f64::max);
+    let mean = |q: &[f64]| q.iter().sum::<f64>() / q.len() as f64;
+    let distances = mesh.x().iter().zip(reference.x()).map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
+    Comparison {
+        r_max: max(&theirs) / max(&ours),
+        r_mean: mean(&theirs) / mean(&ours),
+        cell_max: theirs.iter().zip(&ours).map(|(t, o)| t / o).fold(0.0, f64::max),
+        mesh_rms: (distances.sum::<f64>() / mesh.x().len() as f64).sqrt(),
+    }
+}
+
+/// Q of every cell, in lattice order.
+fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
+    let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
+    for_each_cell(mesh, |_, _, corners| all.push(shape(corners)));
+    all
+}
+
+/// Q of a cell.
+fn shape([a, b, c, d]: Corners) -> f64 {
+    let e = [0, 1].map(|k| 0.5 * (b[k] - a[k] + c[k] - d[k]));
+    let f = [0, 1].map(|k| 0.5 * (d[k] - a[k] + c[k] - b[k]));
+    0.5 * (e[0] * e[0] + e[1] * e[1] + f[0] * f[0] + f[1] * f[1]) / cross(e, f).abs()
 }
 
 /// Refuses a mesh with a node that is not finite or a cell that is folded.

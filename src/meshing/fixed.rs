@@ -1,4 +1,4 @@
-use super::{MeshGenerator, Mmpde};
+use super::{MeshGenerator, Mmpde, Moved};
 use crate::error::{Failure, Result};
 use crate::geometry::Mesh;
 use crate::work::Work;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Fixed {}
 
 impl MeshGenerator for Fixed {
-    fn step(&mut self, _: &Mmpde, mesh: &Mesh<2>, _rho: &[f64], _dt: f64) -> Result<(Mesh<2>, Work), Failure> {
-        Ok((mesh.clone(), Work::default()))
+    fn step(&mut self, _: &Mmpde, mesh: &Mesh<2>, _rho: &[f64], _dt: f64) -> Result<Moved, Failure> {
+        Ok(Moved { mesh: mesh.clone(), work: Work::default(), interface: None })
     }
 }

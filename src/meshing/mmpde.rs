@@ -1,6 +1,7 @@
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Lattice, Patch};
+use crate::geometry::{Lattice, Mesh, Patch};
 use crate::numerics::difference::Gradient;
+use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver};
 use crate::work::Work;
 
@@ -108,11 +109,26 @@ impl<const D: usize> MeshOperator<D> {
         matrix
     }
 
+    /// Refuses an operator whose weights cannot be probabilities: |b|h > 2 somewhere.
+    ///
+    /// # Errors
+    /// [`Failure::SteepDensity`] at the first such node.
+    pub fn check_weights(&self, mesh: &Mesh<D>) -> Result<(), Failure> {
+        match self.weights.iter().position(|w| !w.as_flattened().iter().all(|&w| w >= 0.0)) {
+            None => Ok(()),
+            Some(k) => {
+                let skews = self.weights[k].map(|[below, above]| 2.0 * ((above - below) / (above + below)).abs());
+                let node = self.lattice.node(k).to_vec();
+                Err(Failure::SteepDensity { skew: skews.into_iter().fold(0.0, larger), node, x: mesh.x()[k].to_vec() })
+            }
+        }
+    }
+
     /// Solves the step on one patch, given new values on the ring around it
     ///
-    /// `old` and `new` are nodal values on the whole lattice. On entry `new` holds the known values on the ring and a
-    /// guess inside; on success the solution inside, exact to 1e-12 of `size`, the largest coordinate, or to round-off
-    /// where Δt/(τh²) is so large that it is more. `jump[d]` is added on wrapping around axis d.
+    /// `old` and `new` are nodal values on the whole lattice. `new` holds the known values on the ring and a guess
+    /// inside; what returns is the padded vector of the patch, exact to 1e-12 of `size`, the largest coordinate, or to
+    /// round-off where Δt/(τh²) is so large that it is more. `jump[d]` is added on wrapping around axis d.
     ///
     /// # Errors
     /// [`Failure::LinearStalled`].
@@ -120,18 +136,30 @@ impl<const D: usize> MeshOperator<D> {
         &self,
         patch: Patch<D>,
         old: &[[f64; K]],
-        new: &mut [[f64; K]],
+        new: &[[f64; K]],
         jump: [[f64; K]; D],
         solver: &mut impl LinearSolver<D, S, K>,
         size: [f64; K],
-    ) -> Result<Work, Failure> {
-        let right: Vec<[f64; K]> = patch.nodes(&self.lattice).map(|node| old[node]).collect();
+    ) -> Result<(Vec<[f64; K]>, Work), Failure> {
+        let right = self.right(patch, old, jump);
         let mut x = patch.gather(&self.lattice, new, jump);
         let matrix = self.matrix(patch);
-        let diagonal = matrix.rows.iter().fold(1.0_f64, |m, row| m.max(row[0]));
-        let tolerance = size.map(|size| size * EXACTNESS.max(8.0 * f64::EPSILON * diagonal));
-        let linear_iterations = solver.solve(&matrix, &right, &mut x, tolerance)?;
-        patch.scatter(&self.lattice, &x, new);
-        Ok(Work { linear_solves: K, linear_iterations, ..Work::default() })
+        let linear_iterations = solver.solve(&matrix, &right, &mut x, exactness(&matrix, size))?;
+        Ok((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
     }
+
+    /// The right-hand side on one patch: old values, continued across the seam of a periodic axis.
+    pub(super) fn right<const K: usize>(&self, patch: Patch<D>, old: &[[f64; K]], jump: [[f64; K]; D]) -> Vec<[f64; K]> {
+        let padded = patch.gather(&self.lattice, old, jump);
+        patch.places().map(|place| padded[place]).collect()
+    }
+}
+
+/// The residual at which a mesh equation counts as solved.
+pub(super) fn exactness<const D: usize, const S: usize, const K: usize>(
+    matrix: &LatticeMatrix<D, S>,
+    size: [f64; K],
+) -> [f64; K] {
+    let diagonal = matrix.rows.iter().fold(1.0_f64, |m, row| m.max(row[0]));
+    size.map(|size| size * EXACTNESS.max(8.0 * f64::EPSILON * diagonal))
 }

@@ -1,19 +1,28 @@
 //! From a density to a mesh: the mesh equation, and the ways to solve it.
 
+mod decomposition;
 mod fixed;
 mod mmpde;
+mod schwarz;
 mod sides;
+mod stochastic;
 mod whole;
 
+pub use decomposition::{Cut, Decomposition};
 pub use fixed::Fixed;
 pub use mmpde::{MeshOperator, Mmpde};
+pub use schwarz::Schwarz;
 pub use sides::move_sides;
+pub use stochastic::{
+    Estimate, Estimator, EstimatorKind, GridWalk, Interpolation, MonteCarlo, Placement, Problem, ResidualWalk, Stochastic,
+};
 pub use whole::Whole;
 
 use crate::error::{Failure, Result};
-use crate::geometry::Mesh;
+use crate::geometry::{Lattice, Mesh};
 use crate::kind::kinds;
 use crate::work::Work;
+use serde::Serialize;
 
 /// A way to advance the mesh by one time step.
 ///
@@ -24,13 +33,56 @@ pub trait MeshGenerator: Send {
     ///
     /// # Errors
     /// A [`Failure`] where a system cannot be solved or the arrays do not fit.
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<(Mesh<2>, Work), Failure>;
+    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure>;
+}
+
+/// A mesh that was moved.
+#[derive(Debug, Clone)]
+pub struct Moved {
+    /// The mesh at the end of the step.
+    pub mesh: Mesh<2>,
+    /// What it cost.
+    pub work: Work,
+    /// How well the subdomains fit together, where there are any.
+    pub interface: Option<Interface>,
+}
+
+/// What one step knows about the values at which subdomains meet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interface {
+    /// Nodes at which subdomains meet.
+    pub points: usize,
+    /// Root mean square of the standard errors of their values, both coordinates of all points; none where a single
+    /// sample has no spread, and none for deterministic methods.
+    pub standard_error: Option<f64>,
+    /// That over the shortest edge of the mesh.
+    pub noise: Option<f64>,
+    /// Relaxation sweeps before the walks.
+    pub sweeps: usize,
+    /// How fast an iteration between the subdomains converged.
+    pub contraction: Option<Contraction>,
+    /// Seconds spent on interface values.
+    #[serde(skip)]
+    pub seconds: f64,
+}
+
+/// Convergence of an iteration between subdomains.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Contraction {
+    /// Iterations done.
+    pub iterations: usize,
+    /// Bound on the factor by which an iteration shrinks the error, from the operator itself.
+    pub predicted: f64,
+    /// Geometric mean of the factors seen between the first and the last change.
+    pub observed: f64,
 }
 
 kinds! {
     /// `mesh.generator` of a study.
     GeneratorKind {
         "whole" = Whole: "one implicit solve of the mesh equation on the whole domain",
+        "stochastic" = Stochastic: "random walks give the interfaces between subdomains, then each is solved by itself",
+        "schwarz" = Schwarz: "overlapping subdomains, solved in parallel and iterated to a tolerance",
         "fixed" = Fixed: "the mesh does not move",
     }
 }
@@ -42,10 +94,24 @@ impl Default for GeneratorKind {
 }
 
 impl GeneratorKind {
+    /// Refuses settings out of range for a lattice.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid).
+    pub fn check(&self, lattice: &Lattice<2>) -> Result<()> {
+        match self {
+            Self::Whole(_) | Self::Fixed(_) => Ok(()),
+            Self::Stochastic(stochastic) => stochastic.check(lattice),
+            Self::Schwarz(schwarz) => schwarz.check(lattice),
+        }
+    }
+
     /// The generator, ready to step.
     pub fn into_generator(self) -> Box<dyn MeshGenerator> {
         match self {
             Self::Whole(whole) => Box::new(whole),
+            Self::Stochastic(stochastic) => Box::new(stochastic),
+            Self::Schwarz(schwarz) => Box::new(schwarz),
             Self::Fixed(fixed) => Box::new(fixed),
         }
     }

@@ -27,15 +27,22 @@ pub fn move_sides(
             let place = |i: usize| end * strides[across] + i * strides[along];
             let side_rho: Vec<f64> = (0..nodes[along]).map(|i| rho[place(i)]).collect();
             let old: Vec<[f64; 1]> = (0..nodes[along]).map(|i| [mesh.x()[place(i)][along]]).collect();
-            let mut new = old.clone();
+            let patch = Patch::whole(&line);
             let operator = equation.operator(&line, &side_rho, dt)?;
-            work += operator.solve::<3, 1>(Patch::whole(&line), &old, &mut new, jump, solver, [size(mesh)[along]])?;
-            for (i, [value]) in new.into_iter().enumerate() {
-                x[place(i)][along] = value;
+            let (new, cost) = operator.solve::<3, 1>(patch, &old, &old, jump, solver, [size(mesh)[along]])?;
+            work += cost;
+            for (i, k) in patch.nodes(&line).zip(patch.places()) {
+                x[place(i)][along] = new[k][0];
             }
         }
     }
     Ok(work)
+}
+
+/// What is added to positions on wrapping around each axis.
+pub(super) fn jump(mesh: &Mesh<2>) -> [[f64; 2]; 2] {
+    let [width, height] = mesh.extent();
+    [[width, 0.0], [0.0, height]]
 }
 
 /// The largest coordinate along each axis.

@@ -61,6 +61,9 @@ pub enum Gradient {
     Central,
     /// Central differences of ln ρ; bounded by half the jump of ln ρ over two cells, however steep ρ is.
     Log,
+    /// bh = 2 tanh(h ∂ ln ρ / 2) with central differences of ln ρ: second order like the others, and |b|h < 2 for every
+    /// ρ, which is what makes the mesh equation an M-matrix and its weights probabilities.
+    Safe,
 }
 
 impl Gradient {
@@ -69,16 +72,20 @@ impl Gradient {
         let logarithm: Vec<f64>;
         let potential = match self {
             Self::Central => rho,
-            Self::Log => {
+            Self::Log | Self::Safe => {
                 logarithm = rho.iter().map(|r| r.ln()).collect();
                 &logarithm
             }
         };
         let mut b = vec![[0.0; D]; rho.len()];
-        for d in 0..D {
+        for (d, h) in lattice.spacing().into_iter().enumerate() {
             let slopes = derivative(lattice, potential.as_chunks::<1>().0, d, [0.0]);
             for ((b, [slope]), rho) in b.iter_mut().zip(slopes).zip(rho) {
-                b[d] = if self == Self::Central { slope / rho } else { slope };
+                b[d] = match self {
+                    Self::Central => slope / rho,
+                    Self::Log => slope,
+                    Self::Safe => 2.0 / h * (0.5 * h * slope).tanh(),
+                };
             }
         }
         b

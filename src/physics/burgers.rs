@@ -225,7 +225,7 @@ impl Physics for Burgers {
                 u[0] += c[0];
             }
         };
-        patch.scatter(lattice, u_new.as_flattened(), solution.values_mut());
+        patch.scatter(lattice, &u_new, solution.values_mut().as_chunks_mut::<1>().0, [[0.0]; 2]);
         check_finite("u", new, solution.values())?;
         self.newest = Some((new.clone(), stencils));
         stalled.map_or(Ok((solution, work)), Err)

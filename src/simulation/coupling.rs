@@ -1,7 +1,9 @@
 use super::{Seconds, Simulation, State, timed};
+use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{check_unfolded, interpolate};
-use crate::physics::Motion;
+use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
+use crate::meshing::Interface;
+use crate::physics::{Motion, Physics};
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
@@ -43,6 +45,13 @@ impl Coupling {
     }
 }
 
+/// One step, and what it cost.
+pub(super) struct Advanced {
+    pub state: State,
+    pub work: Work,
+    pub interface: Option<Interface>,
+}
+
 /// One step to time `t`: mesh, then physics, as often as the coupling says.
 pub(super) fn advance(
     simulation: &mut Simulation,
@@ -50,33 +59,49 @@ pub(super) fn advance(
     t: f64,
     dt: f64,
     seconds: &mut Seconds,
-) -> Result<(State, Work), Failure> {
+) -> Result<Advanced, Failure> {
     let Simulation { physics, monitor, generator, equation, coupling, .. } = simulation;
     let mut work = Work::default();
+    let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
     let mut latest = None;
     for _ in 0..coupling.iterations {
+        let mut spent = 0.0;
         let mesh = timed(&mut seconds.mesh, || {
             let mut mesh = state.mesh.clone();
             for sub in 0..coupling.mesh_steps {
                 let carried = if sub == 0 { None } else { Some(interpolate(&state.mesh, &rho, &mesh)) };
                 let rho = carried.as_ref().unwrap_or(&rho);
-                let (moved, cost) = generator.step(equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
-                check_unfolded(&moved)?;
-                (mesh, work) = (moved, {
-                    work += cost;
-                    work
-                });
+                let moved = generator.step(equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
+                check_unfolded(&moved.mesh)?;
+                mesh = moved.mesh;
+                work += moved.work;
+                spent += moved.interface.map_or(0.0, |i| i.seconds);
+                interface = moved.interface;
             }
             Ok::<_, Failure>(mesh)
         })?;
+        seconds.mesh -= spent;
+        seconds.interface += spent;
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
         let (u, cost) = timed(&mut seconds.pde, || physics.step(motion, &state.u))?;
         work += cost;
-        let monitored: Vec<f64> = u.component(0).collect();
-        rho = timed(&mut seconds.monitor, || monitor.density(&mesh, &monitored))?;
+        rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
         latest = Some((mesh, u));
     }
     let (mesh, u) = latest.expect("a coupling has at least one iteration");
-    Ok((State { t, step: state.step + 1, mesh, u, rho }, work))
+    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho }, work, interface })
+}
+
+/// ρ from the solution: what the monitor makes of the first unknown, and of its gradient where that is known exactly.
+pub(super) fn density(
+    physics: &dyn Physics,
+    monitor: &dyn Monitor,
+    t: f64,
+    mesh: &Mesh<2>,
+    u: &Field,
+) -> Result<Vec<f64>, Failure> {
+    let values: Vec<f64> = u.component(0).collect();
+    let gradient = physics.gradient(t, mesh);
+    monitor.density(mesh, &values, gradient.as_deref())
 }

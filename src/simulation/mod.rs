@@ -14,7 +14,7 @@ pub use schedule::Schedule;
 use crate::density::Monitor;
 use crate::error::{Error, Moment, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
-use crate::meshing::{MeshGenerator, Mmpde};
+use crate::meshing::{Interface, MeshGenerator, Mmpde};
 use crate::physics::Physics;
 use crate::work::Work;
 use std::time::Instant;
@@ -43,6 +43,10 @@ pub struct Record {
     pub seconds: Seconds,
     /// One report for each time asked for.
     pub reports: Vec<Report>,
+    /// What the last step knows about the interfaces between subdomains.
+    pub interface: Option<Interface>,
+    /// What the user should know although nothing failed.
+    pub warnings: Vec<String>,
 }
 
 /// A moving mesh, the physics on it, and how they are advanced together.
@@ -83,6 +87,10 @@ pub struct Simulation {
     pub schedule: Schedule,
 }
 
+/// Standard error of interface values, as a share of the shortest edge, above which a run says so.
+pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
+const NOISY: &str = "interface values are noisy";
+
 impl Simulation {
     /// The state at the start, on a given mesh.
     ///
@@ -94,8 +102,7 @@ impl Simulation {
         let at_start = |failure| Error::Failed { failure, moment };
         check_unfolded(&mesh).map_err(at_start)?;
         let u = self.physics.initial(t, &mesh);
-        let monitored: Vec<f64> = u.component(0).collect();
-        let rho = self.monitor.density(&mesh, &monitored).map_err(at_start)?;
+        let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
         Ok(State { t, step: 0, mesh, u, rho })
     }
 
@@ -119,21 +126,40 @@ impl Simulation {
         let mass_at_start = mass(state);
         self.show(Event::Started, state, record, observers, 0.0, started)?;
         if self.schedule.reports_at(state.t) {
-            record.reports.push(self.report(state, mass_at_start));
+            let report = self.report(state, mass_at_start, record.interface);
+            record.reports.push(report);
         }
         while let Some(dt) = self.schedule.step_from(state.step) {
             let step = state.step + 1;
             let t = self.schedule.time(step);
-            let (next, work) = coupling::advance(self, state, t, dt, &mut record.seconds)
+            let next = coupling::advance(self, state, t, dt, &mut record.seconds)
                 .map_err(|failure| Error::Failed { failure, moment: Some(Moment { t, step }) })?;
-            *state = next;
-            record.work.add(work);
+            *state = next.state;
+            record.work.add(next.work);
+            record.interface = next.interface;
+            self.warn_of_noise(state, record);
             if self.schedule.reports_at(t) {
-                record.reports.push(self.report(state, mass_at_start));
+                let report = self.report(state, mass_at_start, record.interface);
+            record.reports.push(report);
             }
             self.show(Event::Stepped, state, record, observers, dt, started)?;
         }
         self.show(Event::Finished, state, record, observers, 0.0, started)
+    }
+
+    /// Says once in a run that interface values are noisy.
+    fn warn_of_noise(&self, state: &State, record: &mut Record) {
+        let Some(noise) = record.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING) else {
+            return;
+        };
+        if !record.warnings.iter().any(|warning| warning.starts_with(NOISY)) {
+            let (percent, limit) = (100.0 * noise, 100.0 * NOISE_WORTH_A_WARNING);
+            record.warnings.push(format!(
+                "{NOISY}: from t = {} on their standard error is {percent:.1} % of the shortest edge of the mesh or more \
+                 (said above {limit} %); more walks, or more sweeps, lower it",
+                state.t
+            ));
+        }
     }
 
     fn show(
@@ -157,6 +183,7 @@ impl Simulation {
             quality: quality(&state.mesh, &state.rho),
             error: self.error(state),
             work: record.work,
+            interface: record.interface,
             seconds: started.elapsed().as_secs_f64(),
         };
         let outcome = observers.iter_mut().try_for_each(|observer| observer.observe(event, &snapshot));
@@ -178,7 +205,7 @@ impl Simulation {
         Some(ErrorNorms { linf, l2: (square / area).sqrt() })
     }
 
-    fn report(&self, state: &State, mass_at_start: f64) -> Report {
+    fn report(&self, state: &State, mass_at_start: f64, interface: Option<Interface>) -> Report {
         let mass = mass(state);
         let drift = if mass_at_start == 0.0 { mass } else { (mass - mass_at_start) / mass_at_start.abs() };
         Report {
@@ -186,6 +213,8 @@ impl Simulation {
             error: self.error(state),
             quality: quality(&state.mesh, &state.rho),
             conserved: Conserved { mass, drift },
+            interface,
+            comparison: None,
         }
     }
 }

@@ -4,8 +4,9 @@ use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{GeneratorKind, Mmpde};
 use crate::physics::PdeKind;
+use crate::setting::pair;
 use crate::simulation::{Coupling, FramesAt, Schedule, Simulation};
-use serde::{Deserialize, Deserializer, Serialize, de};
+use serde::{Deserialize, Serialize};
 
 /// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -28,9 +29,20 @@ pub struct MovingMesh {
     /// `[mesh]`.
     #[serde(default)]
     pub mesh: MeshTable,
+    /// `[compare]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compare: Option<Compare>,
     /// `[output]`.
     #[serde(default)]
     pub output: Output,
+}
+
+/// `[compare]`: the same study with another generator, as a reference for the mesh.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Compare {
+    /// How the mesh of the reference moves.
+    pub generator: GeneratorKind,
 }
 
 /// `[study]`.
@@ -148,13 +160,6 @@ pub struct Output {
     pub frames: Option<FramesAt>,
 }
 
-/// An array of exactly two entries; serde's own arrays take the first two of more.
-fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<[T; 2], D::Error> {
-    let entries = Vec::<T>::deserialize(deserializer)?;
-    <[T; 2]>::try_from(entries)
-        .map_err(|entries| de::Error::custom(format!("expected an array of length 2, found {}", entries.len())))
-}
-
 /// Memory that a run needs for each node: 1350 bytes measured at 1000 × 1000 cells, and a reserve.
 const BYTES_PER_NODE: u128 = 1600;
 const FRAMES_BY_DEFAULT: usize = 20;
@@ -186,7 +191,11 @@ impl MovingMesh {
             return Err(Error::invalid("domain.periodic", format!("{:?}", self.domain.periodic), rule));
         }
         self.check_size()?;
-        self.initial_mesh()?;
+        let lattice = *self.initial_mesh()?.lattice();
+        self.mesh.generator.check(&lattice).map_err(|error| error.within("generator").within("mesh"))?;
+        if let Some(compare) = &self.compare {
+            compare.generator.check(&lattice).map_err(|error| error.within("generator").within("compare"))?;
+        }
         self.pde.check().map_err(|error| error.within("pde"))?;
         self.monitor.check().map_err(|error| error.within("monitor"))?;
         self.equation().check().map_err(|error| error.within("mesh"))?;
@@ -255,6 +264,14 @@ impl MovingMesh {
             coupling: self.mesh.coupling,
             schedule: self.schedule()?,
         })
+    }
+
+    /// The study with the generator of `[compare]`, if there is one.
+    pub(super) fn reference(&self) -> Option<Self> {
+        let compare = self.compare.clone()?;
+        let mut reference = self.clone();
+        reference.mesh.generator = compare.generator;
+        Some(reference)
     }
 
     /// When frames are written.

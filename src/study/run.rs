@@ -1,7 +1,8 @@
 use super::MovingMesh;
 use crate::error::{Error, Result};
+use crate::geometry::{Mesh, compare};
 use crate::simulation::{
-    Failed, Frames, History, Observer, Parallel, Record, RunDirectory, State, Summary, draw, final_arrays,
+    Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw, final_arrays,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -44,6 +45,7 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
         parallel: Parallel { ranks: 1, threads: rayon::current_num_threads() },
         work: Default::default(),
         reports: Vec::new(),
+        warnings: Vec::new(),
     };
     directory.write("study.toml", study.to_toml().as_bytes())?;
     directory.write_summary(&summary)?;
@@ -51,9 +53,11 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     let outcome = simulation.start(mesh).and_then(|mut state| {
         let mut history = History::create(&directory.path().join("history.csv"))?;
         let mut frames = Frames::create(directory.path(), study.frames())?;
-        let mut observers: Vec<&mut dyn Observer> = vec![&mut history, &mut frames];
+        let mut meshes = Meshes::of(&study);
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut history, &mut frames, &mut meshes];
         watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
         let failure = simulation.run(&mut state, &mut record, &mut observers).err();
+        let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record).err(), Some);
         let output = Instant::now();
         let kept = keep(&study, &directory, &unknowns, &state, &mut frames);
         let spent = output.elapsed().as_secs_f64();
@@ -72,10 +76,47 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     summary.seconds = record.seconds;
     summary.work = record.work;
     summary.reports = record.reports;
+    summary.warnings = record.warnings;
     let written = directory.write_summary(&summary);
     let (state, failure) = outcome?;
     written?;
     Ok(Finished { summary, state, failure })
+}
+
+/// Keeps the meshes at the report times, if there is something to compare them with.
+struct Meshes {
+    at: Vec<f64>,
+    found: Vec<(f64, Mesh<2>)>,
+}
+
+impl Meshes {
+    fn of(study: &MovingMesh) -> Self {
+        let at = if study.compare.is_some() { study.time.report.clone() } else { Vec::new() };
+        Self { at, found: Vec::new() }
+    }
+}
+
+impl Observer for Meshes {
+    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
+        if event != Event::Finished && self.at.contains(&snapshot.state.t) {
+            self.found.push((snapshot.state.t, snapshot.state.mesh.clone()));
+        }
+        Ok(())
+    }
+}
+
+/// Runs the study with the generator of `[compare]` and adds to each report how the meshes compare.
+fn compare_with_reference(study: &MovingMesh, meshes: &Meshes, record: &mut Record) -> Result<()> {
+    let Some(reference) = study.reference() else { return Ok(()) };
+    let mut simulation = reference.simulation()?;
+    let mut state = simulation.start(reference.initial_mesh()?)?;
+    let mut theirs = Meshes::of(study);
+    simulation.run(&mut state, &mut Record::default(), &mut [&mut theirs])?;
+    for report in &mut record.reports {
+        let at = |meshes: &Meshes| meshes.found.iter().find(|(t, _)| *t == report.t).map(|(_, mesh)| mesh.clone());
+        report.comparison = at(meshes).zip(at(&theirs)).map(|(ours, theirs)| compare(&ours, &theirs));
+    }
+    Ok(())
 }
 
 /// Writes the last good state: as a frame, as arrays, as a picture.

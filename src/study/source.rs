@@ -25,8 +25,9 @@ struct Piece {
     padded: String,
 }
 
-/// Tables in which `kind` names one of several structures.
-const KINDED: [&str; 3] = ["pde", "monitor", "mesh.generator"];
+/// Tables in which `kind` names one of several structures, inner ones first.
+const KINDED: [&str; 6] =
+    ["pde", "monitor", "mesh.generator.estimator", "mesh.generator", "compare.generator.estimator", "compare.generator"];
 /// Tables that hold one of several keys.
 const CHOICES: [&str; 2] = ["monitor.strength", "output.frames"];
 /// Characters of a line that are shown.
@@ -200,6 +201,7 @@ impl Source {
             message
                 .replace("expected f64", "expected a number")
                 .replace("expected usize", "expected a whole number, 0 or more")
+                .replace("expected u64", "expected a whole number from 0 to 2^63 - 1")
                 .replace("a sequence", "an array")
                 .replace("a map", "a table")
                 .replace("invalid type: map", "invalid type: table")

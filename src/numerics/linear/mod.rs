@@ -6,9 +6,11 @@
 mod adi;
 mod bicgstab;
 mod lu;
+mod relaxation;
 
 pub use bicgstab::Bicgstab;
 pub use lu::SparseLu;
+pub use relaxation::{Smoother, relax};
 
 use super::larger;
 use crate::error::Failure;
@@ -99,8 +101,8 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
         self.apply(x, out, |_, k, ax| std::array::from_fn(|c| v[k][c] - ax[c]));
     }
 
-    /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown and the ring of `out` zero; returns the largest |b − A x| of each
-    /// right-hand side, NaN where there is one.
+    /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown and the ring of `out` zero; returns
+    /// the largest |b − A x| of each right-hand side, NaN where there is one.
     pub fn residual<const K: usize>(&self, b: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) -> [f64; K] {
         self.apply(x, out, |i, _, ax| std::array::from_fn(|c| b[i][c] - ax[c]));
         let mut sizes = [0.0; K];

@@ -22,6 +22,8 @@ struct Row {
     error_l2: Option<f64>,
     linear_iterations: usize,
     newton_iterations: usize,
+    interface_standard_error: Option<f64>,
+    interface_noise: Option<f64>,
     seconds: f64,
 }
 
@@ -55,6 +57,8 @@ impl Observer for History {
             error_l2: snapshot.error.map(|e| e.l2),
             linear_iterations: work.linear_iterations,
             newton_iterations: work.newton_iterations,
+            interface_standard_error: snapshot.interface.and_then(|i| i.standard_error),
+            interface_noise: snapshot.interface.and_then(|i| i.noise),
             seconds: snapshot.seconds,
         };
         // row by row, so that a run that is killed leaves whole rows

@@ -10,6 +10,7 @@ pub use history::History;
 use super::{ErrorNorms, State, WorkTotal};
 use crate::error::Result;
 use crate::geometry::Quality;
+use crate::meshing::Interface;
 
 /// What just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +40,8 @@ pub struct Snapshot<'a> {
     pub error: Option<ErrorNorms>,
     /// Work so far.
     pub work: WorkTotal,
+    /// What the last step knows about the interfaces between subdomains.
+    pub interface: Option<Interface>,
     /// Seconds since the run began.
     pub seconds: f64,
 }

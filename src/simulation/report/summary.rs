@@ -1,5 +1,6 @@
 use crate::error::Error;
-use crate::geometry::Quality;
+use crate::geometry::{Comparison, Quality};
+use crate::meshing::Interface;
 use crate::work::Work;
 use serde::Serialize;
 
@@ -27,6 +28,9 @@ pub struct Summary {
     pub work: WorkTotal,
     /// One entry for each time of `time.report` that was reached.
     pub reports: Vec<Report>,
+    /// What the user should know although nothing failed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// A failure in `summary.json`.
@@ -104,6 +108,12 @@ pub struct Report {
     pub quality: Quality,
     /// Integrals of the solution.
     pub conserved: Conserved,
+    /// Where there are subdomains.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interface: Option<Interface>,
+    /// Where the study compares with another generator.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<Comparison>,
 }
 
 /// Error against the exact solution.

@@ -1,0 +1,35 @@
+use crate::terminal::say;
+use clap::Args;
+use driftmesh::Error;
+use driftmesh::reproduce::{ITEMS, Options};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+#[derive(Args)]
+pub struct Reproduce {
+    /// What to rerun; everything where nothing is named.
+    #[arg(value_name = "ITEM", value_parser = clap::builder::PossibleValuesParser::new(ITEMS.iter().map(|item| item.name)))]
+    items: Vec<String>,
+    /// Fewer rows and samples: everything in about a minute.
+    #[arg(long)]
+    quick: bool,
+    /// Directory for the tables, one Markdown file an item.
+    #[arg(long, value_name = "DIR", default_value = "out/reproduce")]
+    out: PathBuf,
+}
+
+impl Reproduce {
+    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+        let unwritable =
+            |path: &PathBuf, error: std::io::Error| Error::Unwritable { path: path.clone(), reason: error.to_string() };
+        std::fs::create_dir_all(&self.out).map_err(|error| unwritable(&self.out, error))?;
+        for item in ITEMS.iter().filter(|item| self.items.is_empty() || self.items.iter().any(|name| name == item.name)) {
+            let tables = item.run(Options { quick: self.quick })?;
+            let text = tables.iter().map(|table| table.to_string()).collect::<Vec<_>>().join("\n");
+            say(&text);
+            let path = self.out.join(format!("{}.md", item.name));
+            std::fs::write(&path, &text).map_err(|error| unwritable(&path, error))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

@@ -1,0 +1,133 @@
+use crate::error::{Error, Result};
+use crate::geometry::{Lattice, Patch};
+
+/// A division of the lattice into S_ξ × S_η subdomains
+///
+/// Cuts are lines of nodes, as evenly apart as the cells allow: s·cells/S, rounded. On a bounded axis S subdomains have
+/// S − 1 cuts between them. On a periodic axis they have S, the first at node 0; a single subdomain has none and wraps.
+///
+/// # Example
+/// ```
+/// use driftmesh::{geometry::Lattice, meshing::Decomposition};
+/// let lattice = Lattice::bounded([40, 40])?;
+/// let decomposition = Decomposition::new(&lattice, [4, 4])?;
+/// assert_eq!(decomposition.points().len(), 225); // 2 × 3 cuts of 39 nodes, less the 9 crossings
+/// assert_eq!(decomposition.patches().len(), 16);
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Decomposition {
+    lattice: Lattice<2>,
+    /// Ends of the subdomains along each axis, in nodes.
+    spans: [Vec<[usize; 2]>; 2],
+}
+
+/// A line of nodes between subdomains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    /// The axis along which it runs.
+    pub along: usize,
+    /// Its nodes in order, those on bounded sides included.
+    pub nodes: Vec<usize>,
+}
+
+impl Decomposition {
+    /// Divides a lattice.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless every axis has at least one subdomain and no more than cells.
+    pub fn new(lattice: &Lattice<2>, subdomains: [usize; 2]) -> Result<Self> {
+        let cells = lattice.cells();
+        if (0..2).any(|d| !(1..=cells[d]).contains(&subdomains[d])) {
+            let rule = format!("every axis needs at least 1 subdomain and at most one a cell, here {cells:?}");
+            return Err(Error::invalid("subdomains", format!("{subdomains:?}"), rule));
+        }
+        let spans = [0, 1].map(|d| {
+            let (n, s) = (cells[d], subdomains[d]);
+            let end = |k: usize| (2 * k * n + s) / (2 * s);
+            (0..s).map(|k| [end(k), end(k + 1)]).collect()
+        });
+        Ok(Self { lattice: *lattice, spans })
+    }
+
+    /// True where a whole periodic axis is one subdomain.
+    fn wraps(&self, d: usize) -> bool {
+        self.lattice.periodic()[d] && self.spans[d].len() == 1
+    }
+
+    /// Cuts across one axis, as places along it.
+    fn cuts(&self, d: usize) -> impl Iterator<Item = usize> {
+        let none = self.spans[d].len() == 1;
+        let first = if self.lattice.periodic()[d] && !none { 0 } else { 1 };
+        self.spans[d].iter().skip(first).map(|span| span[0])
+    }
+
+    /// All cuts, those across ξ first.
+    pub fn lines(&self) -> Vec<Cut> {
+        let nodes = self.lattice.nodes();
+        let mut lines = Vec::new();
+        for across in 0..2 {
+            let along = 1 - across;
+            for at in self.cuts(across) {
+                let node = |k: usize| if across == 0 { [at, k] } else { [k, at] };
+                lines.push(Cut { along, nodes: (0..nodes[along]).map(|k| self.lattice.index(node(k))).collect() });
+            }
+        }
+        lines
+    }
+
+    /// All nodes on cuts, bounded sides left out, in order.
+    pub fn points(&self) -> Vec<usize> {
+        let inner = |k: &usize| !self.on_side(*k);
+        let mut points: Vec<usize> = self.lines().into_iter().flat_map(|cut| cut.nodes).filter(inner).collect();
+        points.sort_unstable();
+        points.dedup();
+        points
+    }
+
+    /// True for a node on a bounded side.
+    pub fn on_side(&self, index: usize) -> bool {
+        let (node, nodes, periodic) = (self.lattice.node(index), self.lattice.nodes(), self.lattice.periodic());
+        (0..2).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d]))
+    }
+
+    /// The insides of all subdomains; one of a single cell has none and is left out.
+    pub fn patches(&self) -> Vec<Patch<2>> {
+        self.extended([0, 0]).into_iter().map(|(patch, _)| patch).collect()
+    }
+
+    /// All subdomains made larger by `more[0]` cells downwards and `more[1]` upwards along each axis, as far as there
+    /// are nodes, each with the nodes that it alone answers for: those above its lower cut up to its upper one.
+    pub fn extended(&self, more: [usize; 2]) -> Vec<(Patch<2>, Vec<usize>)> {
+        let (cells, nodes, periodic) = (self.lattice.cells(), self.lattice.nodes(), self.lattice.periodic());
+        let mut all = Vec::new();
+        for &a in &self.spans[0] {
+            for &b in &self.spans[1] {
+                let mut patch = Patch { origin: [0; 2], size: cells, wraps: [0, 1].map(|d| self.wraps(d)) };
+                let mut own: [Vec<usize>; 2] = [0, 1].map(|d| (0..nodes[d]).collect());
+                for (d, [low, high]) in [a, b].into_iter().enumerate().filter(|&(d, _)| !self.wraps(d)) {
+                    let n = cells[d];
+                    let (from, to) = if periodic[d] {
+                        // both rings may be the same node, but a patch never overlaps itself
+                        let spare = n - (high - low);
+                        let down = more[0].min(spare);
+                        (low + n - down, high + n + more[1].min(spare - down))
+                    } else {
+                        (low.saturating_sub(more[0]), (high + more[1]).min(n))
+                    };
+                    patch.size[d] = to - from - 1;
+                    patch.origin[d] = (from + 1) % n;
+                    let last = if periodic[d] || high < n { high } else { n - 1 };
+                    own[d] = (low + 1..=last).map(|i| i % nodes[d]).collect();
+                }
+                if patch.len() > 0 {
+                    let [rows, columns] = own;
+                    let place = |i: usize, j: usize| self.lattice.index([i, j]);
+                    let own = rows.iter().flat_map(|&i| columns.iter().map(move |&j| place(i, j))).collect();
+                    all.push((patch, own));
+                }
+            }
+        }
+        all
+    }
+}

@@ -1,0 +1,290 @@
+use super::super::mmpde::exactness;
+use super::super::sides::{jump, size};
+use super::{Estimate, Estimates, Estimator, Problem};
+use crate::error::{Error, Failure, Result};
+use crate::geometry::Patch;
+use crate::numerics::linear::{LatticeMatrix, Smoother, relax};
+use crate::parallel;
+use crate::setting::Auto;
+use crate::work::Work;
+use serde::{Deserialize, Serialize};
+
+/// Random walks on the lattice, unbiased for the discrete step
+///
+/// A row of the mesh operator, divided by its diagonal, is a jump to each neighbour with a probability and a stop with
+/// what is left:
+///
+/// ```text
+/// jump to e with w_e / (1 + Σw),   stop with 1 / (1 + Σw);   x_i = E[xⁿ where the walk stops, xⁿ⁺¹ on a side]
+/// ```
+///
+/// Neither a time step nor an interpolation is left to make an error, only the noise of N walks. It needs weights ≥ 0,
+/// that is |b|h ≤ 2; `monitor.gradient = "safe"` always has them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GridWalk {
+    /// N, for each point.
+    pub walks: usize,
+    /// Walks pay the motion over the step instead of the position: the residual walk without sweeps.
+    #[serde(default)]
+    pub increment: bool,
+}
+
+/// Random walks for what relaxation leaves
+///
+/// ```text
+/// P = k sweeps on M x = xⁿ from xⁿ, with the new sides,   r = xⁿ − M P,   x_i = P_i + E[r where the walk stops]
+/// ```
+///
+/// The walks are those of [`GridWalk`]. P is a control variate whose target is known exactly: the estimate stays
+/// unbiased for any P, and its variance falls with the square of the residual.
+///
+/// `sweeps = "auto"` takes k = ⌈8√a⌉, a = Δt/(τh²) averaged over the axes and bounded by what the sides leave of the
+/// slowest mode; as many as Chebyshev's sweeps need to shrink any error some hundred times.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ResidualWalk {
+    /// k.
+    pub sweeps: Auto<usize>,
+    /// N, for each point.
+    pub walks: usize,
+    /// Weights of the sweeps.
+    pub smoother: Smoother,
+}
+
+impl Default for ResidualWalk {
+    fn default() -> Self {
+        Self { sweeps: Auto::Auto, walks: 10, smoother: Smoother::Chebyshev }
+    }
+}
+
+/// More than this of anything takes longer than anyone waits.
+const MAX_WALKS: usize = 1 << 31;
+const MAX_SWEEPS: usize = 1_000_000;
+
+fn check_walks(walks: usize) -> Result<()> {
+    match walks {
+        0 => Err(Error::invalid("walks", 0, "without walks there is no estimate; set it to 1 or more")),
+        1..=MAX_WALKS => Ok(()),
+        _ => Err(Error::invalid("walks", walks, format!("must be at most {MAX_WALKS}"))),
+    }
+}
+
+impl GridWalk {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub fn check(&self) -> Result<()> {
+        check_walks(self.walks)
+    }
+}
+
+impl ResidualWalk {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub fn check(&self) -> Result<()> {
+        match self.sweeps {
+            Auto::Value(sweeps) if sweeps > MAX_SWEEPS => {
+                Err(Error::invalid("sweeps", sweeps, format!("must be at most {MAX_SWEEPS}, or \"auto\"")))
+            }
+            _ => check_walks(self.walks),
+        }
+    }
+
+    /// k for a step.
+    pub fn count(&self, problem: &Problem<'_>) -> usize {
+        match self.sweeps {
+            Auto::Value(sweeps) => sweeps,
+            Auto::Auto => (8.0 * (0.25 * (1.0 / lowest(problem) - 1.0)).sqrt()).ceil().max(4.0) as usize,
+        }
+    }
+}
+
+/// Lower end of the spectrum of the step, over its diagonal: the slowest mode has half a wave across a bounded axis.
+fn lowest(problem: &Problem<'_>) -> f64 {
+    let (lattice, a) = (problem.mesh.lattice(), problem.stiffness());
+    let slowest: f64 = (0..2)
+        .filter(|&d| !lattice.periodic()[d])
+        .map(|d| 4.0 * a[d] * (0.5 * std::f64::consts::PI * lattice.spacing()[d]).sin().powi(2))
+        .sum();
+    (1.0 + slowest) / (1.0 + 2.0 * a[0] + 2.0 * a[1])
+}
+
+impl Estimator for GridWalk {
+    fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
+        if self.increment {
+            return on_residual(problem, points, self.walks, Smoother::Jacobi, 0);
+        }
+        let table = Table::new(problem)?;
+        let (estimates, path_steps) =
+            table.walk(problem, points, self.walks, problem.new, jump(problem.mesh), |k| problem.mesh.x()[k]);
+        Ok(Estimates {
+            points: estimates,
+            guess: problem.new.to_vec(),
+            work: Work { path_steps, ..Work::default() },
+            sweeps: 0,
+        })
+    }
+}
+
+impl Estimator for ResidualWalk {
+    fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
+        on_residual(problem, points, self.walks, self.smoother, self.count(problem))
+    }
+}
+
+/// Sweeps, then walks that pay the residual.
+fn on_residual(
+    problem: &Problem<'_>,
+    points: &[usize],
+    walks: usize,
+    smoother: Smoother,
+    sweeps: usize,
+) -> Result<Estimates, Failure> {
+    let (mesh, lattice) = (problem.mesh, problem.mesh.lattice());
+    let (jump, patch) = (jump(mesh), Patch::whole(lattice));
+    let table = Table::new(problem)?;
+    let matrix: LatticeMatrix<2, 5> = problem.operator.matrix(patch);
+    let right = problem.operator.right(patch, mesh.x(), jump);
+    let mut x = patch.gather(lattice, problem.new, jump);
+    let mut padded = vec![[0.0; 2]; x.len()];
+    let mut sizes = matrix.residual(&right, &x, &mut padded);
+    // a mesh that is at rest but for round-off stays, to the last bit
+    let at_rest = sizes.iter().zip(exactness(&matrix, size(mesh))).all(|(r, tolerance)| *r <= tolerance);
+    if !at_rest {
+        relax(&matrix, &right, &mut x, smoother, sweeps, lowest(problem));
+        sizes = matrix.residual(&right, &x, &mut padded);
+    }
+    let mut guess = problem.new.to_vec();
+    patch.scatter(lattice, &x, &mut guess, jump);
+    let mut residual = vec![[0.0; 2]; lattice.len()];
+    if !at_rest && sizes.iter().all(|r| r.is_finite()) {
+        patch.scatter(lattice, &padded, &mut residual, [[0.0; 2]; 2]);
+    }
+    let (mut estimates, path_steps) = table.walk(problem, points, walks, &residual, [[0.0; 2]; 2], |_| [0.0; 2]);
+    for (estimate, &k) in estimates.iter_mut().zip(points) {
+        estimate.x = [0, 1].map(|c| guess[k][c] + estimate.x[c]);
+    }
+    Ok(Estimates { points: estimates, guess, work: Work { path_steps, ..Work::default() }, sweeps })
+}
+
+/// Where a walk goes from each node.
+struct Table {
+    rows: Vec<Row>,
+}
+
+/// A random word below the first threshold goes to the first neighbour, below the second to the second …; beyond the
+/// last the walk stops. Probabilities are rounded to 2⁻³².
+#[derive(Clone, Copy)]
+struct Row {
+    thresholds: [u32; 4],
+    neighbours: [u32; 4],
+}
+
+impl Table {
+    fn new(problem: &Problem<'_>) -> Result<Self, Failure> {
+        let lattice = problem.mesh.lattice();
+        problem.operator.check_weights(problem.mesh)?;
+        let (nodes, strides) = (lattice.nodes(), lattice.strides());
+        let row = |(k, weights): (usize, &[[f64; 2]; 2])| {
+            let node = lattice.node(k);
+            let mut row = Row { thresholds: [0; 4], neighbours: [k as u32; 4] };
+            if (0..2).any(|d| !lattice.periodic()[d] && (node[d] == 0 || node[d] + 1 == nodes[d])) {
+                return row; // a side: the walk ends here
+            }
+            let diagonal = 1.0 + weights.as_flattened().iter().sum::<f64>();
+            let mut sum = 0.0;
+            for d in 0..2 {
+                let first = k - node[d] * strides[d];
+                for (end, weight) in weights[d].into_iter().enumerate() {
+                    let to = (node[d] + nodes[d] + 2 * end - 1) % nodes[d];
+                    sum += weight;
+                    row.neighbours[2 * d + end] = (first + to * strides[d]) as u32;
+                    // casts of floats saturate
+                    row.thresholds[2 * d + end] = (sum / diagonal * 4_294_967_296.0).round() as u32;
+                }
+            }
+            row
+        };
+        Ok(Self { rows: problem.operator.weights().iter().enumerate().map(row).collect() })
+    }
+
+    /// For each point the mean of `pay` − `base` of the point over where walks from there stop, plus `base`; `jump` is
+    /// paid for turns around periodic axes. Also the number of jumps and stops.
+    fn walk(
+        &self,
+        problem: &Problem<'_>,
+        points: &[usize],
+        walks: usize,
+        pay: &[[f64; 2]],
+        jump: [[f64; 2]; 2],
+        base: impl Fn(usize) -> [f64; 2] + Sync + Send,
+    ) -> (Vec<Estimate>, usize) {
+        let one = |&point: &usize| {
+            let base = base(point);
+            let mut samples = Samples::new();
+            let mut steps = 0;
+            for path in 0..walks {
+                let mut stream = problem.random.stream(problem.step, point as u32, path as u32);
+                let mut k = point as u32;
+                let mut turns = [0_i32; 2];
+                loop {
+                    steps += 1;
+                    let (row, word) = (&self.rows[k as usize], stream.word());
+                    let exit = row.thresholds.iter().map(|&t| usize::from(word >= t)).sum::<usize>();
+                    if exit == 4 {
+                        break;
+                    }
+                    let next = row.neighbours[exit];
+                    // stepping up to a lower index, or down to a higher one, is a turn
+                    turns[exit / 2] += i32::from(exit % 2 == 1 && next < k) - i32::from(exit % 2 == 0 && next > k);
+                    k = next;
+                }
+                let paid = pay[k as usize];
+                samples.add([0, 1].map(|c| paid[c] + f64::from(turns[c]) * jump[c][c] - base[c]));
+            }
+            (samples.estimate(base), steps)
+        };
+        let found = parallel::map(points, one);
+        let steps = found.iter().map(|(_, steps)| steps).sum();
+        (found.into_iter().map(|(estimate, _)| estimate).collect(), steps)
+    }
+}
+
+/// Running sums of samples that are small.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Samples {
+    count: f64,
+    sums: [f64; 2],
+    squares: [f64; 2],
+}
+
+impl Samples {
+    pub fn new() -> Self {
+        Self { count: 0.0, sums: [0.0; 2], squares: [0.0; 2] }
+    }
+
+    #[inline(always)]
+    pub fn add(&mut self, sample: [f64; 2]) {
+        self.count += 1.0;
+        for c in 0..2 {
+            self.sums[c] += sample[c];
+            self.squares[c] += sample[c] * sample[c];
+        }
+    }
+
+    /// Their mean, from a base.
+    pub fn estimate(self, base: [f64; 2]) -> Estimate {
+        let n = self.count;
+        let mean = self.sums.map(|sum| sum / n);
+        let variance = [0, 1].map(|c| ((self.squares[c] / n - mean[c] * mean[c]).max(0.0)) / (n - 1.0));
+        Estimate {
+            x: [0, 1].map(|c| base[c] + mean[c]),
+            // one sample says nothing of its spread: 0/0
+            standard_error: if n > 1.0 { variance.map(f64::sqrt) } else { [f64::NAN; 2] },
+        }
+    }
+}

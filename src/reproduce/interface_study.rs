@@ -1,0 +1,295 @@
+use super::{Options, Table};
+use crate::density::{Arclength, Strength};
+use crate::error::{Failure, Result};
+use crate::geometry::{Lattice, Mesh};
+use crate::meshing::{
+    Decomposition, Estimator, EstimatorKind, GridWalk, MeshGenerator, MeshOperator, Mmpde, MonteCarlo, Problem,
+    ResidualWalk, Whole, move_sides,
+};
+use crate::numerics::linear::{Robust, Smoother};
+use crate::physics::{Burgers, Convection};
+use crate::setting::Auto;
+use crate::simulation::{Coupling, Record, Schedule, Simulation};
+use std::time::Instant;
+
+/// One mesh step of Burgers' front with its exact solution on the whole lattice, for estimators to be measured on.
+pub struct InterfaceStep {
+    equation: Mmpde,
+    mesh: Mesh<2>,
+    rho: Vec<f64>,
+    dt: f64,
+    operator: MeshOperator<2>,
+    /// New positions on the sides, old ones elsewhere.
+    new: Vec<[f64; 2]>,
+    exact: Vec<[f64; 2]>,
+    decomposition: Decomposition,
+    points: Vec<usize>,
+}
+
+/// What an estimator did on a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Measured {
+    /// Root mean square over both coordinates of all interface points.
+    pub error: f64,
+    /// What the estimator itself says of it.
+    pub standard_error: f64,
+    /// Steps of walks for each point.
+    pub evaluations: f64,
+    /// Sweeps over the whole lattice.
+    pub sweeps: usize,
+    /// Seconds for all points.
+    pub seconds: f64,
+}
+
+impl InterfaceStep {
+    /// The step after t = .75 of case A (ν = .005, strength 10, no smoothing, advective) with `cells` cells an axis.
+    ///
+    /// # Errors
+    /// Where the run up to there fails.
+    pub fn case_a(cells: usize) -> Result<Self> {
+        let dt = 1e-3;
+        let monitor = Arclength { strength: Strength::Relative(10.0), smoothing: 0, ..Arclength::default() };
+        let mut simulation = Simulation {
+            physics: Box::new(Burgers::new(0.005, Convection::Advective)?),
+            monitor: Box::new(monitor),
+            generator: Box::new(Whole::default()),
+            equation: Mmpde::default(),
+            coupling: Coupling::default(),
+            schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
+        };
+        let mesh = Mesh::uniform(Lattice::bounded([cells, cells])?, [0.0; 2], [1.0; 2])?;
+        let mut state = simulation.start(mesh)?;
+        simulation.run(&mut state, &mut Record::default(), &mut [])?;
+        Ok(Self::new(state.mesh, state.rho, Mmpde::default(), dt, [4, 4])?)
+    }
+
+    /// A step of any mesh.
+    ///
+    /// # Errors
+    /// A [`Failure`] where the step cannot be solved.
+    pub fn new(
+        mesh: Mesh<2>,
+        rho: Vec<f64>,
+        equation: Mmpde,
+        dt: f64,
+        subdomains: [usize; 2],
+    ) -> Result<Self, Failure> {
+        let lattice = *mesh.lattice();
+        let operator = equation.operator(&lattice, &rho, dt)?;
+        let mut new = mesh.x().to_vec();
+        move_sides(&equation, &mesh, &rho, dt, &mut new, &mut Robust::default())?;
+        let exact = Whole::default().step(&equation, &mesh, &rho, dt)?.mesh.x().to_vec();
+        let decomposition = Decomposition::new(&lattice, subdomains)
+            .map_err(|_| Failure::Subdomains { subdomains, cells: lattice.cells() })?;
+        let points = decomposition.points();
+        Ok(Self { equation, mesh, rho, dt, operator, new, exact, decomposition, points })
+    }
+
+    /// Δt/(τh²), the larger of both axes.
+    pub fn stiffness(&self) -> f64 {
+        let a = self.problem(0).stiffness();
+        a[0].max(a[1])
+    }
+
+    /// Length of the shortest edge of the mesh.
+    pub fn shortest_edge(&self) -> f64 {
+        self.mesh.shortest_edge()
+    }
+
+    /// Number of interface points.
+    pub fn points(&self) -> usize {
+        self.points.len()
+    }
+
+    fn problem(&self, seed: u64) -> Problem<'_> {
+        Problem::new(&self.equation, &self.operator, &self.mesh, &self.rho, self.dt, &self.new, seed, 0)
+    }
+
+    /// Root mean square distance of positions from the exact ones at the interface points, for one coordinate.
+    fn error(&self, x: impl Fn(usize) -> [f64; 2]) -> f64 {
+        let squares = self.points.iter().enumerate().map(|(p, &k)| {
+            let (x, exact) = (x(p), self.exact[k]);
+            (x[0] - exact[0]).powi(2) + (x[1] - exact[1]).powi(2)
+        });
+        (squares.sum::<f64>() / (2 * self.points.len()) as f64).sqrt()
+    }
+
+    /// Error of keeping the old mesh.
+    pub fn do_nothing(&self) -> f64 {
+        self.error(|p| self.mesh.x()[self.points[p]])
+    }
+
+    /// What an estimator does, averaged over seeds 1 … `seeds` (the errors as root mean squares).
+    ///
+    /// # Errors
+    /// As [`Estimator::estimate`].
+    pub fn measure(&self, estimator: &dyn Estimator, seeds: u64) -> Result<Measured, Failure> {
+        let mut sum = Measured { error: 0.0, standard_error: 0.0, evaluations: 0.0, sweeps: 0, seconds: 0.0 };
+        for seed in 1..=seeds {
+            let started = Instant::now();
+            let found = estimator.estimate(&self.problem(seed), &self.points)?;
+            sum.seconds += started.elapsed().as_secs_f64();
+            sum.error += self.error(|p| found.points[p].x).powi(2);
+            let squares = found.points.iter().flat_map(|e| e.standard_error).map(|s| s * s).sum::<f64>();
+            sum.standard_error += squares / (2 * self.points.len()) as f64;
+            sum.evaluations += found.work.path_steps as f64 / self.points.len() as f64;
+            sum.sweeps = found.sweeps;
+        }
+        let n = seeds as f64;
+        Ok(Measured {
+            error: (sum.error / n).sqrt(),
+            standard_error: (sum.standard_error / n).sqrt(),
+            evaluations: sum.evaluations / n,
+            seconds: sum.seconds / n,
+            ..sum
+        })
+    }
+
+    /// Error of sweeps alone, without a walk.
+    ///
+    /// # Errors
+    /// As [`Estimator::estimate`].
+    pub fn sweeps_alone(&self, walk: &ResidualWalk) -> Result<f64, Failure> {
+        let walk = ResidualWalk { walks: 1, ..walk.clone() };
+        let guess = walk.estimate(&self.problem(1), &[])?.guess;
+        Ok(self.error(|p| guess[self.points[p]]))
+    }
+
+    /// Error, unknowns for each point and seconds of one overlapping Schwarz sweep from the old mesh: every subdomain
+    /// made larger by `width` cells on all sides.
+    ///
+    /// # Errors
+    /// As [`MeshOperator::solve`].
+    pub fn strip(&self, width: usize) -> Result<(f64, f64, f64), Failure> {
+        let started = Instant::now();
+        let lattice = self.mesh.lattice();
+        let mut x = self.new.clone();
+        let mut unknowns = 0;
+        for (patch, own) in self.decomposition.extended([width, width]) {
+            let solver = &mut Robust::<2>::default();
+            let zero = [[0.0; 2]; 2];
+            let (inside, _) = self.operator.solve::<5, 2>(patch, self.mesh.x(), &self.new, zero, solver, [1.0; 2])?;
+            let mut all = self.new.clone();
+            patch.scatter(lattice, &inside, &mut all, zero);
+            own.into_iter().for_each(|k| x[k] = all[k]);
+            unknowns += patch.len();
+        }
+        let seconds = started.elapsed().as_secs_f64();
+        Ok((self.error(|p| x[self.points[p]]), unknowns as f64 / self.points.len() as f64, seconds))
+    }
+}
+
+/// The figures of the project's own measurements, by an independent implementation.
+fn estimators(quick: bool) -> Vec<(&'static str, EstimatorKind, &'static str)> {
+    let paths = |paths, substeps| MonteCarlo::new(paths, substeps);
+    let residual = |sweeps, walks| {
+        EstimatorKind::ResidualWalk(ResidualWalk { sweeps: Auto::Value(sweeps), walks, smoother: Smoother::Jacobi })
+    };
+    let grid = |walks, increment| EstimatorKind::GridWalk(GridWalk { walks, increment });
+    let monte = EstimatorKind::MonteCarlo;
+    let mut all = vec![
+        ("Monte Carlo N=10⁴ M=10, as published", monte(paths(10_000, 10)), "4.2–4.5e-4"),
+        ("Monte Carlo N=10³ M=10", monte(paths(1000, 10)), "1.4e-3"),
+        ("  antithetic, N=10⁴", monte(MonteCarlo { antithetic: true, ..paths(10_000, 10) }), "6.7e-5"),
+        ("  control variate, N=10⁴", monte(MonteCarlo { control_variate: true, ..paths(10_000, 10) }), "5.5e-5"),
+        ("  common random numbers, N=10⁴", monte(MonteCarlo { common: true, ..paths(10_000, 10) }), ""),
+        ("  Sobol, N=1024 M=8", monte(MonteCarlo { sobol: true, ..paths(1024, 8) }), "3.4e-5"),
+        ("grid walk N=10", grid(10, false), "1.4e-2"),
+        ("grid walk N=100", grid(100, false), "4.4e-3"),
+        ("grid walk N=10⁴", grid(10_000, false), "4.4e-4"),
+        ("grid walk on the increment, N=10", grid(10, true), "6.4e-5"),
+        ("grid walk on the increment, N=100", grid(100, true), "2.0e-5"),
+        ("residual walk k=4 N=10, Jacobi", residual(4, 10), "1.3e-5"),
+        ("residual walk k=16 N=10, Jacobi", residual(16, 10), "1.3e-6"),
+        ("residual walk, the default", EstimatorKind::default(), ""),
+    ];
+    if quick {
+        all.retain(|(name, _, _)| !name.starts_with("  common"));
+    }
+    all
+}
+
+pub(super) fn run(options: Options) -> Result<Vec<Table>> {
+    let step = InterfaceStep::case_a(40)?;
+    let seeds = if options.quick { 2 } else { 10 };
+    let title = format!("One mesh step at 41², Δt = 1e-3, t = .75, 4×4: {} interface points, mean of {seeds} seeds", step.points());
+    let mut table = Table::new(
+        title,
+        &["estimator", "evaluations a point", "sweeps", "error", "its own estimate", "measured before", "µs a point", "times the default"],
+    );
+    let default = step.measure(EstimatorKind::default().estimator(), seeds.max(10))?;
+    let us = |seconds: f64| seconds * 1e6 / step.points() as f64;
+    table.row(["keep the old mesh (do nothing)", "0", "0", &format!("{:.1e}", step.do_nothing()), "", "9.7e-5", "0", "0"]);
+    let mut published = default;
+    let mut cheap = default;
+    for (name, kind, before) in estimators(options.quick) {
+        let found = step.measure(kind.estimator(), seeds)?;
+        table.row([
+            name.to_string(),
+            format!("{:.0}", found.evaluations),
+            found.sweeps.to_string(),
+            format!("{:.1e}", found.error),
+            format!("{:.1e}", found.standard_error),
+            before.to_string(),
+            format!("{:.2}", us(found.seconds)),
+            format!("{:.2}", found.seconds / default.seconds),
+        ]);
+        match name {
+            "Monte Carlo N=10⁴ M=10, as published" => published = found,
+            "residual walk k=4 N=10, Jacobi" => cheap = found,
+            _ => {}
+        }
+    }
+    let (error, unknowns, seconds) = step.strip(8)?;
+    table.row([
+        "deterministic strip, 8 cells to each side".to_string(),
+        format!("{unknowns:.0} unknowns"),
+        "0".into(),
+        format!("{error:.1e}"),
+        String::new(),
+        "2.7e-7".into(),
+        format!("{:.2}", us(seconds)),
+        format!("{:.2}", seconds / default.seconds),
+    ]);
+    table.note("error: root mean square over both coordinates of all points, against the discrete step on one domain");
+    table.note("its own estimate: the standard error of the samples; it does not see the bias of Monte Carlo");
+    table.note("measured before: by an independent implementation of this project, ±10 %");
+    table.note(format!(
+        "residual walk k=4 N=10 against Monte Carlo N=10⁴ M=10: {:.0} times cheaper at 1/{:.0} of the error",
+        published.seconds / cheap.seconds,
+        published.error / cheap.error
+    ));
+    Ok(vec![table, over_stiffness(options)?])
+}
+
+/// The default over a = Δt/(τh²).
+fn over_stiffness(options: Options) -> Result<Table> {
+    let mut table = Table::new(
+        "The default residual walk (N = 10) over a = Δt/(τh²), from the mesh and density of case A at t = .75",
+        &["cells", "a", "sweeps", "jumps a walk", "do nothing", "error", "its own estimate", "of the shortest edge", "sweeps alone", "µs a point"],
+    );
+    let sizes: &[usize] = if options.quick { &[40] } else { &[40, 80] };
+    for &cells in sizes {
+        let at = InterfaceStep::case_a(cells)?;
+        for a in [0.5, 1.6, 5.0, 16.0, 50.0, 100.0] {
+            let dt = a / (cells * cells) as f64;
+            let step = InterfaceStep::new(at.mesh.clone(), at.rho.clone(), at.equation, dt, [4, 4])?;
+            let walk = ResidualWalk::default();
+            let found = step.measure(&walk, if options.quick { 2 } else { 10 })?;
+            table.row([
+                format!("{cells}²"),
+                format!("{:.1}", step.stiffness()),
+                found.sweeps.to_string(),
+                format!("{:.0}", found.evaluations / walk.walks as f64),
+                format!("{:.1e}", step.do_nothing()),
+                format!("{:.1e}", found.error),
+                format!("{:.1e}", found.standard_error),
+                format!("{:.2} %", 100.0 * found.standard_error / step.shortest_edge()),
+                format!("{:.1e}", step.sweeps_alone(&walk)?),
+                format!("{:.2}", found.seconds * 1e6 / step.points() as f64),
+            ]);
+        }
+    }
+    table.note("sweeps alone: the error without any walk. In a single step it is hardly larger, and where walks are long it is far cheaper; what walks add is that errors of many steps are independent and do not add up to a drift");
+    Ok(table)
+}

@@ -1,0 +1,61 @@
+//! How a study writes a setting.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::fmt;
+use std::marker::PhantomData;
+
+/// A setting that a study gives as a value, or leaves to the program with `"auto"`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Auto<T> {
+    /// The program chooses.
+    #[default]
+    Auto,
+    /// This value.
+    Value(T),
+}
+
+impl<T: Serialize> Serialize for Auto<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Auto => serializer.serialize_str("auto"),
+            Self::Value(value) => value.serialize(serializer),
+        }
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Auto<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> de::Visitor<'de> for Visitor<T> {
+            type Value = Auto<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or \"auto\"")
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<Auto<T>, E> {
+                if text == "auto" { Ok(Auto::Auto) } else { Err(E::invalid_value(de::Unexpected::Str(text), &self)) }
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Auto<T>, E> {
+                T::deserialize(de::value::I64Deserializer::new(value)).map(Auto::Value)
+            }
+
+            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Auto<T>, E> {
+                T::deserialize(de::value::U64Deserializer::new(value)).map(Auto::Value)
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Auto<T>, E> {
+                T::deserialize(de::value::F64Deserializer::new(value)).map(Auto::Value)
+            }
+        }
+        deserializer.deserialize_any(Visitor(PhantomData))
+    }
+}
+
+/// An array of exactly two entries; serde's own arrays take the first two of more.
+pub(crate) fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<[T; 2], D::Error> {
+    let entries = Vec::<T>::deserialize(deserializer)?;
+    <[T; 2]>::try_from(entries)
+        .map_err(|entries| de::Error::custom(format!("expected an array of length 2, found {}", entries.len())))
+}
