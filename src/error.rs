@@ -69,7 +69,9 @@ pub enum Failure {
         x: Vec<f64>,
     },
     /// Interface values are so noisy that cells can fold.
-    #[error("interface values are too noisy: standard error {noise:.1e}, shortest edge of the mesh {edge:.1e}, Δt/(τh²) = {stiffness:.3}")]
+    #[error(
+        "interface values are too noisy: standard error {noise:.1e}, shortest edge of the mesh {edge:.1e}, Δt/(τh²) = {stiffness:.3}"
+    )]
     NoisyInterface {
         /// Root mean square of the standard errors.
         noise: f64,
@@ -131,7 +133,9 @@ impl Failure {
             Self::NonFinite { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => "lower time.step or raise mesh.relaxation",
-            Self::SteepDensity { .. } => "set monitor.gradient = \"safe\", which bounds |b|h, or raise monitor.smoothing",
+            Self::SteepDensity { .. } => {
+                "set monitor.gradient = \"safe\", which bounds |b|h, or raise monitor.smoothing"
+            }
             Self::NoisyInterface { .. } => {
                 "raise mesh.generator.estimator.walks or its sweeps (paths for monte-carlo), or set them to \"auto\""
             }

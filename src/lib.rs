@@ -59,7 +59,6 @@ pub mod study;
 
 pub mod reproduce;
 
-
 pub use error::{Error, Failure, Result};
 pub use setting::Auto;
 pub use work::Work;

@@ -84,7 +84,8 @@ pub(crate) fn normals<const L: usize>(a: [u32; L], b: [u32; L]) -> [[f64; L]; 2]
         let radius = (-2.0 * ln(uniform(a[l]))).sqrt();
         // the angle in quarter turns, from the nearest one: −½ … ½
         let quarter = b[l].wrapping_add(1 << 29) >> 30;
-        let rest = f64::from(b[l].wrapping_sub(quarter << 30) as i32) * (std::f64::consts::FRAC_PI_2 / f64::from(1 << 30));
+        let rest =
+            f64::from(b[l].wrapping_sub(quarter << 30) as i32) * (std::f64::consts::FRAC_PI_2 / f64::from(1 << 30));
         let (s, c) = sin_cos(rest);
         let (x, y) = if quarter & 1 == 0 { (c, s) } else { (s, c) };
         out[0][l] = if quarter == 1 || quarter == 2 { -radius * x } else { radius * x };
@@ -112,8 +113,10 @@ fn ln(x: f64) -> f64 {
 #[inline(always)]
 fn sin_cos(x: f64) -> (f64, f64) {
     let z = x * x;
-    let sin = 1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0 * (1.0 - z / 156.0)))));
-    let cos = 1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0 * (1.0 - z / 132.0)))));
+    let sin =
+        1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0 * (1.0 - z / 156.0)))));
+    let cos =
+        1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0 * (1.0 - z / 132.0)))));
     (x * sin, cos)
 }
 
@@ -178,7 +181,8 @@ mod tests {
             }
         }
         let count = 4.0 * f64::from(n);
-        for (sum, expected, deviation) in [(sums[0], 0.0, 1.0), (sums[1], 1.0, 2_f64.sqrt()), (sums[2], 3.0, 96_f64.sqrt())]
+        for (sum, expected, deviation) in
+            [(sums[0], 0.0, 1.0), (sums[1], 1.0, 2_f64.sqrt()), (sums[2], 3.0, 96_f64.sqrt())]
         {
             assert!((sum / count - expected).abs() < 4.0 * deviation / count.sqrt(), "{} for {expected}", sum / count);
         }

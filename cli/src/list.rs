@@ -1,6 +1,10 @@
 use crate::terminal::say;
 use clap::{Args, ValueEnum};
-use driftmesh::{density::MonitorKind, meshing::{EstimatorKind, GeneratorKind}, physics::PdeKind};
+use driftmesh::{
+    density::MonitorKind,
+    meshing::{EstimatorKind, GeneratorKind},
+    physics::PdeKind,
+};
 use std::process::ExitCode;
 
 #[derive(Args)]

@@ -23,7 +23,8 @@ impl Reproduce {
         let unwritable =
             |path: &PathBuf, error: std::io::Error| Error::Unwritable { path: path.clone(), reason: error.to_string() };
         std::fs::create_dir_all(&self.out).map_err(|error| unwritable(&self.out, error))?;
-        for item in ITEMS.iter().filter(|item| self.items.is_empty() || self.items.iter().any(|name| name == item.name)) {
+        for item in ITEMS.iter().filter(|item| self.items.is_empty() || self.items.iter().any(|name| name == item.name))
+        {
             let tables = item.run(Options { quick: self.quick })?;
             let text = tables.iter().map(|table| table.to_string()).collect::<Vec<_>>().join("\n");
             say(&text);

@@ -149,7 +149,12 @@ impl<const D: usize> MeshOperator<D> {
     }
 
     /// The right-hand side on one patch: old values, continued across the seam of a periodic axis.
-    pub(super) fn right<const K: usize>(&self, patch: Patch<D>, old: &[[f64; K]], jump: [[f64; K]; D]) -> Vec<[f64; K]> {
+    pub(super) fn right<const K: usize>(
+        &self,
+        patch: Patch<D>,
+        old: &[[f64; K]],
+        jump: [[f64; K]; D],
+    ) -> Vec<[f64; K]> {
         let padded = patch.gather(&self.lattice, old, jump);
         patch.places().map(|place| padded[place]).collect()
     }

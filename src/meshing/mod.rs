@@ -14,7 +14,8 @@ pub use mmpde::{MeshOperator, Mmpde};
 pub use schwarz::Schwarz;
 pub use sides::move_sides;
 pub use stochastic::{
-    Estimate, Estimator, EstimatorKind, GridWalk, Interpolation, MonteCarlo, Placement, Problem, ResidualWalk, Stochastic,
+    Estimate, Estimator, EstimatorKind, GridWalk, Interpolation, MonteCarlo, Placement, Problem, ResidualWalk,
+    Stochastic,
 };
 pub use whole::Whole;
 

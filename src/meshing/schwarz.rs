@@ -96,7 +96,11 @@ impl Schwarz {
     pub fn check(&self, lattice: &Lattice<2>) -> Result<()> {
         Decomposition::new(lattice, self.subdomains)?;
         if self.overlap == 0 {
-            return Err(Error::invalid("overlap", 0, "without overlap the iteration does not converge; set it to 1 or more"));
+            return Err(Error::invalid(
+                "overlap",
+                0,
+                "without overlap the iteration does not converge; set it to 1 or more",
+            ));
         }
         if !(self.tolerance.is_finite() && self.tolerance >= 1e-12) {
             return Err(Error::invalid("tolerance", self.tolerance, "must be a finite number, 1e-12 or more"));
@@ -113,10 +117,8 @@ impl Parts {
         if self.lattice == Some(*lattice) {
             return Ok(());
         }
-        let decomposition = Decomposition::new(lattice, subdomains).map_err(|_| Failure::Subdomains {
-            subdomains,
-            cells: lattice.cells(),
-        })?;
+        let decomposition = Decomposition::new(lattice, subdomains)
+            .map_err(|_| Failure::Subdomains { subdomains, cells: lattice.cells() })?;
         let extended = decomposition.extended([overlap / 2, overlap - overlap / 2]);
         let mut on_ring = vec![false; lattice.len()];
         for (patch, _) in &extended {
@@ -169,9 +171,8 @@ fn ring<'a>(patch: &'a Patch<2>, lattice: &'a Lattice<2>) -> impl Iterator<Item 
     (0..2).filter(|&d| !patch.wraps[d]).flat_map(move |d| {
         let ends = [patch.origin[d] + nodes[d] - 1, patch.origin[d] + patch.size[d]];
         ends.into_iter().flat_map(move |end| {
-            (0..patch.size[1 - d]).map(move |k| {
-                end % nodes[d] * strides[d] + (patch.origin[1 - d] + k) % nodes[1 - d] * strides[1 - d]
-            })
+            (0..patch.size[1 - d])
+                .map(move |k| end % nodes[d] * strides[d] + (patch.origin[1 - d] + k) % nodes[1 - d] * strides[1 - d])
         })
     })
 }

@@ -212,14 +212,35 @@ fn estimators(quick: bool) -> Vec<(&'static str, EstimatorKind, &'static str)> {
 pub(super) fn run(options: Options) -> Result<Vec<Table>> {
     let step = InterfaceStep::case_a(40)?;
     let seeds = if options.quick { 2 } else { 10 };
-    let title = format!("One mesh step at 41², Δt = 1e-3, t = .75, 4×4: {} interface points, mean of {seeds} seeds", step.points());
+    let title = format!(
+        "One mesh step at 41², Δt = 1e-3, t = .75, 4×4: {} interface points, mean of {seeds} seeds",
+        step.points()
+    );
     let mut table = Table::new(
         title,
-        &["estimator", "evaluations a point", "sweeps", "error", "its own estimate", "measured before", "µs a point", "times the default"],
+        &[
+            "estimator",
+            "evaluations a point",
+            "sweeps",
+            "error",
+            "its own estimate",
+            "measured before",
+            "µs a point",
+            "times the default",
+        ],
     );
     let default = step.measure(EstimatorKind::default().estimator(), seeds.max(10))?;
     let us = |seconds: f64| seconds * 1e6 / step.points() as f64;
-    table.row(["keep the old mesh (do nothing)", "0", "0", &format!("{:.1e}", step.do_nothing()), "", "9.7e-5", "0", "0"]);
+    table.row([
+        "keep the old mesh (do nothing)",
+        "0",
+        "0",
+        &format!("{:.1e}", step.do_nothing()),
+        "",
+        "9.7e-5",
+        "0",
+        "0",
+    ]);
     let mut published = default;
     let mut cheap = default;
     for (name, kind, before) in estimators(options.quick) {
@@ -266,7 +287,18 @@ pub(super) fn run(options: Options) -> Result<Vec<Table>> {
 fn over_stiffness(options: Options) -> Result<Table> {
     let mut table = Table::new(
         "The default residual walk (N = 10) over a = Δt/(τh²), from the mesh and density of case A at t = .75",
-        &["cells", "a", "sweeps", "jumps a walk", "do nothing", "error", "its own estimate", "of the shortest edge", "sweeps alone", "µs a point"],
+        &[
+            "cells",
+            "a",
+            "sweeps",
+            "jumps a walk",
+            "do nothing",
+            "error",
+            "its own estimate",
+            "of the shortest edge",
+            "sweeps alone",
+            "µs a point",
+        ],
     );
     let sizes: &[usize] = if options.quick { &[40] } else { &[40, 80] };
     for &cells in sizes {

@@ -48,7 +48,8 @@ impl fmt::Display for Table {
         };
         writeln!(f, "### {}\n", self.title)?;
         line(f, &self.columns)?;
-        let rules = widths.iter().enumerate().map(|(c, &w)| if c == 0 { "-".repeat(w) } else { "-".repeat(w - 1) + ":" });
+        let rules =
+            widths.iter().enumerate().map(|(c, &w)| if c == 0 { "-".repeat(w) } else { "-".repeat(w - 1) + ":" });
         line(f, &rules.collect::<Vec<_>>())?;
         self.rows.iter().try_for_each(|row| line(f, row))?;
         if !self.notes.is_empty() {

@@ -140,7 +140,7 @@ impl Simulation {
             self.warn_of_noise(state, record);
             if self.schedule.reports_at(t) {
                 let report = self.report(state, mass_at_start, record.interface);
-            record.reports.push(report);
+                record.reports.push(report);
             }
             self.show(Event::Stepped, state, record, observers, dt, started)?;
         }

@@ -2,7 +2,8 @@ use super::MovingMesh;
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, compare};
 use crate::simulation::{
-    Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw, final_arrays,
+    Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw,
+    final_arrays,
 };
 use std::path::Path;
 use std::time::Instant;

@@ -26,8 +26,14 @@ struct Piece {
 }
 
 /// Tables in which `kind` names one of several structures, inner ones first.
-const KINDED: [&str; 6] =
-    ["pde", "monitor", "mesh.generator.estimator", "mesh.generator", "compare.generator.estimator", "compare.generator"];
+const KINDED: [&str; 6] = [
+    "pde",
+    "monitor",
+    "mesh.generator.estimator",
+    "mesh.generator",
+    "compare.generator.estimator",
+    "compare.generator",
+];
 /// Tables that hold one of several keys.
 const CHOICES: [&str; 2] = ["monitor.strength", "output.frames"];
 /// Characters of a line that are shown.

@@ -93,7 +93,13 @@ fn crossings(lines: &[Cut]) -> Vec<usize> {
 }
 
 /// Fills all cuts of `x`, which holds estimates at `points` and `guess` everywhere else.
-pub(super) fn fill(decomposition: &Decomposition, mesh: &Mesh<2>, points: &[usize], guess: &[[f64; 2]], x: &mut [[f64; 2]]) {
+pub(super) fn fill(
+    decomposition: &Decomposition,
+    mesh: &Mesh<2>,
+    points: &[usize],
+    guess: &[[f64; 2]],
+    x: &mut [[f64; 2]],
+) {
     let lattice = mesh.lattice();
     for cut in decomposition.lines() {
         let n = cut.nodes.len();

@@ -18,7 +18,8 @@ use statrs::function::erf::erfc_inv;
 ///
 /// with b interpolated bilinearly and xⁿ bicubically. Near a bounded side, paths leave between two points with the
 /// probability exp(−d₀d₁/Δs) of a Brownian bridge, d their distances from it; a path that left pays the position on the
-/// side where and when it did, linear in time between old and new side.
+/// side where and when it did, linear in time between old and new side. Whether a path leaves is drawn; with any of the
+/// variance reductions it is weighed instead, that is each path pays the mean over what could have been drawn.
 ///
 /// Its target is the time-continuous step, not the implicit Euler one that the subdomains solve: a bias of first order
 /// in Δs remains, and the noise of N paths.
@@ -93,7 +94,7 @@ impl MonteCarlo {
 
 impl Estimator for MonteCarlo {
     fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
-        let domain = Domain::new(problem, self.substeps);
+        let domain = Domain::new(problem, self);
         let bridge = Bridge::new(self.substeps);
         let found = parallel::map(points, |&k| self.point(problem, &domain, &bridge, k));
         let path_steps = found.iter().map(|(_, steps)| steps).sum();
@@ -129,7 +130,7 @@ impl MonteCarlo {
             for lane in 0..LANES.min(self.paths - first) {
                 let path = (first + lane) as u32;
                 let exits = |block: u32| problem.random.blocks([[block], [path], [node], [problem.step]])[0][0];
-                let (paid, taken) = domain.path(from, &increments, lane, exits, self.control_variate);
+                let (paid, taken) = domain.path(from, &increments, lane, exits);
                 steps += taken;
                 let sample = [0, 1].map(|c| paid[c] - base[c]);
                 if !self.antithetic {
@@ -181,10 +182,15 @@ struct Domain {
     new: Surface,
     /// How far old and new side are apart in time, in substeps.
     substeps: f64,
+    /// Subtract the martingale.
+    control: bool,
+    /// Weigh exits instead of drawing them.
+    weigh: bool,
 }
 
 impl Domain {
-    fn new(problem: &Problem<'_>, substeps: usize) -> Self {
+    fn new(problem: &Problem<'_>, settings: &MonteCarlo) -> Self {
+        let substeps = settings.substeps;
         let (mesh, lattice) = (problem.mesh, *problem.mesh.lattice());
         let ds = problem.dt / (problem.equation.relaxation * substeps as f64);
         let n = lattice.cells().map(|n| n as f64);
@@ -204,6 +210,8 @@ impl Domain {
             old: Surface::new(&lattice, mesh.x(), jump),
             new: Surface::new(&lattice, problem.new, jump),
             substeps: substeps as f64,
+            control: settings.control_variate,
+            weigh: settings.antithetic || settings.sobol || settings.control_variate,
         }
     }
 
@@ -215,18 +223,18 @@ impl Domain {
         increments: &Increments,
         lane: usize,
         exits: impl Fn(u32) -> u32,
-        control: bool,
     ) -> ([f64; 2], usize) {
         let (cells, periodic) = (self.lattice.cells(), self.lattice.periodic());
         let mut at = from;
         let mut martingale = [0.0; 2];
+        let (mut inside, mut paid) = (1.0, [0.0; 2]);
         for (step, w) in increments.iter().enumerate() {
             // position in the lattice, turns around periodic axes taken off
             let place = [0, 1].map(|d| if periodic[d] { at[d].rem_euclid(cells[d] as f64) } else { at[d] });
             let (k, share) = self.cell(place);
             let drift = bilinear(&self.drift, cells[1] + 1, k, share);
             let noise = [0, 1].map(|d| self.spread[d] * w[d][lane]);
-            if control {
+            if self.control {
                 let slope = bilinear(&self.slopes, cells[1] + 1, k, share);
                 (0..2).for_each(|c| martingale[c] += slope[2 * c] * noise[0] + slope[2 * c + 1] * noise[1]);
             }
@@ -238,28 +246,35 @@ impl Domain {
                     if exponent > FAR {
                         continue;
                     }
-                    // blocks beyond those of the increments
-                    let left = after <= 0.0 || {
+                    let mut leaves = if after <= 0.0 { 1.0 } else { (-exponent).exp() };
+                    if !self.weigh && after > 0.0 {
+                        // blocks beyond those of the increments
                         let word = exits(0x8000_0000 | (step as u32) << 2 | (d as u32) << 1 | end as u32);
-                        uniform(word) < (-exponent).exp()
-                    };
-                    if left {
+                        leaves = if uniform(word) < leaves { 1.0 } else { 0.0 };
+                    }
+                    if leaves > 0.0 {
                         let part = before / (before + after.abs()).max(f64::MIN_POSITIVE);
-                        let mut exit = [0, 1].map(|e| (at[e] + part * (next[e] - at[e])).clamp(0.0, cells[e] as f64));
-                        if periodic[1 - d] {
-                            exit[1 - d] = at[1 - d] + part * (next[1 - d] - at[1 - d]);
-                        }
+                        let mut exit = [0, 1].map(|e| at[e] + part * (next[e] - at[e]));
                         exit[d] = if end == 0 { 0.0 } else { n };
+                        if !periodic[1 - d] {
+                            exit[1 - d] = exit[1 - d].clamp(0.0, cells[1 - d] as f64);
+                        }
                         let elapsed = (step as f64 + part) / self.substeps;
                         let (old, new) = (self.old.at(&self.lattice, exit), self.new.at(&self.lattice, exit));
-                        return ([0, 1].map(|c| new[c] + elapsed * (old[c] - new[c]) - martingale[c]), step + 1);
+                        for c in 0..2 {
+                            paid[c] += inside * leaves * (new[c] + elapsed * (old[c] - new[c]) - martingale[c]);
+                        }
+                        inside *= 1.0 - leaves;
                     }
                 }
             }
+            if inside <= 0.0 {
+                return (paid, step + 1);
+            }
             at = next;
         }
-        let paid = self.old.at(&self.lattice, at);
-        ([0, 1].map(|c| paid[c] - martingale[c]), increments.len())
+        let end = self.old.at(&self.lattice, at);
+        ([0, 1].map(|c| paid[c] + inside * (end[c] - martingale[c])), increments.len())
     }
 
     /// The first node of the cell that holds a place, and where the place is in it.
@@ -353,12 +368,7 @@ impl Surface {
 #[inline(always)]
 fn cubic(s: f64) -> [f64; 4] {
     let (before, after, beyond) = (s + 1.0, s - 1.0, s - 2.0);
-    [
-        -s * after * beyond / 6.0,
-        0.5 * before * after * beyond,
-        -0.5 * before * s * beyond,
-        before * s * after / 6.0,
-    ]
+    [-s * after * beyond / 6.0, 0.5 * before * after * beyond, -0.5 * before * s * beyond, before * s * after / 6.0]
 }
 
 /// A path of M steps built from its end, then its middle, then the middles of the halves …, so that the first and best
@@ -377,8 +387,7 @@ struct Knot {
 
 impl Bridge {
     fn new(steps: usize) -> Self {
-        let mut knots =
-            vec![Knot { at: steps, ends: [0, 0], weights: [0.0, 0.0], deviation: (steps as f64).sqrt() }];
+        let mut knots = vec![Knot { at: steps, ends: [0, 0], weights: [0.0, 0.0], deviation: (steps as f64).sqrt() }];
         let mut gaps = std::collections::VecDeque::from([[0, steps]]);
         while let Some([a, b]) = gaps.pop_front() {
             let at = a.midpoint(b);
@@ -402,7 +411,8 @@ impl Bridge {
                     let index = (first + lane as u32) & 0xFFFF;
                     let point = sobol_burley::sample(index, (2 * number + axis) as u32, seed);
                     // the middle of the 2⁻²³ that a single-precision number stands for
-                    let normal = -std::f64::consts::SQRT_2 * erfc_inv(2.0 * (f64::from(point) + 0.5 / f64::from(1 << 23)));
+                    let normal =
+                        -std::f64::consts::SQRT_2 * erfc_inv(2.0 * (f64::from(point) + 0.5 / f64::from(1 << 23)));
                     let [a, b] = knot.ends.map(|end| places[end]);
                     places[knot.at] = knot.weights[0] * a + knot.weights[1] * b + knot.deviation * normal;
                 }
