@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Lowest floor first; modules on one floor are siblings that do not know each other.
 const FLOORS: [&[&str]; 7] = [
     &["error"],
-    &["kind", "parallel", "work"],
+    &["formula", "kind", "parallel", "work"],
     &["geometry"],
     &["numerics"],
     &["density", "meshing", "physics"],
