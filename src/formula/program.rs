@@ -1,8 +1,8 @@
 use super::Formula;
 use super::graph::{Binary, Comparison, Graph, Id, Node, Unary, reordered};
 
-/// Doubles that fit the first cache: the registers of one block of points.
-const CACHE: usize = 4096;
+/// Doubles that stay in the second cache: the registers of one block of points.
+const CACHE: usize = 16384;
 
 /// Several formulas compiled for many points, their common parts computed once
 ///
