@@ -29,6 +29,7 @@ mod derivative;
 mod graph;
 mod parse;
 mod program;
+mod tokens;
 
 #[cfg(test)]
 mod tests;
