@@ -23,6 +23,7 @@ slow: test
 # Speeds, as ratios measured in one run.
 bench: $(VENV)/ready
 	$(CARGO) bench -p driftmesh --bench case_b
+	$(CARGO) bench -p driftmesh --bench formula
 	$(VENV)/bin/python benches/mesh_solve.py
 
 # The library's documentation, in target/doc.

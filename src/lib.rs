@@ -35,10 +35,11 @@
 //!
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
-//! Modules, lowest floor first: [`error`], [`geometry`], [`numerics`], then [`density`], [`meshing`] and [`physics`],
+//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`meshing`] and [`physics`],
 //! then [`simulation`], then [`study`].
 
 pub mod error;
+pub mod formula;
 mod kind;
 mod parallel;
 mod random;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Lowest floor first; modules on one floor are siblings that do not know each other.
 const FLOORS: [&[&str]; 8] = [
     &["error"],
-    &["kind", "parallel", "random", "setting", "work"],
+    &["formula", "kind", "parallel", "random", "setting", "work"],
     &["geometry"],
     &["numerics"],
     &["density", "meshing", "physics"],

@@ -1,0 +1,185 @@
+use super::Formula;
+use super::graph::{Binary, Comparison, Graph, Id, Node, Unary, reordered};
+
+/// Doubles that stay in the second cache: the registers of one block of points.
+const CACHE: usize = 16384;
+
+/// Several formulas compiled for many points, their common parts computed once
+///
+/// The first P variables have a value a point; the others, such as the time, are shared by all points of a call, and what
+/// depends on these alone is computed once a call. Formulas meet by the place of a variable, not by its name.
+///
+/// Points pass in blocks, operation by operation. Every value has the bits of [`Formula::eval`].
+///
+/// # Example
+/// ```
+/// use driftmesh::formula::{Formula, Program};
+/// let u = Formula::parse("x*y^2 + t", &["x", "y", "t"])?;
+/// let program = Program::new([&u, &u.derivative(0)?, &u.derivative(1)?]);
+/// let mut out = [[0.0; 3]; 2];
+/// program.eval_each(&[[1.0, 2.0], [3.0, -1.0]], &[0.5], &mut out);
+/// // u, u_x = y², u_y = 2xy at t = 0.5
+/// assert_eq!(out, [[4.5, 4.0, 4.0], [3.5, 1.0, -6.0]]);
+/// # Ok::<(), driftmesh::formula::Mistake>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Program<const P: usize, const K: usize> {
+    /// Operands first; before all others the `shared` operations that no variable of a point reaches.
+    pub(super) nodes: Vec<Node>,
+    shared: usize,
+    roots: [Id; K],
+}
+
+impl<const P: usize, const K: usize> Program<P, K> {
+    /// Compiles K formulas.
+    pub fn new(formulas: [&Formula; K]) -> Self {
+        let mut graph = Graph::default();
+        let roots = formulas.map(|formula| graph.import(&formula.nodes).last().copied().unwrap_or_default());
+        let mut shared: Vec<bool> = Vec::with_capacity(graph.nodes().len());
+        for node in graph.nodes() {
+            let mut own = !matches!(node, Node::Variable(v) if (*v as usize) < P);
+            node.each(|id| own &= shared[id as usize]);
+            shared.push(own);
+        }
+        let (first, then): (Vec<Id>, Vec<Id>) = (0..shared.len() as Id).partition(|&id| shared[id as usize]);
+        let (nodes, places) = reordered(graph.nodes(), first.iter().chain(&then).copied());
+        Self { nodes, shared: first.len(), roots: roots.map(|id| places[id as usize]) }
+    }
+
+    /// The values of all formulas at one point.
+    pub fn eval(&self, point: [f64; P], shared: &[f64]) -> [f64; K] {
+        let mut out = [[f64::NAN; K]];
+        self.eval_each(&[point], shared, &mut out);
+        out[0]
+    }
+
+    /// The values of all formulas at every point, as many as the shorter slice holds. `shared` has the values of the
+    /// variables from place P on; one without a value is NaN.
+    pub fn eval_each(&self, points: &[[f64; P]], shared: &[f64], out: &mut [[f64; K]]) {
+        let width = (CACHE / self.nodes.len().max(1)).clamp(8, 128).min(points.len()).max(1);
+        let mut rows = vec![0.0; self.nodes.len() * width];
+        for k in 0..self.shared {
+            let (done, to) = rows.split_at_mut(k * width);
+            match self.nodes[k] {
+                Node::Variable(v) => to[..width].fill(shared.get(v as usize - P).copied().unwrap_or(f64::NAN)),
+                node => step(node, done, width, &mut to[..width]),
+            }
+        }
+        for (points, out) in points.chunks(width).zip(out.chunks_mut(width)) {
+            for k in self.shared..self.nodes.len() {
+                let (done, to) = rows.split_at_mut(k * width);
+                let to = &mut to[..points.len()];
+                match self.nodes[k] {
+                    Node::Variable(v) => to.iter_mut().zip(points).for_each(|(to, point)| *to = point[v as usize]),
+                    node => step(node, done, width, to),
+                }
+            }
+            for (k, root) in self.roots.iter().enumerate() {
+                let values = &rows[*root as usize * width..];
+                out.iter_mut().zip(values).for_each(|(out, value)| out[k] = *value);
+            }
+        }
+    }
+}
+
+/// One operation on rows of `width` values, of which `to` has the first ones. Variables are the caller's.
+///
+/// All that an operation means stands here, for one point, for many and for constants alike; inlined, because for one
+/// point the rows fall away.
+#[inline(always)]
+pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
+    let lanes = to.len();
+    let row = |id: Id| &done[id as usize * width..][..lanes];
+    match node {
+        Node::Constant(bits) => to.fill(f64::from_bits(bits)),
+        Node::Variable(_) => debug_assert!(false, "a variable has no value here"),
+        Node::Unary(f, a) => {
+            let a = row(a);
+            match f {
+                Unary::Negate => each(to, a, |a| -a),
+                Unary::Sin => each(to, a, f64::sin),
+                Unary::Cos => each(to, a, f64::cos),
+                Unary::Tan => each(to, a, f64::tan),
+                Unary::Sinh => each(to, a, f64::sinh),
+                Unary::Cosh => each(to, a, f64::cosh),
+                Unary::Tanh => each(to, a, f64::tanh),
+                Unary::Exp => each(to, a, f64::exp),
+                Unary::Log => each(to, a, f64::ln),
+                Unary::Sqrt => each(to, a, f64::sqrt),
+                Unary::Abs => each(to, a, f64::abs),
+                Unary::Erf => each(to, a, libm::erf),
+                Unary::Sign => each(to, a, |a| if a == 0.0 || a.is_nan() { a } else { a.signum() }),
+            }
+        }
+        Node::Binary(f, a, b) => {
+            let (a, b) = (row(a), row(b));
+            match f {
+                Binary::Add => pairs(to, a, b, |a, b| a + b),
+                Binary::Subtract => pairs(to, a, b, |a, b| a - b),
+                Binary::Multiply => pairs(to, a, b, |a, b| a * b),
+                Binary::Divide => pairs(to, a, b, |a, b| a / b),
+                Binary::Power => pairs(to, a, b, f64::powf),
+                // std's drop NaN
+                Binary::Min => pairs(to, a, b, |a, b| if b < a || b.is_nan() { b } else { a }),
+                Binary::Max => pairs(to, a, b, |a, b| if b > a || b.is_nan() { b } else { a }),
+            }
+        }
+        Node::Power(a, n) => {
+            let a = row(a);
+            match n {
+                // without a loop a lane
+                2 => each(to, a, |a| power(a, 2)),
+                3 => each(to, a, |a| power(a, 3)),
+                4 => each(to, a, |a| power(a, 4)),
+                -1 => each(to, a, |a| power(a, -1)),
+                -2 => each(to, a, |a| power(a, -2)),
+                n => each(to, a, |a| power(a, n)),
+            }
+        }
+        Node::Choice(comparison, [left, right, a, b]) => {
+            let sides = row(left).iter().zip(row(right));
+            for ((to, (l, r)), (a, b)) in to.iter_mut().zip(sides).zip(row(a).iter().zip(row(b))) {
+                *to = if comparison.holds(*l, *r) { *a } else { *b };
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn each(to: &mut [f64], a: &[f64], f: impl Fn(f64) -> f64) {
+    to.iter_mut().zip(a).for_each(|(to, a)| *to = f(*a));
+}
+
+#[inline(always)]
+fn pairs(to: &mut [f64], a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
+    to.iter_mut().zip(a).zip(b).for_each(|((to, a), b)| *to = f(*a, *b));
+}
+
+/// aⁿ by repeated squaring; `powi` may round differently from call to call.
+#[inline(always)]
+fn power(a: f64, n: i32) -> f64 {
+    let (mut square, mut rest, mut product) = (a, n.unsigned_abs(), 1.0);
+    while rest > 0 {
+        if rest & 1 == 1 {
+            product *= square;
+        }
+        square *= square;
+        rest >>= 1;
+    }
+    if n < 0 { 1.0 / product } else { product }
+}
+
+impl Comparison {
+    /// Whether it holds; next to NaN only `!=` does.
+    #[inline]
+    pub fn holds(self, left: f64, right: f64) -> bool {
+        match self {
+            Self::Less => left < right,
+            Self::LessEqual => left <= right,
+            Self::Greater => left > right,
+            Self::GreaterEqual => left >= right,
+            Self::Equal => left == right,
+            Self::Unequal => left != right,
+        }
+    }
+}
