@@ -108,9 +108,9 @@ impl Decomposition {
                 for (d, [low, high]) in [a, b].into_iter().enumerate().filter(|&(d, _)| !self.wraps(d)) {
                     let n = cells[d];
                     let (from, to) = if periodic[d] {
-                        // both rings may be the same node, but a patch never overlaps itself
+                        // both rings may be the same node, but a patch never overlaps itself and holds its upper cut
                         let spare = n - (high - low);
-                        let down = more[0].min(spare);
+                        let down = more[0].min(spare / 2);
                         (low + n - down, high + n + more[1].min(spare - down))
                     } else {
                         (low.saturating_sub(more[0]), (high + more[1]).min(n))
