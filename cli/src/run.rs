@@ -1,6 +1,7 @@
 use crate::{StudyArgs, progress::Progress, terminal};
 use clap::Args;
 use driftmesh::Error;
+use driftmesh::meshing::Interface;
 use driftmesh::simulation::{Observer, RunDirectory, Summary};
 use driftmesh::study;
 use std::path::PathBuf;
@@ -42,6 +43,7 @@ impl Run {
             Ok(finished) => finished,
             Err(error) => return Ok(terminal::complain(&error, study.remedy(&error).or_else(|| error.help()), None)),
         };
+        finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
         if !self.quiet {
             terminal::say(table(&finished.summary));
             terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
@@ -63,28 +65,56 @@ impl Run {
 
 /// Time, error, mesh quality, work and seconds in a few lines.
 fn table(summary: &Summary) -> String {
-    let mut text = String::from("       t     l_inf        l2   Q max  Q mean   min J  equidist\n");
+    let compared = summary.reports.iter().any(|report| report.comparison.is_some());
+    let mut text = String::from("       t     l_inf        l2   Q max  Q mean   min J  equidist");
+    text += if compared { "   R max  R mean  mesh rms\n" } else { "\n" };
     for report in &summary.reports {
         let [linf, l2] = report.error.map_or(["-".into(), "-".into()], |e| [e.linf, e.l2].map(|e| format!("{e:.3e}")));
         let q = report.quality;
         text += &format!(
-            "{:8.4} {linf:>9} {l2:>9} {:7.3} {:7.3} {:7.4} {:9.3}\n",
+            "{:8.4} {linf:>9} {l2:>9} {:7.3} {:7.3} {:7.4} {:9.3}",
             report.t, q.q_max, q.q_mean, q.min_scaled_jacobian, q.equidistribution
         );
+        if let Some(c) = report.comparison {
+            text += &format!(" {:7.4} {:7.4} {:9.1e}", c.r_max, c.r_mean, c.mesh_rms);
+        }
+        text.push('\n');
+    }
+    if let Some(interface) = summary.reports.last().and_then(|report| report.interface) {
+        text += &interfaces(&interface);
     }
     let (total, s) = (summary.work, summary.seconds);
+    text += &format!(
+        "work     {} steps, {} Newton iterations, {} linear solves in {} iterations",
+        total.steps, total.work.newton_iterations, total.work.linear_solves, total.work.linear_iterations
+    );
+    if total.work.path_steps > 0 {
+        text += &format!(", {} path steps", total.work.path_steps);
+    }
+    text += &format!("\nseconds  {:.2} (", s.wall);
+    if s.interface > 0.0 {
+        text += &format!("interface {:.2}, ", s.interface);
+    }
     text + &format!(
-        "work     {} steps, {} Newton iterations, {} linear solves in {} iterations\n\
-         seconds  {:.2} (mesh {:.2}, pde {:.2}, monitor {:.2}, output {:.2}), {} threads",
-        total.steps,
-        total.work.newton_iterations,
-        total.work.linear_solves,
-        total.work.linear_iterations,
-        s.wall,
-        s.mesh,
-        s.pde,
-        s.monitor,
-        s.output,
-        summary.parallel.threads
+        "mesh {:.2}, pde {:.2}, monitor {:.2}, output {:.2}), {} threads",
+        s.mesh, s.pde, s.monitor, s.output, summary.parallel.threads
     )
+}
+
+/// How well the subdomains fit together at the end.
+fn interfaces(interface: &Interface) -> String {
+    let mut text = format!("between  {} interface points", interface.points);
+    if let (Some(error), Some(noise)) = (interface.standard_error, interface.noise) {
+        text += &format!(", standard error {error:.1e}, {:.2} % of the shortest edge", 100.0 * noise);
+    }
+    if interface.sweeps > 0 {
+        text += &format!(", {} sweeps a step", interface.sweeps);
+    }
+    if let Some(c) = interface.contraction {
+        text += &format!(
+            ", {} iterations a step, contraction {:.3} (at most {:.3})",
+            c.iterations, c.observed, c.predicted
+        );
+    }
+    text + "\n"
 }

@@ -9,6 +9,11 @@ pub fn say(text: impl std::fmt::Display) {
     let _ = writeln!(stdout(), "{text}");
 }
 
+/// Prints something that did not stop the program.
+pub fn warn(text: &str) {
+    let _ = writeln!(stderr(), "warning: {text}");
+}
+
 /// Prints an error with its remedy and a note, and says how the program ends.
 pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> ExitCode {
     let mut text = format!("error: {error}\n");

@@ -94,7 +94,10 @@ fn all_generators_agree_on_a_step() {
             let difference = largest_difference(&moved.mesh, &whole);
             assert!(difference < 1e-8, "schwarz {subdomains:?} on {periodic:?}: off by {difference:e}");
             let contraction = moved.interface.unwrap().contraction.unwrap();
-            assert!(contraction.observed <= contraction.predicted + 1e-9 && contraction.predicted < 1.0, "{contraction:?}");
+            assert!(
+                contraction.observed <= contraction.predicted + 1e-9 && contraction.predicted < 1.0,
+                "{contraction:?}"
+            );
         }
         for estimator in [
             EstimatorKind::default(),
@@ -159,7 +162,8 @@ fn grid_walks_are_unbiased() {
         let mut sides = start.x().to_vec();
         move_sides(&equation, &start, &rho, DT, &mut sides, &mut Default::default()).unwrap();
         let point = start.lattice().index([1, cells[1] / 3]);
-        let residual = EstimatorKind::ResidualWalk(ResidualWalk { sweeps: Auto::Value(2), walks: 20, ..Default::default() });
+        let residual =
+            EstimatorKind::ResidualWalk(ResidualWalk { sweeps: Auto::Value(2), walks: 20, ..Default::default() });
         for kind in [EstimatorKind::GridWalk(GridWalk { walks: 20, increment: false }), residual] {
             let runs: Vec<[f64; 2]> = (0..200)
                 .map(|seed| {
@@ -242,7 +246,8 @@ fn steep_densities_are_named_and_the_safe_gradient_carries_them() {
     let safe = Mmpde { relaxation: 1.0, gradient: Gradient::Safe };
     let moved = generator.step(&safe, &start, &rho, DT).unwrap();
     let whole = Whole::default().step(&safe, &start, &rho, DT).unwrap().mesh;
-    let (difference, noise) = (largest_difference(&moved.mesh, &whole), moved.interface.unwrap().standard_error.unwrap());
+    let (difference, noise) =
+        (largest_difference(&moved.mesh, &whole), moved.interface.unwrap().standard_error.unwrap());
     assert!(difference < 6.0 * noise, "off by {difference:e}, standard error {noise:e}");
 }
 
@@ -251,8 +256,7 @@ fn steep_densities_are_named_and_the_safe_gradient_carries_them() {
 fn noise_beyond_the_shortest_edge_is_refused() {
     let start = mesh([40, 40], [false; 2]);
     let rho = bump(&start, 5.0, 0.3);
-    let mut generator =
-        Stochastic::new([4, 4], 0, EstimatorKind::GridWalk(GridWalk { walks: 2, increment: false }));
+    let mut generator = Stochastic::new([4, 4], 0, EstimatorKind::GridWalk(GridWalk { walks: 2, increment: false }));
     let error = generator.step(&Mmpde::default(), &start, &rho, 0.04).unwrap_err();
     assert!(matches!(error, Failure::NoisyInterface { .. }), "{error}");
 }
