@@ -40,9 +40,9 @@ impl DualCells {
         let patch = Patch { origin: [0; 2], size: [n, m], wraps };
         let s = m + 2;
         // the node at a padded place, and how often it lies around the axis
-        let along = |d: usize, place: usize, n: usize| match wraps[d] {
-            true => ((place + n - 1) % n, ((place + n - 1) / n) as f64 - 1.0),
-            false => (place.clamp(1, n) - 1, 0.0),
+        let along = |d: usize, place: usize, n: usize| {
+            let above = place + n - 1;
+            if wraps[d] { (above % n, (above / n) as f64 - 1.0) } else { (place.clamp(1, n) - 1, 0.0) }
         };
         let mut x = Vec::with_capacity(patch.padded_len());
         for p in 0..n + 2 {
