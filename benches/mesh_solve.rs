@@ -4,7 +4,7 @@
 //! system there as `.npz` for `benches/mesh_solve.py`, which sets scipy beside it.
 
 use driftmesh::geometry::Patch;
-use driftmesh::meshing::{MeshGenerator, Mmpde, Whole};
+use driftmesh::meshing::{MeshGenerator, Mmpde, Moved, Whole};
 use driftmesh::numerics::linear::{Bicgstab, LatticeMatrix, LinearSolver, SparseLu};
 use driftmesh::simulation::{Record, State};
 use driftmesh::study::{MovingMesh, Source};
@@ -45,7 +45,7 @@ fn main() {
         let operator = Mmpde::default().operator(&lattice, &state.rho, DT).unwrap();
         let patch = Patch::whole(&lattice);
         // the sides at their new places
-        let (moved, _) = Whole::default().step(&Mmpde::default(), &state.mesh, &state.rho, DT).unwrap();
+        let Moved { mesh: moved, .. } = Whole::default().step(&Mmpde::default(), &state.mesh, &state.rho, DT).unwrap();
         let mut guess = state.mesh.x().to_vec();
         lattice.sides().for_each(|k| guess[k] = moved.x()[k]);
         let right: Vec<[f64; 2]> = patch.nodes(&lattice).map(|k| state.mesh.x()[k]).collect();

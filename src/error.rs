@@ -34,10 +34,30 @@ pub enum Failure {
         /// Where the node is.
         x: [f64; 2],
     },
+    /// A quantity that must be positive is not.
+    #[error("{what} is {value:.3e}, not positive, at node ({}, {}), x = {}, y = {}", node[0], node[1], short(x[0]), short(x[1]))]
+    NotPositive {
+        /// The quantity, in the reader's words.
+        what: &'static str,
+        /// The value found, at most 0.
+        value: f64,
+        /// Indices of the node along ξ and η.
+        node: [usize; 2],
+        /// Where the node is.
+        x: [f64; 2],
+    },
+    /// An equation that is made for periodic axes met a bounded one.
+    #[error("{what} need periodic axes, but axis {axis} is bounded")]
+    NotPeriodic {
+        /// The equation.
+        what: &'static str,
+        /// The axis.
+        axis: usize,
+    },
     /// Newton's method did not reach its tolerance.
     #[error("Newton's method stalled: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed")]
     NewtonStalled {
-        /// Largest residual, in the unit of the solution.
+        /// Largest residual, in the unit of the solution or as a share of its size.
         residual: f64,
         /// What was asked for.
         tolerance: f64,
@@ -116,6 +136,8 @@ impl Failure {
         match self {
             Self::Folded { .. } => "mesh-folded",
             Self::NonFinite { .. } => "non-finite",
+            Self::NotPositive { .. } => "not-positive",
+            Self::NotPeriodic { .. } => "not-periodic",
             Self::NewtonStalled { .. } => "newton-stalled",
             Self::LinearStalled { .. } => "linear-stalled",
             Self::SteepDensity { .. } => "steep-density",
@@ -131,6 +153,8 @@ impl Failure {
         match self {
             Self::Folded { .. } => "raise monitor.smoothing, lower monitor.strength or lower time.step",
             Self::NonFinite { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
+            Self::NotPositive { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
+            Self::NotPeriodic { .. } => "set domain.periodic to [true, true]",
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => "lower time.step or raise mesh.relaxation",
             Self::SteepDensity { .. } => {

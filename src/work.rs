@@ -9,7 +9,8 @@ use serde::Serialize;
 pub struct Work {
     /// Right-hand sides solved for, of every size (the sides of the domain included).
     pub linear_solves: usize,
-    /// Iterations of the linear solver (alternating-direction sweeps) over all systems; 0 for direct solves.
+    /// Iterations of the linear solver over all systems, alternating-direction sweeps or products with a block matrix; 0 for
+    /// direct solves.
     pub linear_iterations: usize,
     /// Newton iterations of the physics.
     pub newton_iterations: usize,

@@ -4,7 +4,7 @@ use driftmesh::density::{Arclength, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{MeshGenerator, Mmpde, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
-use driftmesh::physics::{Burgers, Convection, Motion, Physics};
+use driftmesh::physics::{Burgers, Convection, Motion, Physics, ShallowWater};
 use driftmesh::simulation::{RunDirectory, Schedule};
 use driftmesh::study::{MovingMesh, Source};
 use driftmesh::{Error, Failure};
@@ -51,6 +51,39 @@ fn non_finite() {
 }
 
 #[test]
+fn not_positive() {
+    let mesh = Mesh::uniform(Lattice::new([8, 8], [true; 2]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+    let mut values = vec![[1.0, 0.0, 0.0]; 64];
+    values[9][0] = -0.25;
+    let motion = Motion { t: 0.0, dt: 1e-3, old: &mesh, new: &mesh };
+    let error = ShallowWater::default().step(motion, &Field::nodal(values)).unwrap_err();
+    assert_eq!(error.name(), "not-positive");
+    let message = "the depth h is -2.500e-1, not positive, at node (1, 1), x = 0.1250, y = 0.1250";
+    assert_says(error, &[message], Some("time.step"), true);
+}
+
+/// Water that a step leaves dry is refused too: two nodes throw it out faster than there is any.
+#[test]
+fn run_dry() {
+    let mesh = Mesh::uniform(Lattice::new([16, 2], [true; 2]).unwrap(), [0.0; 2], [16.0, 2.0]).unwrap();
+    let velocity = |k: usize| [0.0, 40.0, 0.0, -40.0][k / 2 % 4];
+    let values: Vec<[f64; 3]> = (0..32).map(|k| [1.0, velocity(k), 0.0]).collect();
+    let motion = Motion { t: 0.0, dt: 0.05, old: &mesh, new: &mesh };
+    let error = ShallowWater::default().step(motion, &Field::nodal(values)).unwrap_err();
+    assert_says(error, &["the depth h is -"], Some("time.step"), true);
+}
+
+#[test]
+fn not_periodic() {
+    let mut water = ShallowWater::default();
+    let u = water.initial(0.0, &mesh());
+    let motion = Motion { t: 0.0, dt: 1e-3, old: &mesh(), new: &mesh() };
+    let error = water.step(motion, &u).unwrap_err();
+    assert_eq!(error.name(), "not-periodic");
+    assert_says(error, &["shallow water equations need periodic axes, but axis 0"], Some("domain.periodic"), true);
+}
+
+#[test]
 fn newton_stalled() {
     let mut burgers = Burgers::new(1e-6, Convection::Conservative).unwrap();
     let u = burgers.initial(0.5, &mesh());
@@ -93,6 +126,10 @@ fn invalid() {
     assert_says(Burgers::new(-1.0, Convection::Advective).unwrap_err(), &["`viscosity` is -1, but must"], None, false);
     assert_says(Lattice::bounded([1, 5]).unwrap_err(), &["`cells` is [1, 5]", "at least 2"], None, false);
     assert_says(Lattice::bounded([usize::MAX, 5]).unwrap_err(), &["cannot be counted"], None, false);
+    let dry = ShallowWater { pile: -10.0, ..ShallowWater::default() };
+    assert_says(dry.check().unwrap_err(), &["`pile` is -10", "above -depth = -10"], None, false);
+    let steep = ShallowWater { width: 0.0, ..ShallowWater::default() };
+    assert_says(steep.check().unwrap_err(), &["`width` is 0", "above 0"], None, false);
     assert_says(Schedule::new(1.0, 0.0, 0.1, vec![]).unwrap_err(), &["`end` is 0"], None, false);
 }
 

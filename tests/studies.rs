@@ -2,6 +2,7 @@
 //!
 //! The norms are those on which two other implementations agree, each with the tolerance that comes with it; the counters are this implementation's own and hold exactly.
 
+use driftmesh::geometry::DualCells;
 use driftmesh::simulation::{Event, Observer, Snapshot, Summary};
 use driftmesh::study::{MovingMesh, Source, run};
 use std::path::Path;
@@ -22,12 +23,16 @@ impl Observer for Node {
 
 fn rerun(name: &str) -> (Summary, Node) {
     let mut node = Node::default();
+    (rerun_with(name, &mut node), node)
+}
+
+fn rerun_with(name: &str, observer: &mut dyn Observer) -> Summary {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(format!("{name}.toml"));
     let study = MovingMesh::from_source(&Source::read(&file).unwrap()).unwrap();
     let out = tempfile::tempdir().unwrap();
-    let finished = run(&study, &out.path().join("run"), &mut [&mut node]).unwrap();
+    let finished = run(&study, &out.path().join("run"), &mut [observer]).unwrap();
     assert!(finished.failure.is_none(), "{name}: {:?}", finished.failure);
-    (finished.summary, node)
+    finished.summary
 }
 
 /// Values at the three report times, each within its tolerance, relative.
@@ -128,6 +133,48 @@ fn uniform_meshes() {
         assert_row(name, "Q mean", q_mean(&summary), [1.0; 3], [1e-12; 3]);
         assert_work(&summary, 2000, 2000, 3000);
     }
+}
+
+/// Mass, both momenta and energy of shallow water, by dual areas.
+#[derive(Default)]
+struct Totals {
+    history: Vec<[f64; 4]>,
+}
+
+impl Observer for Totals {
+    fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
+        let mut sums = [0.0; 4];
+        let values = snapshot.state.u.values().as_chunks::<3>().0;
+        for (area, [h, u, v]) in DualCells::new(&snapshot.state.mesh).areas().iter().zip(values) {
+            let density = [*h, h * u, h * v, 0.5 * h * (u * u + v * v) + 0.5 * h * h];
+            sums = std::array::from_fn(|c| sums[c] + area * density[c]);
+        }
+        self.history.push(sums);
+        Ok(())
+    }
+}
+
+/// Mass and momentum to round-off on the moving mesh, energy to the order of the scheme. All figures are this
+/// implementation's own.
+#[test]
+fn dam_break() {
+    let mut totals = Totals::default();
+    let summary = rerun_with("dam-break", &mut totals);
+    let start = totals.history[0];
+    let momentum = start[0] * 12.5_f64.sqrt();
+    for now in &totals.history {
+        assert!((now[0] / start[0] - 1.0).abs() < 1e-13, "mass {now:?}");
+        assert!(now[1].abs().max(now[2].abs()) < 1e-13 * momentum, "momentum {now:?}");
+        assert!((now[3] / start[3] - 1.0).abs() < 1e-5, "energy {:.2e}", now[3] / start[3] - 1.0);
+    }
+    for (report, [q_max, jacobian]) in summary.reports.iter().zip([[1.0285, 0.6469], [1.0081, 0.7967]]) {
+        assert!(report.conserved.drift.abs() <= 1e-14, "drift {:e}", report.conserved.drift);
+        let found = [report.quality.q_max, report.quality.min_scaled_jacobian];
+        assert!((found[0] / q_max - 1.0).abs().max((found[1] / jacobian - 1.0).abs()) < 1e-3, "{found:?}");
+    }
+    let work = summary.work.work;
+    assert_eq!([summary.work.steps, work.newton_iterations, work.linear_solves], [30, 90, 150]);
+    assert!(work.linear_iterations.abs_diff(1848) * 50 <= 1848, "{} iterations", work.linear_iterations);
 }
 
 /// No study is left out of the tests above.

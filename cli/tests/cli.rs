@@ -395,7 +395,7 @@ fn settings_override_choices() {
 fn list_names_every_kind() {
     let sandbox = Sandbox::new();
     let all = String::from_utf8(sandbox.call(&["list"]).stdout).unwrap();
-    for part in ["pdes (pde.kind)", "burgers", "arclength", "whole", "fixed"] {
+    for part in ["pdes (pde.kind)", "burgers", "shallow-water", "arclength", "whole", "fixed"] {
         assert!(all.contains(part), "{part:?} is not in\n{all}");
     }
     let generators = String::from_utf8(sandbox.call(&["list", "generators"]).stdout).unwrap();

@@ -14,6 +14,17 @@ impl Field {
         Self { components: 1, values }
     }
 
+    /// A field of K unknowns from their values at every node.
+    ///
+    /// # Example
+    /// ```
+    /// let field = driftmesh::geometry::Field::nodal(vec![[1.0, 2.0], [3.0, 4.0]]);
+    /// assert_eq!(field.component(1).collect::<Vec<_>>(), [2.0, 4.0]);
+    /// ```
+    pub fn nodal<const K: usize>(values: Vec<[f64; K]>) -> Self {
+        Self { components: K, values: values.into_flattened() }
+    }
+
     /// Unknowns a node.
     pub fn components(&self) -> usize {
         self.components

@@ -1,5 +1,6 @@
 //! Where things are: the lattice of computational nodes, the mesh over it, fields on it, and how good the mesh is.
 
+mod dual;
 mod field;
 mod lattice;
 mod locate;
@@ -7,6 +8,7 @@ mod mesh;
 mod patch;
 mod quality;
 
+pub use dual::DualCells;
 pub use field::Field;
 pub use lattice::Lattice;
 pub(crate) use lattice::strides;

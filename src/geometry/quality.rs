@@ -27,11 +27,11 @@ pub struct Quality {
 /// Corners of a cell, counter-clockwise: (i, j), (i+1, j), (i+1, j+1), (i, j+1).
 type Corners = [[f64; 2]; 4];
 
-fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+pub(super) fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(super) fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 

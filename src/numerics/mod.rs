@@ -8,9 +8,29 @@ pub(crate) fn larger(m: f64, value: f64) -> f64 {
     if value.abs() <= m || m.is_nan() { m } else { value.abs() }
 }
 
+/// Sum whose round-off does not grow with the number of terms, in order
+///
+/// # Source
+/// Neumaier, *Rundungsfehleranalyse einiger Verfahren zur Summation endlicher Summen* (1974).
+pub(crate) fn sum(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut lost) = (0.0_f64, 0.0);
+    for value in values {
+        let next = sum + value;
+        lost += if sum.abs() >= value.abs() { (sum - next) + value } else { (value - next) + sum };
+        sum = next;
+    }
+    sum + lost
+}
+
 #[cfg(test)]
 mod tests {
-    use super::larger;
+    use super::{larger, sum};
+
+    /// What ordinary addition loses beside 1e16 is kept.
+    #[test]
+    fn sums_keep_what_is_small() {
+        assert_eq!(sum([1.0, 1e16, 1.0, -1e16].into_iter()), 2.0);
+    }
 
     /// A NaN stays, wherever it stands; `f64::max` would drop it.
     #[test]

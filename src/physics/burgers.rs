@@ -1,4 +1,4 @@
-use super::{Motion, Physics, check_finite, curvilinear::Stencils};
+use super::{Motion, Physics, check_finite, curvilinear::Stencils, nodal};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, Patch};
 use crate::numerics::larger;
@@ -148,6 +148,7 @@ impl Physics for Burgers {
 
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
         let Motion { t, dt, old, new } = motion;
+        let start = nodal::<1>(motion, u)?;
         let lattice = new.lattice();
         let patch = Patch::whole(lattice);
         let [width, height] = new.extent();
@@ -166,7 +167,7 @@ impl Physics for Burgers {
             Some((mesh, stencils)) if mesh == *old => stencils,
             _ => Stencils::new(&patch, &x_old),
         };
-        let u_old = patch.gather(lattice, u.values().as_chunks::<1>().0, [[0.0]; 2]);
+        let u_old = patch.gather(lattice, start, [[0.0]; 2]);
         let mut known = vec![0.0; patch.len()];
         parallel::for_each_row(&mut known, n, |p, known| {
             for (known, (i, k)) in known.iter_mut().zip(places(p)) {
@@ -226,7 +227,7 @@ impl Physics for Burgers {
             }
         };
         patch.scatter(lattice, &u_new, solution.values_mut().as_chunks_mut::<1>().0, [[0.0]; 2]);
-        check_finite("u", new, solution.values())?;
+        check_finite(["u"], new, solution.values().as_chunks().0)?;
         self.newest = Some((new.clone(), stencils));
         stalled.map_or(Ok((solution, work)), Err)
     }

@@ -37,12 +37,8 @@ impl Stencils {
             let start = patch.pencil(p);
             let mut south = face(x, start - 1, 1, s);
             for (k, (gradient, laplacian)) in (start..).zip(gradient.iter_mut().zip(laplacian)) {
-                let (xi, eta) = (minus(x[k + s], x[k - s]), minus(x[k + 1], x[k - 1]));
-                let inverse = 1.0 / cross(xi, eta);
-                let above = [eta[1] * inverse, -eta[0] * inverse];
-                let right = [-xi[1] * inverse, xi[0] * inverse];
-                *gradient = [above.map(|v| -v), above, right.map(|v| -v), right];
-
+                let inverse;
+                (*gradient, inverse) = gradient_and_inverse(x, k, [s, 1]);
                 let (west, east, north) = (face(x, k - s, s, 1), face(x, k, s, 1), face(x, k, 1, s));
                 let scale = 4.0 * inverse;
                 *laplacian = [
@@ -62,6 +58,20 @@ impl Stencils {
         });
         Self { gradient, laplacian }
     }
+}
+
+/// Weights of u_x and u_y at place k for the four neighbours of the star.
+pub(super) fn gradient(x: &[[f64; 2]], k: usize, strides: [usize; 2]) -> [[f64; 2]; 4] {
+    gradient_and_inverse(x, k, strides).0
+}
+
+/// The weights, and 1/J in undivided differences.
+fn gradient_and_inverse(x: &[[f64; 2]], k: usize, [s, t]: [usize; 2]) -> ([[f64; 2]; 4], f64) {
+    let (xi, eta) = (minus(x[k + s], x[k - s]), minus(x[k + t], x[k - t]));
+    let inverse = 1.0 / cross(xi, eta);
+    let above = [eta[1] * inverse, -eta[0] * inverse];
+    let right = [-xi[1] * inverse, xi[0] * inverse];
+    ([above.map(|v| -v), above, right.map(|v| -v), right], inverse)
 }
 
 /// The face between nodes k and k + `step`; `side` leads along it.

@@ -2,12 +2,15 @@
 
 mod burgers;
 mod curvilinear;
+mod shallow_water;
 
 pub use burgers::{Burgers, Convection};
+pub use shallow_water::{ShallowWater, WaterForm};
 
 use crate::error::{Failure, Result};
-use crate::geometry::{Field, Mesh};
+use crate::geometry::{Field, Mesh, node_areas};
 use crate::kind::kinds;
+use crate::numerics::sum;
 use crate::work::Work;
 
 /// One time step over a mesh that moves.
@@ -42,6 +45,11 @@ pub trait Physics: Send {
         None
     }
 
+    /// ∫ of the first unknown, by the areas for which a conservative scheme keeps it.
+    fn conserved(&self, mesh: &Mesh<2>, u: &Field) -> f64 {
+        sum(node_areas(mesh).iter().zip(u.component(0)).map(|(area, u)| area * u))
+    }
+
     /// The exact solution where it is known.
     fn exact(&self, _t: f64, _mesh: &Mesh<2>) -> Option<Field> {
         None
@@ -52,6 +60,7 @@ kinds! {
     /// `[pde]` of a study.
     PdeKind {
         "burgers" = Burgers: "u_t + u u_x + u u_y = nu (u_xx + u_yy), an oblique front with exact solution",
+        "shallow-water" = ShallowWater: "h_t + div(h u) = 0, (h u)_t + div(h u u) + grad(g h^2/2) = 0, a pile of water that collapses",
     }
 }
 
@@ -63,6 +72,7 @@ impl PdeKind {
     pub fn check(&self) -> Result<()> {
         match self {
             Self::Burgers(burgers) => burgers.check(),
+            Self::ShallowWater(water) => water.check(),
         }
     }
 
@@ -70,14 +80,32 @@ impl PdeKind {
     pub fn into_physics(self) -> Box<dyn Physics> {
         match self {
             Self::Burgers(burgers) => Box::new(burgers),
+            Self::ShallowWater(water) => Box::new(water),
         }
     }
 }
 
-/// Refuses values that are not finite, one unknown a node.
-fn check_finite(what: &'static str, mesh: &Mesh<2>, values: &[f64]) -> Result<(), Failure> {
-    match values.iter().position(|v| !v.is_finite()) {
+/// The K values a node of a solution at the start of a step, where it and both meshes belong to one lattice.
+fn nodal<'a, const K: usize>(motion: Motion<'_>, u: &'a Field) -> Result<&'a [[f64; K]], Failure> {
+    let (lattice, expected) = (motion.new.lattice(), motion.new.lattice().len());
+    let (nodes, rest) = u.values().as_chunks::<K>();
+    if motion.old.lattice() != lattice {
+        return Err(Failure::WrongLength { what: "the old mesh", found: motion.old.x().len(), expected });
+    }
+    if nodes.len() != expected || !rest.is_empty() {
+        return Err(Failure::WrongLength { what: "the solution", found: nodes.len(), expected });
+    }
+    Ok(nodes)
+}
+
+/// Refuses values that are not finite.
+fn check_finite<const K: usize>(what: [&'static str; K], mesh: &Mesh<2>, values: &[[f64; K]]) -> Result<(), Failure> {
+    match values.as_flattened().iter().position(|v| !v.is_finite()) {
         None => Ok(()),
-        Some(k) => Err(Failure::NonFinite { what, value: values[k], node: mesh.lattice().node(k), x: mesh.x()[k] }),
+        Some(place) => {
+            let (k, c) = (place / K, place % K);
+            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+            Err(Failure::NonFinite { what: what[c], value: values[k][c], node, x })
+        }
     }
 }

@@ -123,7 +123,7 @@ impl Simulation {
 
     fn run_steps(&mut self, state: &mut State, record: &mut Record, observers: &mut [&mut dyn Observer]) -> Result<()> {
         let started = Instant::now();
-        let mass_at_start = mass(state);
+        let mass_at_start = self.physics.conserved(&state.mesh, &state.u);
         self.show(Event::Started, state, record, observers, 0.0, started)?;
         if self.schedule.reports_at(state.t) {
             let report = self.report(state, mass_at_start, record.interface);
@@ -206,7 +206,7 @@ impl Simulation {
     }
 
     fn report(&self, state: &State, mass_at_start: f64, interface: Option<Interface>) -> Report {
-        let mass = mass(state);
+        let mass = self.physics.conserved(&state.mesh, &state.u);
         let drift = if mass_at_start == 0.0 { mass } else { (mass - mass_at_start) / mass_at_start.abs() };
         Report {
             t: state.t,
@@ -217,11 +217,6 @@ impl Simulation {
             comparison: None,
         }
     }
-}
-
-/// ∫u dA of the first unknown.
-fn mass(state: &State) -> f64 {
-    node_areas(&state.mesh).iter().zip(state.u.component(0)).map(|(area, u)| area * u).sum()
 }
 
 /// Time and result of a computation.

@@ -186,10 +186,7 @@ impl MovingMesh {
             let rule = "must be 1 to 100 of the characters a-z A-Z 0-9 - _ . and not begin with a dot";
             return Err(Error::invalid("study.name", format!("{name:?}"), rule));
         }
-        if self.domain.periodic != [false; 2] {
-            let rule = "every kind of PDE here needs bounded axes; set it to [false, false]";
-            return Err(Error::invalid("domain.periodic", format!("{:?}", self.domain.periodic), rule));
-        }
+        self.check_axes()?;
         self.check_size()?;
         let lattice = *self.initial_mesh()?.lattice();
         self.mesh.generator.check(&lattice).map_err(|error| error.within("generator").within("mesh"))?;
@@ -206,6 +203,22 @@ impl MovingMesh {
         let steps = self.schedule()?.steps();
         let frames = self.output.frames.get_or_insert(FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)));
         frames.check().map_err(|error| error.within("output"))
+    }
+
+    /// Refuses axes that the equation is not made for.
+    fn check_axes(&self) -> Result<()> {
+        let (needed, rule) = match self.pde {
+            PdeKind::Burgers(_) => {
+                ([false; 2], "the front of pde.kind = \"burgers\" needs bounded axes; set it to [false, false]")
+            }
+            PdeKind::ShallowWater(_) => {
+                ([true; 2], "pde.kind = \"shallow-water\" needs periodic axes; set it to [true, true]")
+            }
+        };
+        if self.domain.periodic == needed {
+            return Ok(());
+        }
+        Err(Error::invalid("domain.periodic", format!("{:?}", self.domain.periodic), rule))
     }
 
     /// Memory that the run needs, in bytes.

@@ -1,4 +1,4 @@
-use super::{LatticeMatrix, LinearSolver, solved, stalled};
+use super::{Entry, LatticeMatrix, LinearSolver, solved, stalled};
 use crate::error::Failure;
 use crate::geometry::Patch;
 use faer::linalg::solvers::Solve;
@@ -21,10 +21,13 @@ impl std::fmt::Debug for SparseLu {
 }
 
 impl SparseLu {
-    fn factorise<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> Option<Lu<usize, f64>> {
+    fn factorise<const D: usize, const S: usize, const K: usize, E: Entry<K>>(
+        &mut self,
+        a: &LatticeMatrix<D, S, E>,
+    ) -> Option<Lu<usize, f64>> {
         let matrix = assemble(a)?;
         let wraps = a.patch.wraps.iter().map(|&w| usize::from(w));
-        let pattern: Vec<usize> = a.patch.size.into_iter().chain(wraps).chain([S]).collect();
+        let pattern: Vec<usize> = a.patch.size.into_iter().chain(wraps).chain([S, E::COUPLED]).collect();
         if self.symbolic.as_ref().is_none_or(|(known, _)| *known != pattern) {
             self.symbolic = Some((pattern, SymbolicLu::try_new(matrix.symbolic()).ok()?));
         }
@@ -34,12 +37,15 @@ impl SparseLu {
 }
 
 /// The matrix on the unknowns alone; entries for the ring are dropped, since corrections vanish there.
-fn assemble<const D: usize, const S: usize>(a: &LatticeMatrix<D, S>) -> Option<SparseColMat<usize, f64>> {
+fn assemble<const D: usize, const S: usize, const K: usize, E: Entry<K>>(
+    a: &LatticeMatrix<D, S, E>,
+) -> Option<SparseColMat<usize, f64>> {
     let Patch { size, wraps, .. } = a.patch;
     let strides = crate::geometry::strides(size);
-    let mut entries = Vec::with_capacity(a.rows.len() * S);
+    let block = E::COUPLED;
+    let mut entries = Vec::with_capacity(a.rows.len() * S * block * block);
     for (i, row) in a.rows.iter().enumerate() {
-        'points: for (point, &value) in LatticeMatrix::<D, S>::POINTS.iter().zip(row) {
+        'points: for (point, entry) in LatticeMatrix::<D, S, E>::POINTS.iter().zip(row) {
             let mut column = 0;
             for d in 0..D {
                 let k = (i / strides[d] % size[d]) as isize + point[d];
@@ -49,16 +55,19 @@ fn assemble<const D: usize, const S: usize>(a: &LatticeMatrix<D, S>) -> Option<S
                 }
                 column += k.rem_euclid(n) as usize * strides[d];
             }
-            entries.push(Triplet::new(i, column, value));
+            for (r, c) in (0..block).flat_map(|r| (0..block).map(move |c| (r, c))) {
+                entries.push(Triplet::new(i * block + r, column * block + c, entry.coefficient(r, c)));
+            }
         }
     }
-    SparseColMat::try_new_from_triplets(a.rows.len(), a.rows.len(), &entries).ok()
+    let n = a.rows.len() * block;
+    SparseColMat::try_new_from_triplets(n, n, &entries).ok()
 }
 
-impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for SparseLu {
+impl<const D: usize, const S: usize, const K: usize, E: Entry<K>> LinearSolver<D, S, K, E> for SparseLu {
     fn solve(
         &mut self,
-        a: &LatticeMatrix<D, S>,
+        a: &LatticeMatrix<D, S, E>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],
@@ -72,15 +81,17 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for S
         if let Some(lu) = self.factorise(a) {
             // one pass solves; more refine what round-off left
             for _pass in 0..3 {
-                let mut unknowns = faer::Mat::<f64>::zeros(a.rows.len(), K);
+                // values of one system below each other, systems side by side
+                let at = |i: usize, c: usize| (i * E::COUPLED + c % E::COUPLED, c / E::COUPLED);
+                let mut unknowns = faer::Mat::<f64>::zeros(a.rows.len() * E::COUPLED, K / E::COUPLED);
                 let places = || a.patch.pencils().flat_map(|start| start..start + n).enumerate();
                 for (i, k) in places() {
-                    (0..K).for_each(|c| unknowns[(i, c)] = r[k][c]);
+                    (0..K).for_each(|c| unknowns[at(i, c)] = r[k][c]);
                 }
                 lu.solve_in_place(&mut unknowns);
                 let mut correction = vec![[0.0; K]; a.patch.padded_len()];
                 for (i, k) in places() {
-                    correction[k] = std::array::from_fn(|c| unknowns[(i, c)]);
+                    correction[k] = std::array::from_fn(|c| unknowns[at(i, c)]);
                 }
                 a.patch.wrap(&mut correction);
                 for (x, e) in x.iter_mut().zip(&correction) {
@@ -96,6 +107,6 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for S
                 }
             }
         }
-        Err(stalled(a.rows.len(), sizes, tolerance, 0))
+        Err(stalled(a.rows.len() * E::COUPLED, sizes, tolerance, 0))
     }
 }

@@ -1,14 +1,18 @@
 //! Linear systems on a patch of the lattice.
 //!
 //! A [`LatticeMatrix`] couples every unknown of a [`Patch`] to its nearest neighbours. [`LinearSolver`] is the seam:
-//! [`Bicgstab`] is the fast way, [`SparseLu`] the oracle and the last resort, [`Fallback`] one after the other.
+//! [`Bicgstab`] is the fast way, [`BlockBicgstab`] that of several unknowns a node, [`SparseLu`] the oracle and the last
+//! resort, [`Fallback`] one after the other.
 
 mod adi;
 mod bicgstab;
+mod block;
+mod krylov;
 mod lu;
 mod relaxation;
 
 pub use bicgstab::Bicgstab;
+pub use block::BlockBicgstab;
 pub use lu::SparseLu;
 pub use relaxation::{Smoother, relax};
 
@@ -23,12 +27,58 @@ use crate::parallel;
 /// along each axis in turn. In two dimensions S = 9 adds the corners (−,−), (−,+), (+,−), (+,+).
 ///
 /// Rows are scaled such that the identity of `I − Δt A` is there with weight one; solvers rely on it.
+///
+/// An [`Entry`] is a number, or a block that couples the unknowns of a node ([`BlockMatrix`]).
 #[derive(Debug, Clone)]
-pub struct LatticeMatrix<const D: usize, const S: usize> {
+pub struct LatticeMatrix<const D: usize, const S: usize, E = f64> {
     /// The unknowns.
     pub patch: Patch<D>,
     /// One row an unknown, last axis fastest.
-    pub rows: Vec<[f64; S]>,
+    pub rows: Vec<[E; S]>,
+}
+
+/// A matrix that couples B unknowns a node, row by row of each block the equations of the node.
+pub type BlockMatrix<const D: usize, const S: usize, const B: usize> = LatticeMatrix<D, S, [[f64; B]; B]>;
+
+/// What a matrix holds for a pair of nodes, and how it acts on the K values of one
+///
+/// A number acts on all of them alike: they belong to K systems that share the matrix. A block mixes them: they are K
+/// unknowns of one system.
+pub trait Entry<const K: usize>: Copy + Send + Sync {
+    /// How many of the K values belong to one system.
+    const COUPLED: usize;
+
+    /// Adds the product with the values of a node to `sum`.
+    fn add_product(&self, x: &[f64; K], sum: &mut [f64; K]);
+
+    /// The coefficient of unknown `column` in equation `row`, both below `COUPLED`.
+    fn coefficient(&self, row: usize, column: usize) -> f64;
+}
+
+impl<const K: usize> Entry<K> for f64 {
+    const COUPLED: usize = 1;
+
+    fn add_product(&self, x: &[f64; K], sum: &mut [f64; K]) {
+        (0..K).for_each(|c| sum[c] += self * x[c]);
+    }
+
+    fn coefficient(&self, _row: usize, _column: usize) -> f64 {
+        *self
+    }
+}
+
+impl<const K: usize> Entry<K> for [[f64; K]; K] {
+    const COUPLED: usize = K;
+
+    fn add_product(&self, x: &[f64; K], sum: &mut [f64; K]) {
+        for (sum, row) in sum.iter_mut().zip(self) {
+            (0..K).for_each(|c| *sum += row[c] * x[c]);
+        }
+    }
+
+    fn coefficient(&self, row: usize, column: usize) -> f64 {
+        self[row][column]
+    }
 }
 
 impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
@@ -36,7 +86,16 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
     pub fn zero(patch: Patch<D>) -> Self {
         Self { patch, rows: vec![[0.0; S]; patch.len()] }
     }
+}
 
+impl<const D: usize, const S: usize, const B: usize> BlockMatrix<D, S, B> {
+    /// A matrix of zero blocks.
+    pub fn zero_blocks(patch: Patch<D>) -> Self {
+        Self { patch, rows: vec![[[[0.0; B]; B]; S]; patch.len()] }
+    }
+}
+
+impl<const D: usize, const S: usize, E> LatticeMatrix<D, S, E> {
     /// Steps to the S points of the stencil, in units of nodes along each axis.
     pub const POINTS: [[isize; D]; S] = {
         assert!(S == 2 * D + 1 || (D == 2 && S == 9), "a star, or the nine points of two dimensions");
@@ -69,7 +128,9 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
         x: &[[f64; K]],
         out: &mut [[f64; K]],
         f: impl Fn(usize, usize, [f64; K]) -> [f64; K] + Sync,
-    ) {
+    ) where
+        E: Entry<K>,
+    {
         let offsets = self.offsets();
         let n = self.patch.pencil_len();
         parallel::for_each_row(out, n + 2, |q, out| {
@@ -82,9 +143,7 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
             for (j, (row, out)) in rows.iter().zip(&mut out[1..=n]).enumerate() {
                 let mut sum = [0.0; K];
                 for s in 0..S {
-                    for c in 0..K {
-                        sum[c] += row[s] * neighbours[s][j][c];
-                    }
+                    row[s].add_product(&neighbours[s][j], &mut sum);
                 }
                 *out = f(p * n + j, q * (n + 2) + 1 + j, sum);
             }
@@ -92,18 +151,27 @@ impl<const D: usize, const S: usize> LatticeMatrix<D, S> {
     }
 
     /// `out` = A x on the unknowns of padded vectors.
-    pub fn multiply<const K: usize>(&self, x: &[[f64; K]], out: &mut [[f64; K]]) {
+    pub fn multiply<const K: usize>(&self, x: &[[f64; K]], out: &mut [[f64; K]])
+    where
+        E: Entry<K>,
+    {
         self.apply(x, out, |_, _, ax| ax);
     }
 
     /// `out` = v − A x on the unknowns of padded vectors.
-    fn difference<const K: usize>(&self, v: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) {
+    fn difference<const K: usize>(&self, v: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]])
+    where
+        E: Entry<K>,
+    {
         self.apply(x, out, |_, k, ax| std::array::from_fn(|c| v[k][c] - ax[c]));
     }
 
     /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown and the ring of `out` zero; returns
     /// the largest |b − A x| of each right-hand side, NaN where there is one.
-    pub fn residual<const K: usize>(&self, b: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) -> [f64; K] {
+    pub fn residual<const K: usize>(&self, b: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) -> [f64; K]
+    where
+        E: Entry<K>,
+    {
         self.apply(x, out, |i, _, ax| std::array::from_fn(|c| b[i][c] - ax[c]));
         let mut sizes = [0.0; K];
         for r in out {
@@ -125,19 +193,20 @@ fn stalled<const K: usize>(unknowns: usize, sizes: [f64; K], tolerance: [f64; K]
     Failure::LinearStalled { unknowns, residual: sizes[worst], tolerance: tolerance[worst], iterations }
 }
 
-/// Solves A x = b for K right-hand sides that share one matrix
+/// Solves A x = b for K right-hand sides that share one matrix, or for K unknowns a node where the entries are blocks
 ///
 /// `b` has one value an unknown. `x` is padded: on entry its ring holds the known values and its unknowns the guess; on
-/// success its unknowns hold the solution, and the images of wrapping axes have moved along. The largest residual of right-hand side c is then at most
-/// `tolerance[c]`, in the unit of b, checked on the solution itself. Returns the number of iterations, 0 for a direct method.
+/// success its unknowns hold the solution, and the images of wrapping axes have moved along. The largest residual of
+/// right-hand side or equation c is then at most `tolerance[c]`, in the unit of b, checked on the solution itself.
+/// Returns the number of iterations, 0 for a direct method.
 ///
 /// # Errors
 /// [`Failure::LinearStalled`] with the residual reached; `x` then holds no solution.
-pub trait LinearSolver<const D: usize, const S: usize, const K: usize>: Send {
+pub trait LinearSolver<const D: usize, const S: usize, const K: usize, E = f64>: Send {
     /// See the trait.
     fn solve(
         &mut self,
-        a: &LatticeMatrix<D, S>,
+        a: &LatticeMatrix<D, S, E>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],
@@ -151,14 +220,17 @@ pub struct Fallback<First, Then>(First, Then);
 /// What the library uses: fast where it converges, direct where it does not.
 pub type Robust<const K: usize> = Fallback<Bicgstab<K>, SparseLu>;
 
-impl<const D: usize, const S: usize, const K: usize, First, Then> LinearSolver<D, S, K> for Fallback<First, Then>
+/// [`Robust`] for B coupled unknowns a node.
+pub type RobustBlock<const B: usize> = Fallback<BlockBicgstab<B>, SparseLu>;
+
+impl<const D: usize, const S: usize, const K: usize, E, First, Then> LinearSolver<D, S, K, E> for Fallback<First, Then>
 where
-    First: LinearSolver<D, S, K>,
-    Then: LinearSolver<D, S, K>,
+    First: LinearSolver<D, S, K, E>,
+    Then: LinearSolver<D, S, K, E>,
 {
     fn solve(
         &mut self,
-        a: &LatticeMatrix<D, S>,
+        a: &LatticeMatrix<D, S, E>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],

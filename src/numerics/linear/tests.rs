@@ -43,6 +43,61 @@ proptest! {
     }
 }
 
+/// A block system as a step of waves makes it: diagonal blocks near [[1, 0, 0], [u, h, 0], [v, 0, h]], neighbours at most
+/// `a` in each entry.
+fn block_sample<const S: usize>(size: [usize; 2], wraps: [bool; 2], a: f64, seed: u64) -> BlockMatrix<2, S, 3> {
+    let mut matrix = BlockMatrix::<2, S, 3>::zero_blocks(Patch { origin: [1, 1], size, wraps });
+    let mut state = seed;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 40) as f64 / (1_u64 << 23) as f64 - 1.0
+    };
+    for row in &mut matrix.rows {
+        row.iter_mut().flatten().flatten().for_each(|entry| *entry = a * random());
+        let (h, u, v) = (2.0 + random(), random(), random());
+        let own = [[1.0, 0.0, 0.0], [u, h, 0.0], [v, 0.0, h]];
+        (0..9).for_each(|k| row[0][k / 3][k % 3] += own[k / 3][k % 3]);
+    }
+    matrix
+}
+
+fn compare_blocks<const S: usize>(matrix: &BlockMatrix<2, S, 3>) {
+    let values = |n: usize| -> Vec<[f64; 3]> {
+        wave(n).into_iter().enumerate().map(|(k, [a, b])| [a, b, (0.2 * k as f64).cos()]).collect()
+    };
+    let b = values(matrix.rows.len());
+    let mut fast = values(matrix.patch.padded_len());
+    matrix.patch.wrap(&mut fast);
+    let mut exact = fast.clone();
+    BlockBicgstab::default().solve(matrix, &b, &mut fast, [1e-12, 2e-12, 3e-12]).expect("the iteration converges");
+    SparseLu::default().solve(matrix, &b, &mut exact, [1e-12; 3]).expect("the factorisation exists");
+    for (f, e) in fast.as_flattened().iter().zip(exact.as_flattened()) {
+        assert!((f - e).abs() < 1e-10, "{f} against {e}");
+    }
+}
+
+proptest! {
+    /// The iteration and the direct solver agree to 1e-10 on blocks too.
+    #[test]
+    fn both_block_solvers_agree(n in 2_usize..20, m in 2_usize..20, wx: bool, wy: bool, a in 0.0..0.1_f64, seed: u64) {
+        compare_blocks(&block_sample::<5>([n, m], [wx, wy], a, seed));
+        compare_blocks(&block_sample::<9>([n, m], [wx, wy], 0.5 * a, seed));
+    }
+}
+
+/// A singular block on the diagonal stops the iteration, not the direct solver; a singular system stops both.
+#[test]
+fn blocks_fall_back_on_the_direct_solver() {
+    let mut matrix = block_sample::<5>([5, 4], [true, false], 0.1, 7);
+    matrix.rows[3][0] = [[0.0; 3]; 3];
+    let mut x = vec![[0.0; 3]; 42];
+    assert!(BlockBicgstab::default().solve(&matrix, &[[1.0; 3]; 20], &mut x, [1e-12; 3]).is_err());
+    RobustBlock::default().solve(&matrix, &[[1.0; 3]; 20], &mut x, [1e-11; 3]).unwrap();
+    matrix.rows[3] = [[[0.0; 3]; 3]; 5];
+    let error = RobustBlock::default().solve(&matrix, &[[1.0; 3]; 20], &mut x, [1e-11; 3]).unwrap_err();
+    assert!(matches!(error, Failure::LinearStalled { .. }), "{error}");
+}
+
 /// In one dimension the alternating-direction factorisation is the inverse itself: one iteration, any strength.
 #[test]
 fn one_dimension_takes_one_iteration() {
