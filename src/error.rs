@@ -153,7 +153,9 @@ impl Failure {
         match self {
             Self::Folded { .. } => "raise monitor.smoothing, lower monitor.strength or lower time.step",
             Self::NonFinite { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
-            Self::NotPositive { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
+            Self::NotPositive { .. } => {
+                "mend the formula that gives it, if one does; else lower time.step or refine grid.cells"
+            }
             Self::NotPeriodic { .. } => "set domain.periodic to [true, true]",
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => "lower time.step or raise mesh.relaxation",
@@ -200,6 +202,20 @@ pub enum Error {
         /// What must hold, and how to make it hold.
         rule: String,
     },
+    /// A setting is no formula.
+    #[error("`{key}`: {message}\n  {text}\n  {}", carets(text, at))]
+    Formula {
+        /// Dotted key as in a study file.
+        key: String,
+        /// The formula.
+        text: String,
+        /// The bytes of it that are meant.
+        at: std::ops::Range<usize>,
+        /// What is wrong.
+        message: String,
+        /// The remedy.
+        help: Option<String>,
+    },
     /// A study file (or a `--set`) is wrong at a known place.
     #[error("{0}")]
     Study(Box<Diagnostic>),
@@ -245,6 +261,13 @@ fn short(x: f64) -> String {
     if x == 0.0 || (1e-3..1e6).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.3e}") }
 }
 
+/// Marks a part of a text, on the line below it.
+fn carets(text: &str, at: &std::ops::Range<usize>) -> String {
+    let before = text.get(..at.start).map_or(0, |t| t.chars().count());
+    let width = text.get(at.clone()).map_or(1, |t| t.chars().count().max(1));
+    " ".repeat(before) + &"^".repeat(width)
+}
+
 fn at(moment: &Option<Moment>) -> String {
     moment.map_or(String::new(), |m| format!("at t = {:.6} (step {}): ", m.t, m.step))
 }
@@ -271,6 +294,9 @@ impl Error {
     pub fn within(self, table: &str) -> Self {
         match self {
             Self::Invalid { key, value, rule } => Self::Invalid { key: format!("{table}.{key}"), value, rule },
+            Self::Formula { key, text, at, message, help } => {
+                Self::Formula { key: format!("{table}.{key}"), text, at, message, help }
+            }
             other => other,
         }
     }
@@ -280,6 +306,7 @@ impl Error {
         match self {
             Self::Failed { failure, .. } => Some(failure.help().into()),
             Self::Study(diagnostic) => diagnostic.help.clone(),
+            Self::Formula { help, .. } => help.clone(),
             Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
             Self::ForeignDirectory { .. } => Some("name another directory with --out, or empty this one".into()),
             Self::Invalid { .. } | Self::Unreadable { .. } | Self::Unwritable { .. } => None,

@@ -1,4 +1,7 @@
-use crate::{StudyArgs, terminal::say};
+use crate::{
+    StudyArgs,
+    terminal::{say, warn},
+};
 use clap::Args;
 use std::process::ExitCode;
 
@@ -11,6 +14,7 @@ pub struct Check {
 impl Check {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
         let study = self.study.read()?;
+        study.warnings()?.iter().for_each(|warning| warn(warning));
         say(study.to_toml().trim_end());
         let mebibytes = study.memory() as f64 / f64::from(1 << 20);
         say(format_args!("\n# valid; needs about {:.0} MiB of memory", mebibytes.max(1.0)));

@@ -1,4 +1,4 @@
-use super::{Monitor, smooth};
+use super::{MAX_SMOOTHING, Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::Mesh;
 use crate::numerics::difference::{Gradient, Metrics};
@@ -53,9 +53,6 @@ impl Default for Arclength {
         Self { strength: Strength::Relative(30.0), smoothing: 2, gradient: Gradient::Central }
     }
 }
-
-/// More passes than this leave nothing of ρ on any lattice that fits a machine.
-const MAX_SMOOTHING: usize = 1000;
 
 impl Arclength {
     /// Refuses settings out of range.

@@ -3,15 +3,20 @@
 //! Every density is positive and finite, and only its ratios matter: ρ and cρ give the same mesh.
 
 mod arclength;
+mod given;
 mod smoothing;
 
 pub use arclength::{Arclength, Strength};
+pub use given::Given;
 pub use smoothing::smooth;
 
 use crate::error::{Failure, Result};
 use crate::geometry::Mesh;
 use crate::kind::kinds;
 use crate::numerics::difference::Gradient;
+
+/// More passes than this leave nothing of ρ on any lattice that fits a machine.
+const MAX_SMOOTHING: usize = 1000;
 
 /// Where a mesh should be fine, decided from the solution on the mesh it has.
 pub trait Monitor: Send {
@@ -27,6 +32,7 @@ kinds! {
     /// `[monitor]` of a study.
     MonitorKind {
         "arclength" = Arclength: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
+        "given" = Given: "rho = the first unknown itself, smoothed",
     }
 }
 
@@ -44,6 +50,7 @@ impl MonitorKind {
     pub fn check(&self) -> Result<()> {
         match self {
             Self::Arclength(arclength) => arclength.check(),
+            Self::Given(given) => given.check(),
         }
     }
 
@@ -51,6 +58,7 @@ impl MonitorKind {
     pub fn gradient(&self) -> Gradient {
         match self {
             Self::Arclength(arclength) => arclength.gradient,
+            Self::Given(given) => given.gradient,
         }
     }
 
@@ -58,6 +66,7 @@ impl MonitorKind {
     pub fn into_monitor(self) -> Box<dyn Monitor> {
         match self {
             Self::Arclength(arclength) => Box::new(arclength),
+            Self::Given(given) => Box::new(given),
         }
     }
 }

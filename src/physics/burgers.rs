@@ -1,5 +1,7 @@
-use super::{Motion, Physics, check_finite, curvilinear::Stencils, nodal};
+use super::prescribed::evaluate;
+use super::{Motion, Physics, check_finite, curvilinear::Stencils, formula, nodal};
 use crate::error::{Error, Failure, Result};
+use crate::formula::Program;
 use crate::geometry::{Field, Mesh, Patch};
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
@@ -14,7 +16,8 @@ use serde::{Deserialize, Serialize};
 /// ```
 ///
 /// ν > 0 (`viscosity`) sets the width of the front, about 10ν between u = .1 and .9. Initial and side values come from
-/// the exact solution. In the moving coordinate ξ, with the velocity ẋ of the nodes, the right-hand side is
+/// the exact solution, or from the formulas `initial` and `boundary`, which on periodic axes are needed (the first) and
+/// not (the second). In the moving coordinate ξ, with the velocity ẋ of the nodes, the right-hand side is
 ///
 /// ```text
 /// R = ẋ·∇u − (u²/2)_x − (u²/2)_y + ν Δu   (conservative)      R = (ẋ − u)·∇u + ν Δu   (advective)
@@ -35,6 +38,15 @@ pub struct Burgers {
     /// Form of the convection term.
     #[serde(default)]
     pub convection: Convection,
+    /// u at the start, a formula of x and y (and t, the time there); the front where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial: Option<String>,
+    /// u on bounded sides, a formula of x, y and t; given only with `initial`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub boundary: Option<String>,
+    /// Both formulas, in this order.
+    #[serde(skip)]
+    given: [Option<Program<2, 1>>; 2],
     #[serde(skip)]
     solver: Robust<1>,
     /// Stencils of the newest mesh, with the mesh: the next step starts on it.
@@ -63,19 +75,50 @@ impl Burgers {
     /// # Errors
     /// As [`Burgers::check`].
     pub fn new(viscosity: f64, convection: Convection) -> Result<Self> {
-        let burgers = Self { viscosity, convection, solver: Robust::default(), newest: None };
-        burgers.check().map(|()| burgers)
+        Self {
+            viscosity,
+            convection,
+            initial: None,
+            boundary: None,
+            given: [None, None],
+            solver: Robust::default(),
+            newest: None,
+        }
+        .compiled()
+    }
+
+    /// The same equation from initial values of one's own, formulas of x, y and t; `boundary` where a side is bounded.
+    ///
+    /// # Errors
+    /// As [`Burgers::check`].
+    pub fn from(self, initial: &str, boundary: Option<&str>) -> Result<Self> {
+        Self { initial: Some(initial.into()), boundary: boundary.map(Into::into), ..self }.compiled()
     }
 
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless ν is positive and finite.
+    /// [`Error::Invalid`] unless ν is positive and finite, [`Error::Formula`] where a formula is none.
     pub fn check(&self) -> Result<()> {
-        if self.viscosity.is_finite() && self.viscosity > 0.0 {
-            return Ok(());
+        self.clone().compiled().map(|_| ())
+    }
+
+    /// Ready to step.
+    pub(super) fn compiled(mut self) -> Result<Self> {
+        if !(self.viscosity.is_finite() && self.viscosity > 0.0) {
+            return Err(Error::invalid("viscosity", self.viscosity, "must be a finite number above 0"));
         }
-        Err(Error::invalid("viscosity", self.viscosity, "must be a finite number above 0"))
+        if let (None, Some(boundary)) = (&self.initial, &self.boundary) {
+            let rule = "without initial the front gives the sides; add initial, or leave it out";
+            return Err(Error::invalid("boundary", format!("{boundary:?}"), rule));
+        }
+        for (n, (key, text)) in [("initial", &self.initial), ("boundary", &self.boundary)].into_iter().enumerate() {
+            self.given[n] = match text {
+                Some(text) => Some(Program::new([&formula(key, text)?])),
+                None => None,
+            };
+        }
+        Ok(self)
     }
 
     /// The exact solution.
@@ -139,11 +182,14 @@ impl Physics for Burgers {
     }
 
     fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field {
-        self.on_mesh(t, mesh)
+        match &self.given[0] {
+            Some(formula) => Field::nodal(evaluate(formula, t, mesh)),
+            None => self.on_mesh(t, mesh),
+        }
     }
 
     fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
-        Some(self.on_mesh(t, mesh))
+        self.given[0].is_none().then(|| self.on_mesh(t, mesh))
     }
 
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
@@ -186,7 +232,12 @@ impl Physics for Burgers {
         });
         let mut solution = u.clone();
         for k in lattice.sides() {
-            solution.values_mut()[k] = self.front(t + dt, new.x()[k]);
+            solution.values_mut()[k] = match &self.given {
+                [_, Some(boundary)] => boundary.eval(new.x()[k], &[t + dt])[0],
+                // a side without a formula keeps its values
+                [Some(_), None] => u.values()[k],
+                [None, None] => self.front(t + dt, new.x()[k]),
+            };
         }
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 

@@ -2,12 +2,15 @@
 
 mod burgers;
 mod curvilinear;
+mod prescribed;
 mod shallow_water;
 
 pub use burgers::{Burgers, Convection};
+pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
 
-use crate::error::{Failure, Result};
+use crate::error::{Error, Failure, Result};
+use crate::formula::{Formula, Mistake};
 use crate::geometry::{Field, Mesh, node_areas};
 use crate::kind::kinds;
 use crate::numerics::sum;
@@ -61,6 +64,7 @@ kinds! {
     PdeKind {
         "burgers" = Burgers: "u_t + u u_x + u u_y = nu (u_xx + u_yy), an oblique front with exact solution",
         "shallow-water" = ShallowWater: "h_t + div(h u) = 0, (h u)_t + div(h u u) + grad(g h^2/2) = 0, a pile of water that collapses",
+        "prescribed" = Prescribed: "no equation: the solution or the mesh density is a formula of x, y and t",
     }
 }
 
@@ -73,16 +77,44 @@ impl PdeKind {
         match self {
             Self::Burgers(burgers) => burgers.check(),
             Self::ShallowWater(water) => water.check(),
+            Self::Prescribed(prescribed) => prescribed.check(),
         }
     }
 
     /// The equation, ready to step.
-    pub fn into_physics(self) -> Box<dyn Physics> {
-        match self {
-            Self::Burgers(burgers) => Box::new(burgers),
+    ///
+    /// # Errors
+    /// As [`PdeKind::check`].
+    pub fn into_physics(self) -> Result<Box<dyn Physics>> {
+        Ok(match self {
+            Self::Burgers(burgers) => Box::new(burgers.compiled()?),
             Self::ShallowWater(water) => Box::new(water),
-        }
+            Self::Prescribed(prescribed) => Box::new(prescribed.field()?),
+        })
     }
+
+    /// The formulas of x, y and t that are meant on the whole domain, by their keys.
+    pub fn formulas(&self) -> Vec<(&'static str, &str)> {
+        let all = match self {
+            Self::Burgers(burgers) => vec![("initial", &burgers.initial)],
+            Self::ShallowWater(_) => vec![],
+            Self::Prescribed(prescribed) => vec![("u", &prescribed.u), ("rho", &prescribed.rho)],
+        };
+        all.into_iter().filter_map(|(key, text)| Some((key, text.as_deref()?))).collect()
+    }
+}
+
+/// Reads a formula of x, y and t.
+///
+/// # Errors
+/// [`Error::Formula`] with the key.
+pub fn formula(key: &str, text: &str) -> Result<Formula> {
+    Formula::parse(text, &["x", "y", "t"]).map_err(|mistake| mistaken(key, text, mistake))
+}
+
+fn mistaken(key: &str, text: &str, mistake: Mistake) -> Error {
+    let Mistake { message, at, help } = mistake;
+    Error::Formula { key: key.into(), text: text.into(), at, message, help }
 }
 
 /// The K values a node of a solution at the start of a step, where it and both meshes belong to one lattice.

@@ -12,7 +12,7 @@ pub use report::{Picture, draw, final_arrays};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
-use crate::error::{Error, Moment, Result};
+use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
 use crate::meshing::{Interface, MeshGenerator, Mmpde};
 use crate::physics::Physics;
@@ -102,6 +102,11 @@ impl Simulation {
         let at_start = |failure| Error::Failed { failure, moment };
         check_unfolded(&mesh).map_err(at_start)?;
         let u = self.physics.initial(t, &mesh);
+        if let Some(place) = u.values().iter().position(|v| !v.is_finite()) {
+            let (value, k) = (u.values()[place], place / u.components());
+            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+            return Err(at_start(Failure::NonFinite { what: "the initial solution", value, node, x }));
+        }
         let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
         Ok(State { t, step: 0, mesh, u, rho })
     }

@@ -1,9 +1,9 @@
 use super::Source;
-use crate::density::MonitorKind;
+use crate::density::{Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{GeneratorKind, Mmpde};
-use crate::physics::PdeKind;
+use crate::physics::{PdeKind, formula};
 use crate::setting::pair;
 use crate::simulation::{Coupling, FramesAt, Schedule, Simulation};
 use serde::{Deserialize, Serialize};
@@ -23,9 +23,9 @@ pub struct MovingMesh {
     pub time: Time,
     /// `[pde]`.
     pub pde: PdeKind,
-    /// `[monitor]`.
-    #[serde(default)]
-    pub monitor: MonitorKind,
+    /// `[monitor]`; where it is left out, arc length, or what is prescribed as the density itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub monitor: Option<MonitorKind>,
     /// `[mesh]`.
     #[serde(default)]
     pub mesh: MeshTable,
@@ -194,7 +194,16 @@ impl MovingMesh {
             compare.generator.check(&lattice).map_err(|error| error.within("generator").within("compare"))?;
         }
         self.pde.check().map_err(|error| error.within("pde"))?;
-        self.monitor.check().map_err(|error| error.within("monitor"))?;
+        let prescribed_density = matches!(&self.pde, PdeKind::Prescribed(p) if p.rho.is_some());
+        let monitor = self.monitor.get_or_insert_with(|| match prescribed_density {
+            true => MonitorKind::Given(Given::default()),
+            false => MonitorKind::default(),
+        });
+        monitor.check().map_err(|error| error.within("monitor"))?;
+        if prescribed_density && !matches!(monitor, MonitorKind::Given(_)) {
+            let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
+            return Err(Error::invalid("monitor.kind", "another", rule));
+        }
         self.equation().check().map_err(|error| error.within("mesh"))?;
         self.mesh.coupling.check().map_err(|error| error.within("coupling").within("mesh"))?;
         if self.time.report.is_empty() {
@@ -207,18 +216,63 @@ impl MovingMesh {
 
     /// Refuses axes that the equation is not made for.
     fn check_axes(&self) -> Result<()> {
-        let (needed, rule) = match self.pde {
-            PdeKind::Burgers(_) => {
-                ([false; 2], "the front of pde.kind = \"burgers\" needs bounded axes; set it to [false, false]")
-            }
+        let periodic = self.domain.periodic;
+        let (wrong, rule) = match &self.pde {
+            PdeKind::Burgers(burgers) if burgers.initial.is_none() => (
+                periodic.contains(&true),
+                "the front of pde.kind = \"burgers\" needs bounded axes; set it to [false, false], or give pde.initial",
+            ),
+            PdeKind::Burgers(burgers) => (
+                periodic.contains(&false) == burgers.boundary.is_none(),
+                match burgers.boundary {
+                    None => {
+                        "pde.initial needs pde.boundary beside it on bounded axes; add it, or make both axes periodic"
+                    }
+                    Some(_) => "pde.boundary has no side to stand on; leave it out, or make an axis bounded",
+                },
+            ),
             PdeKind::ShallowWater(_) => {
-                ([true; 2], "pde.kind = \"shallow-water\" needs periodic axes; set it to [true, true]")
+                (periodic.contains(&false), "pde.kind = \"shallow-water\" needs periodic axes; set it to [true, true]")
             }
+            PdeKind::Prescribed(_) => (false, ""),
         };
-        if self.domain.periodic == needed {
+        if !wrong {
             return Ok(());
         }
-        Err(Error::invalid("domain.periodic", format!("{:?}", self.domain.periodic), rule))
+        Err(Error::invalid("domain.periodic", format!("{periodic:?}"), rule))
+    }
+
+    /// What is allowed but probably not meant: formulas that are not periodic on periodic axes.
+    ///
+    /// # Errors
+    /// As [`MovingMesh::resolve`].
+    pub fn warnings(&self) -> Result<Vec<String>> {
+        const ALONG: usize = 100;
+        let mut warnings = Vec::new();
+        let Domain { lower, upper, periodic } = self.domain;
+        for (key, text) in self.pde.formulas() {
+            let f = formula(key, text).map_err(|error| error.within("pde"))?;
+            for d in (0..2).filter(|&d| periodic[d]) {
+                let (mut jump, mut size) = (0.0_f64, 0.0_f64);
+                for k in 0..=ALONG {
+                    let along = lower[1 - d] + (upper[1 - d] - lower[1 - d]) * k as f64 / ALONG as f64;
+                    let [a, b] = [lower[d], upper[d]].map(|across| {
+                        let x = if d == 0 { [across, along] } else { [along, across] };
+                        f.eval(&[x[0], x[1], self.time.start])
+                    });
+                    jump = jump.max((a - b).abs());
+                    size = size.max(a.abs()).max(b.abs());
+                }
+                if jump > 1e-9 * size {
+                    let axis = ["x", "y"][d];
+                    warnings.push(format!(
+                        "`pde.{key}` is not periodic along {axis}: from {axis} = {} to {axis} = {} it jumps by up to {jump:.1e}",
+                        upper[d], lower[d]
+                    ));
+                }
+            }
+        }
+        Ok(warnings)
     }
 
     /// Memory that the run needs, in bytes.
@@ -251,8 +305,12 @@ impl MovingMesh {
         Schedule::new(*start, *end, *step, report.clone()).map_err(|error| error.within("time"))
     }
 
+    fn monitor(&self) -> MonitorKind {
+        self.monitor.clone().unwrap_or_default()
+    }
+
     fn equation(&self) -> Mmpde {
-        Mmpde { relaxation: self.mesh.relaxation, gradient: self.monitor.gradient() }
+        Mmpde { relaxation: self.mesh.relaxation, gradient: self.monitor().gradient() }
     }
 
     /// The mesh that the run starts from.
@@ -270,8 +328,8 @@ impl MovingMesh {
     /// [`Error::Invalid`] with the dotted key of a setting out of range.
     pub fn simulation(&self) -> Result<Simulation> {
         Ok(Simulation {
-            physics: self.pde.clone().into_physics(),
-            monitor: self.monitor.clone().into_monitor(),
+            physics: self.pde.clone().into_physics().map_err(|error| error.within("pde"))?,
+            monitor: self.monitor().into_monitor(),
             generator: self.mesh.generator.clone().into_generator(),
             equation: self.equation(),
             coupling: self.mesh.coupling,

@@ -50,7 +50,7 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     };
     directory.write("study.toml", study.to_toml().as_bytes())?;
     directory.write_summary(&summary)?;
-    let mut record = Record::default();
+    let mut record = Record { warnings: study.warnings()?, ..Record::default() };
     let outcome = simulation.start(mesh).and_then(|mut state| {
         let mut history = History::create(&directory.path().join("history.csv"))?;
         let mut frames = Frames::create(directory.path(), study.frames())?;

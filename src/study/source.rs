@@ -121,10 +121,25 @@ impl Source {
 
     /// Turns a setting out of range into a diagnostic at the place where it is set.
     pub fn locate(&self, error: Error) -> Error {
-        let Error::Invalid { key, value, rule } = &error else { return error };
-        let Ok(root) = self.merged() else { return error };
-        let message = format!("`{key}` is {value}, but {rule}");
-        // the key itself, or the innermost table on the way to it that the study names
+        match &error {
+            Error::Invalid { key, value, rule } => match self.place(key) {
+                Some(span) => self.diagnostic(&format!("`{key}` is {value}, but {rule}"), span, None),
+                None => error,
+            },
+            Error::Formula { key, text, at, message, help } => match self.place(key) {
+                Some(span) => {
+                    let span = self.inside(span, text, at);
+                    self.diagnostic(&format!("`{key}`: {message}"), span, help.clone())
+                }
+                None => error,
+            },
+            _ => error,
+        }
+    }
+
+    /// Where a key is set: the key itself, or the innermost table on the way to it that the study names.
+    fn place(&self, key: &str) -> Option<Range<usize>> {
+        let root = self.merged().ok()?;
         let mut place = None;
         let mut table = &root;
         for part in key.split('.') {
@@ -135,9 +150,16 @@ impl Source {
                 None => break,
             }
         }
-        match place {
-            Some(span) => self.diagnostic(&message, span, None),
-            None => error,
+        place
+    }
+
+    /// A part of a string, where the string stands in the study as it is, between one or three quotes.
+    fn inside(&self, span: Range<usize>, text: &str, at: &Range<usize>) -> Range<usize> {
+        let piece = self.pieces.iter().rev().find(|p| span.start >= p.begins).unwrap_or(&self.pieces[0]);
+        let token = piece.padded.get(span.clone()).unwrap_or_default();
+        match token.find(text) {
+            Some(offset) => span.start + offset + at.start..span.start + offset + at.end.max(at.start + 1),
+            None => span, // written with escapes
         }
     }
 
