@@ -2,6 +2,7 @@
 
 mod interface_study;
 mod table;
+mod tables;
 
 pub use interface_study::{InterfaceStep, Measured};
 pub use table::Table;
@@ -25,11 +26,18 @@ pub struct Options {
 }
 
 /// Everything that can be rerun.
-pub const ITEMS: &[Item] = &[Item {
-    name: "interface-study",
-    line: "error against work of all estimators of interface values, in one mesh step",
-    run: interface_study::run,
-}];
+pub const ITEMS: &[Item] = &[
+    Item { name: "table-1", line: "Burgers' front on 2×2, 3×3 and 4×4 subdomains", run: tables::table_1 },
+    Item { name: "table-2", line: "time of a mesh step against the number of subdomains", run: tables::table_2 },
+    Item { name: "table-3", line: "Burgers' equation on a periodic domain", run: tables::table_3 },
+    Item { name: "table-4", line: "shallow water on a periodic domain", run: tables::table_4 },
+    Item { name: "rings", line: "five prescribed rings", run: tables::rings },
+    Item {
+        name: "interface-study",
+        line: "error against work of all estimators of interface values, in one mesh step",
+        run: interface_study::run,
+    },
+];
 
 impl Item {
     /// Reruns it.

@@ -5,5 +5,5 @@ mod run;
 mod source;
 
 pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, StudyKind, Time};
-pub use run::{Finished, run};
+pub use run::{Finished, compute, run};
 pub use source::Source;

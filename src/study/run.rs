@@ -84,6 +84,22 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     Ok(Finished { summary, state, failure })
 }
 
+/// Runs a study without leaving anything on disk; a failure after the start ends it early.
+///
+/// # Errors
+/// As [`run`] before anything is computed.
+pub fn compute(study: &MovingMesh) -> Result<(Record, Option<Error>)> {
+    let mut study = study.clone();
+    study.resolve()?;
+    let mut simulation = study.simulation()?;
+    let mut state = simulation.start(study.initial_mesh()?)?;
+    let mut record = Record::default();
+    let mut meshes = Meshes::of(&study);
+    let failure = simulation.run(&mut state, &mut record, &mut [&mut meshes]).err();
+    let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record).err(), Some);
+    Ok((record, failure))
+}
+
 /// Keeps the meshes at the report times, if there is something to compare them with.
 struct Meshes {
     at: Vec<f64>,
