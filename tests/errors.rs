@@ -1,10 +1,10 @@
 //! Every variant of the library's errors, triggered once and read.
 
-use driftmesh::density::{Arclength, Monitor};
+use driftmesh::density::{Arclength, Given, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
-use driftmesh::meshing::{MeshGenerator, Mmpde, Whole};
+use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
-use driftmesh::physics::{Burgers, Convection, Motion, Physics, ShallowWater};
+use driftmesh::physics::{Burgers, Convection, Motion, Physics, Prescribed, ShallowWater};
 use driftmesh::simulation::{RunDirectory, Schedule};
 use driftmesh::study::{MovingMesh, Source};
 use driftmesh::{Error, Failure};
@@ -99,6 +99,64 @@ fn linear_stalled() {
     let error = Robust::default().solve(&singular, &[[1.0]; 9], &mut [[0.0]; 25], [1e-9]).unwrap_err();
     assert_eq!(error.name(), "linear-stalled");
     assert_says(error, &["linear system of 9 unknowns", "residual 1.0e0"], Some("mesh.relaxation"), true);
+}
+
+/// One step of a generator under a density that rises at once.
+fn step(mut generator: impl MeshGenerator, height: f64, dt: f64) -> Failure {
+    let rho: Vec<f64> = mesh().x().iter().map(|[x, _]| if *x < 0.4 { 1.0 } else { height }).collect();
+    generator.step(&Mmpde::default(), &mesh(), &rho, dt).unwrap_err()
+}
+
+#[test]
+fn steep_density() {
+    let error = step(Stochastic::new([2, 2], 0, EstimatorKind::default()), 1e3, 1e-3);
+    assert_eq!(error.name(), "steep-density");
+    let message = "the density is too steep for random walks: |b|h = 499.500 at node (3, 0), x = (0.3750, 0.0000)";
+    assert_says(error, &[message, "at most 2"], Some("monitor.gradient = \"safe\""), true);
+}
+
+#[test]
+fn noisy_interface() {
+    let walks = EstimatorKind::GridWalk(GridWalk { walks: 2, increment: false });
+    let error = step(Stochastic::new([2, 2], 0, walks), 1.5, 1.0);
+    assert_eq!(error.name(), "noisy-interface");
+    let message = ["interface values are too noisy: standard error", "shortest edge", "Δt/(τh²) = 64"];
+    assert_says(error, &message, Some("estimator.walks"), true);
+}
+
+#[test]
+fn schwarz_stalled() {
+    let mut schwarz = Schwarz::new([2, 2], 1);
+    schwarz.iterations = 2;
+    let error = step(schwarz, 1.5, 1.0);
+    assert_eq!(error.name(), "schwarz-stalled");
+    assert_says(error, &["the Schwarz iteration stalled: change", "after 2 iterations"], Some("overlap"), true);
+}
+
+#[test]
+fn subdomains() {
+    let error = step(Stochastic::new([9, 2], 0, EstimatorKind::default()), 1.5, 1e-3);
+    assert_eq!(error.name(), "subdomains");
+    assert_says(error, &["[9, 2] subdomains do not fit [8, 8] cells"], Some("one subdomain"), true);
+}
+
+/// A formula shows its place; a density that is negative or not a number somewhere says where.
+#[test]
+fn formulas() {
+    let refused = |u: Option<&str>, rho: Option<&str>| {
+        Prescribed { u: u.map(Into::into), rho: rho.map(Into::into) }.check().unwrap_err()
+    };
+    let error = refused(Some("x + sinn(y)"), None);
+    assert_says(error, &["`u`: ", "sinn", "\n      ^^^^"], Some("sin"), false);
+    assert_says(refused(None, None), &["`u` is not given", "needs a formula"], None, false);
+    assert_says(refused(Some("1"), Some("1")), &["`rho`", "only one of u and rho"], None, false);
+    let burgers = Burgers::new(0.1, Convection::Conservative).unwrap();
+    assert_says(burgers.clone().from("x +", None).unwrap_err(), &["`initial`: "], None, false);
+    let prescribed = Prescribed { rho: Some("0.5 - x".into()), ..Prescribed::default() }.field().unwrap();
+    let rho: Vec<f64> = prescribed.initial(0.0, &mesh()).values().to_vec();
+    let error = Given::default().density(&mesh(), &rho, None).unwrap_err();
+    let message = "the mesh density is 0.000e0, not positive, at node (4, 0), x = 0.5000, y = 0.0000";
+    assert_says(error, &[message], Some("mend the formula"), true);
 }
 
 #[test]

@@ -166,6 +166,29 @@ fn bad_settings_are_refused_by_name() {
         ("domain.upper=[1e300,1.0]", &["`domain.upper` is [1e300, 1.0]", "cannot be told apart"]),
         ("time.step=1e-13", &["`time.step`", "raise it"]),
         ("domain.periodic=[true,false]", &["`domain.periodic`", "bounded"]),
+        ("domain.periodic=[true,true]", &["`domain.periodic`", "pde.initial"]),
+        ("mesh.generator.subdomains=[13,4]", &["`mesh.generator.subdomains` is [13, 4]", "one a cell", "[12, 10]"]),
+        ("mesh.generator.subdomains=[4]", &["an array of length 2, found 1"]),
+        ("mesh.generator.subdomains=[0,4]", &["`mesh.generator.subdomains`"]),
+        ("mesh.generator.seed=-1", &["expected a whole number from 0 to 2^63 - 1"]),
+        ("mesh.generator.seed=9223372036854775808", &["--set:1"]),
+        ("mesh.generator.estimator.walks=0", &["`mesh.generator.estimator.walks` is 0", "set it to 1 or more"]),
+        ("mesh.generator.estimator.sweeps=many", &["a number or \"auto\"", "--set:1"]),
+        (
+            "mesh.generator.estimator={kind=\"monte-carlo\",paths=0,substeps=1}",
+            &["`mesh.generator.estimator.paths` is 0"],
+        ),
+        ("mesh.generator.estimator.kind=montecarlo", &["did you mean `monte-carlo`?"]),
+        ("mesh.generator.interface.sample=0", &["`mesh.generator.interface.sample` is 0"]),
+        (
+            "mesh.generator={kind=\"schwarz\",subdomains=[2,2],overlap=0}",
+            &["`mesh.generator.overlap` is 0", "does not converge"],
+        ),
+        ("compare.generator.kind=hole", &["did you mean `whole`?"]),
+        ("pde.initial=\"sin(x\"", &["`pde.initial`: ", "--set:1:17", "^"]),
+        ("pde={kind=\"prescribed\"}", &["`pde.u` is not given", "formula"]),
+        ("pde={kind=\"prescribed\",u=\"x+zz\"}", &["`pde.u`: ", "zz"]),
+        ("monitor.gradient=save", &["did you mean `safe`?"]),
         ("study.name=\"../x\"", &["`study.name`"]),
         ("output.frames.every=0", &["`output.frames.every` is 0"]),
         ("output.frames.times=[nan]", &["`output.frames.times`", "finite"]),
@@ -189,6 +212,36 @@ fn bad_settings_are_refused_by_name() {
     let sandbox = Sandbox::new();
     for (set, expected) in cases {
         assert_refused(&sandbox, &sandbox.run(&[set]), expected);
+    }
+}
+
+/// A formula that jumps over the seam of a periodic axis is allowed, with a warning that says by how much; a density
+/// that is not positive ends the run with its place.
+#[test]
+fn formulas_are_warned_of_and_checked() {
+    let sandbox = Sandbox::new();
+    let periodic = ["domain.periodic=[true,true]", "compare.generator.kind=whole"];
+    let with =
+        |formula: &str| sandbox.run(&[&periodic[..], &[&format!("pde={{kind=\"prescribed\",{formula}}}")]].concat());
+    let output = with("u=\"tanh(5*(x-0.5)) + sin(2*pi*y)\"");
+    let said = words(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let expected = "warning: `pde.u` is not periodic along x: from x = 1 to x = 0 it jumps by up to 2.0e0";
+    assert!(said.contains(expected) && !said.contains("along y"), "{said}");
+    std::fs::remove_dir_all(sandbox.path("out")).unwrap();
+
+    // the arc-length table of the study is refused for a prescribed density, not ignored
+    let refused = with("rho=\"1.5 + sin(2*pi*x)\"");
+    assert_refused(&sandbox, &refused, &["`monitor.kind`", "pde.rho is the density itself"]);
+    let given = "monitor={kind=\"given\"}";
+    let set = |rho: &str| {
+        [&periodic[..], &[&format!("pde={{kind=\"prescribed\",rho=\"{rho}\"}}"), given]].concat().join("\n")
+    };
+    for (rho, code) in [("1.5 + sin(2*pi*x)", 0), ("0.5 + sin(2*pi*x)", 1)] {
+        let assignments = set(rho);
+        let output = sandbox.run(&assignments.split('\n').collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(code), "{}", words(&output));
+        assert_eq!(words(&output).contains("the mesh density is -"), code == 1, "{}", words(&output));
     }
 }
 
