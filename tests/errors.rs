@@ -111,7 +111,7 @@ fn step(mut generator: impl MeshGenerator, height: f64, dt: f64) -> Failure {
 fn steep_density() {
     let error = step(Stochastic::new([2, 2], 0, EstimatorKind::default()), 1e3, 1e-3);
     assert_eq!(error.name(), "steep-density");
-    let message = "the density is too steep for random walks: |b|h = 499.500 at node (3, 0), x = (0.3750, 0.0000)";
+    let message = "the density is too steep for random walks: |b|h = 499.500 at node (3, 1), x = (0.3750, 0.1250)";
     assert_says(error, &[message, "at most 2"], Some("monitor.gradient = \"safe\""), true);
 }
 

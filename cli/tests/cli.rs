@@ -354,8 +354,9 @@ fn only_our_own_directories_are_replaced() {
 #[test]
 fn a_folded_mesh_is_named_and_the_frames_are_kept() {
     let sandbox = Sandbox::new();
-    let set = ["monitor.strength.relative=3000", "monitor.smoothing=0", "grid.cells=[40,40]", "output.frames.every=1"];
-    let output = sandbox.run(&set);
+    let steep =
+        ["monitor.strength.relative=3000", "monitor.smoothing=0", "grid.cells=[40,40]", "output.frames.every=1"];
+    let output = sandbox.run(&[&steep[..], &["mesh.generator.kind=whole"]].concat());
     assert_eq!(output.status.code(), Some(1));
     let words = words(&output);
     for part in [

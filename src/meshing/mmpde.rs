@@ -109,12 +109,13 @@ impl<const D: usize> MeshOperator<D> {
         matrix
     }
 
-    /// Refuses an operator whose weights cannot be probabilities: |b|h > 2 somewhere.
+    /// Refuses an operator whose weights cannot be probabilities: |b|h > 2 at a node that is not on a side.
     ///
     /// # Errors
     /// [`Failure::SteepDensity`] at the first such node.
     pub fn check_weights(&self, mesh: &Mesh<D>) -> Result<(), Failure> {
-        match self.weights.iter().position(|w| !w.as_flattened().iter().all(|&w| w >= 0.0)) {
+        let negative = |k: &usize| !self.weights[*k].as_flattened().iter().all(|&w| w >= 0.0);
+        match Patch::whole(&self.lattice).nodes(&self.lattice).find(negative) {
             None => Ok(()),
             Some(k) => {
                 let skews = self.weights[k].map(|[below, above]| 2.0 * ((above - below) / (above + below)).abs());

@@ -186,6 +186,7 @@ impl MovingMesh {
             let rule = "must be 1 to 100 of the characters a-z A-Z 0-9 - _ . and not begin with a dot";
             return Err(Error::invalid("study.name", format!("{name:?}"), rule));
         }
+        self.pde.check().map_err(|error| error.within("pde"))?;
         self.check_axes()?;
         self.check_size()?;
         let lattice = *self.initial_mesh()?.lattice();
@@ -193,7 +194,6 @@ impl MovingMesh {
         if let Some(compare) = &self.compare {
             compare.generator.check(&lattice).map_err(|error| error.within("generator").within("compare"))?;
         }
-        self.pde.check().map_err(|error| error.within("pde"))?;
         let prescribed_density = matches!(&self.pde, PdeKind::Prescribed(p) if p.rho.is_some());
         let monitor = self.monitor.get_or_insert_with(|| match prescribed_density {
             true => MonitorKind::Given(Given::default()),
