@@ -183,6 +183,35 @@ fn grid_walks_are_unbiased() {
     }
 }
 
+/// Euler–Maruyama is of first order: four times the substeps, a quarter of the bias. Sobol points and the martingale
+/// leave next to no noise.
+#[test]
+fn monte_carlo_has_a_bias_of_first_order() {
+    let start = mesh([20, 20], [true, true]);
+    let rho = bump(&start, 3.0, 0.3);
+    let (equation, dt) = (Mmpde::default(), 2e-3);
+    let operator = equation.operator(start.lattice(), &rho, dt).unwrap();
+    let problem = Problem::new(&equation, &operator, &start, &rho, dt, start.x(), 1, 0);
+    let points: Vec<usize> = [[5, 7], [8, 3], [2, 9]].map(|node| start.lattice().index(node)).to_vec();
+    let at = |paths: usize, substeps: usize| {
+        let monte = MonteCarlo { sobol: true, control_variate: true, ..MonteCarlo::new(paths, substeps) };
+        monte.estimate(&problem, &points).unwrap().points
+    };
+    let limit = at(1 << 14, 64);
+    let bias = |substeps: usize| -> f64 {
+        let squares = at(1 << 15, substeps)
+            .iter()
+            .zip(&limit)
+            .flat_map(|(a, b)| [0, 1].map(|c| (a.x[c] - b.x[c]).powi(2)))
+            .sum::<f64>();
+        squares.sqrt()
+    };
+    // seen from M = 64 the bias of M is that of 1/M − 1/64
+    let (coarse, fine) = (bias(2), bias(8));
+    let expected = (1.0 / 2.0 - 1.0 / 64.0) / (1.0 / 8.0 - 1.0 / 64.0);
+    assert!((coarse / fine / expected - 1.0).abs() < 0.25, "{coarse:e} and {fine:e}: {} for {expected}", coarse / fine);
+}
+
 /// The same bits for 1, 2 and 4 threads, for every estimator and for Schwarz, also over several steps.
 #[test]
 fn interfaces_do_not_depend_on_threads() {

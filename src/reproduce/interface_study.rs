@@ -86,6 +86,14 @@ impl InterfaceStep {
         Ok(Self { equation, mesh, rho, dt, operator, new, exact, decomposition, points })
     }
 
+    /// The same mesh and density with another length of the step.
+    ///
+    /// # Errors
+    /// As [`InterfaceStep::new`].
+    pub fn with_step(&self, dt: f64) -> Result<Self, Failure> {
+        Self::new(self.mesh.clone(), self.rho.clone(), self.equation, dt, [4, 4])
+    }
+
     /// Δt/(τh²), the larger of both axes.
     pub fn stiffness(&self) -> f64 {
         let a = self.problem(0).stiffness();
@@ -306,7 +314,7 @@ fn over_stiffness(options: Options) -> Result<Table> {
         let at = InterfaceStep::case_a(cells)?;
         for a in [0.5, 1.6, 5.0, 16.0, 50.0, 100.0] {
             let dt = a / (cells * cells) as f64;
-            let step = InterfaceStep::new(at.mesh.clone(), at.rho.clone(), at.equation, dt, [4, 4])?;
+            let step = at.with_step(dt)?;
             let walk = ResidualWalk::default();
             let found = step.measure(&walk, if options.quick { 2 } else { 10 })?;
             table.row([
