@@ -105,7 +105,7 @@ fn table(summary: &Summary) -> String {
 fn interfaces(interface: &Interface) -> String {
     let mut text = format!("between  {} interface points", interface.points);
     if let (Some(error), Some(noise)) = (interface.standard_error, interface.noise) {
-        text += &format!(", standard error {error:.1e}, {:.2} % of the shortest edge", 100.0 * noise);
+        text += &format!(", standard error {error:.1e}, {noise:.1e} of the shortest edge");
     }
     if interface.sweeps > 0 {
         text += &format!(", {} sweeps a step", interface.sweeps);
