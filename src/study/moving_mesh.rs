@@ -160,8 +160,9 @@ pub struct Output {
     pub frames: Option<FramesAt>,
 }
 
-/// Memory that a run needs for each node: 1350 bytes measured at 1000 × 1000 cells, and a reserve.
-const BYTES_PER_NODE: u128 = 1600;
+/// Memory that a run needs for each node: 2250 bytes measured at 600 × 600 cells with subdomains and a reference, and a
+/// reserve.
+const BYTES_PER_NODE: u128 = 2600;
 const FRAMES_BY_DEFAULT: usize = 20;
 
 impl MovingMesh {

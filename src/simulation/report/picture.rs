@@ -61,14 +61,33 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
         (0..n).step_by(stride).chain([n]).collect::<Vec<usize>>()
     });
     let at = |i: usize, j: usize| i * (cells[1] + 1) + j;
+    // a periodic mesh leaves the box on one side and enters on the other: it is drawn as often as it shows, cut to size
+    let reach = lattice.periodic().map(|periodic| if periodic { vec![-1.0, 0.0, 1.0] } else { vec![0.0] });
+    let shifts: Vec<[f64; 2]> =
+        reach[0].iter().flat_map(|&i| reach[1].iter().map(move |&j| [i * wx, j * wy])).collect();
+    let shown = |corners: &[usize], shift: [f64; 2]| {
+        let outside = |d: usize, low: f64, width: f64| {
+            corners.iter().all(|&k| x[k][d] + shift[d] < low)
+                || corners.iter().all(|&k| x[k][d] + shift[d] > low + width)
+        };
+        !(outside(0, lx, wx) || outside(1, ly, wy))
+    };
+    let place = |k: usize, shift: [f64; 2]| point(to([x[k][0] + shift[0], x[k][1] + shift[1]]));
+    let _ = writeln!(
+        s,
+        "<clipPath id=\"box\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\n\
+         <g clip-path=\"url(#box)\">"
+    );
     s.push_str("<g stroke-width=\"0.6\" stroke-linejoin=\"round\">\n");
     for i in lines[0].windows(2) {
         for j in lines[1].windows(2) {
             let corners = [at(i[0], j[0]), at(i[1], j[0]), at(i[1], j[1]), at(i[0], j[1])];
             let mean = 0.25 * corners.iter().map(|&k| u[k]).sum::<f64>();
-            let points: Vec<String> = corners.iter().map(|&k| point(to(x[k]))).collect();
             let fill = colour((mean - low) / (high - low));
-            let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\" stroke=\"{fill}\"/>", points.join(" "));
+            for &shift in shifts.iter().filter(|&&shift| shown(&corners, shift)) {
+                let points: Vec<String> = corners.iter().map(|&k| place(k, shift)).collect();
+                let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\" stroke=\"{fill}\"/>", points.join(" "));
+            }
         }
     }
     s.push_str("</g>\n");
@@ -77,7 +96,9 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
     let mut paths = [String::new(), String::new()];
     let mut segment = |a: usize, b: usize| {
         let light = 0.5 * (u[a] + u[b]) - low < 0.6 * (high - low);
-        let _ = write!(paths[usize::from(light)], "M{}L{}", point(to(x[a])), point(to(x[b])));
+        for &shift in shifts.iter().filter(|&&shift| shown(&[a, b], shift)) {
+            let _ = write!(paths[usize::from(light)], "M{}L{}", place(a, shift), place(b, shift));
+        }
     };
     for &i in &lines[0] {
         lines[1].windows(2).for_each(|j| segment(at(i, j[0]), at(i, j[1])));
@@ -91,6 +112,7 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
             "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"0.5\" stroke-width=\"0.7\"/>"
         );
     }
+    s.push_str("</g>\n");
 
     axes(&mut s, [lx, ly], [wx, wy], [width, height]);
     colour_bar(&mut s, unknown, low, high, LEFT + width + 24.0, height);
