@@ -21,17 +21,17 @@ impl Philox {
     /// Four words for each of L counters, side by side so that the compiler can take several at once.
     #[inline(always)]
     pub fn blocks<const L: usize>(self, mut counter: [[u32; L]; 4]) -> [[u32; L]; 4] {
-        let mut key = self.key;
-        for _round in 0..10 {
-            let [a, b, c, d] = counter;
-            for l in 0..L {
-                let (p, q) = (u64::from(a[l]) * 0xD251_1F53, u64::from(c[l]) * 0xCD9E_8D57);
-                counter[0][l] = (q >> 32) as u32 ^ b[l] ^ key[0];
-                counter[1][l] = q as u32;
-                counter[2][l] = (p >> 32) as u32 ^ d[l] ^ key[1];
-                counter[3][l] = p as u32;
+        for l in 0..L {
+            // in 64 bits, for the products to stay where they are
+            let [mut a, mut b, mut c, mut d] = counter.each_ref().map(|words| u64::from(words[l]));
+            let mut key = self.key;
+            for _round in 0..10 {
+                let (p, q) = (a * 0xD251_1F53, c * 0xCD9E_8D57);
+                [a, b] = [(q >> 32) ^ b ^ u64::from(key[0]), q & 0xFFFF_FFFF];
+                [c, d] = [(p >> 32) ^ d ^ u64::from(key[1]), p & 0xFFFF_FFFF];
+                key = [key[0].wrapping_add(0x9E37_79B9), key[1].wrapping_add(0xBB67_AE85)];
             }
-            key = [key[0].wrapping_add(0x9E37_79B9), key[1].wrapping_add(0xBB67_AE85)];
+            (counter.iter_mut().zip([a, b, c, d])).for_each(|(words, word)| words[l] = word as u32);
         }
         counter
     }
@@ -67,10 +67,11 @@ impl Stream {
 
 const TINY: f64 = 1.0 / 4_294_967_296.0; // 2⁻³²
 
-/// A word as a number strictly between 0 and 1.
+/// A word as a number strictly between 0 and 1: (word + ½) 2⁻³².
 #[inline(always)]
 pub(crate) fn uniform(word: u32) -> f64 {
-    (f64::from(word) + 0.5) * TINY
+    // placed behind the point of 1.…: processors without a conversion from unsigned words do this faster
+    f64::from_bits(0x3FF0_0000_0000_0000 | u64::from(word) << 20) - (1.0 - 0.5 * TINY)
 }
 
 /// Two independent standard normal numbers from two words, L at a time: the method of Box and Muller
@@ -82,42 +83,62 @@ pub(crate) fn normals<const L: usize>(a: [u32; L], b: [u32; L]) -> [[f64; L]; 2]
     let mut out = [[0.0; L]; 2];
     for l in 0..L {
         let radius = (-2.0 * ln(uniform(a[l]))).sqrt();
-        // the angle in quarter turns, from the nearest one: −½ … ½
-        let quarter = b[l].wrapping_add(1 << 29) >> 30;
-        let rest =
-            f64::from(b[l].wrapping_sub(quarter << 30) as i32) * (std::f64::consts::FRAC_PI_2 / f64::from(1 << 30));
-        let (s, c) = sin_cos(rest);
-        let (x, y) = if quarter & 1 == 0 { (c, s) } else { (s, c) };
-        out[0][l] = if quarter == 1 || quarter == 2 { -radius * x } else { radius * x };
-        out[1][l] = if quarter >= 2 { -radius * y } else { radius * y };
+        // the angle from the nearest half turn, −π/2 … π/2; after an odd half turn both numbers change sign
+        let (sin, cos) = sin_cos(f64::from((b[l] << 1) as i32) * (std::f64::consts::PI * TINY));
+        let odd = u64::from(b[l].wrapping_add(1 << 30) & 1 << 31) << 32;
+        let radius = f64::from_bits(radius.to_bits() ^ odd);
+        out[0][l] = radius * cos;
+        out[1][l] = radius * sin;
     }
     out
 }
 
-/// Natural logarithm of a positive normal number.
+/// Natural logarithm of a positive normal number, to 1e-12.
 #[inline(always)]
-fn ln(x: f64) -> f64 {
-    // x = 2^e m with m between √½ and √2
-    let bits = x.to_bits().wrapping_sub(0x3FE6_A09E_667F_3BCD);
-    let exponent = f64::from((bits >> 32) as i32 >> 20);
-    let m = f64::from_bits((bits & 0x000F_FFFF_FFFF_FFFF).wrapping_add(0x3FE6_A09E_667F_3BCD));
+pub(crate) fn ln(x: f64) -> f64 {
+    const ROOT_HALF: u64 = 0x3FE6_A09E_667F_3BCD;
+    const ONE: u64 = 0x3FF0_0000_0000_0000;
+    const TWO_52: u64 = 0x4330_0000_0000_0000;
+    // x = 2^e m with m between √½ and √2; e + 1023 stands in the last bits of 2⁵² + e + 1023
+    let bits = x.to_bits() + (ONE - ROOT_HALF);
+    let exponent = f64::from_bits(TWO_52 | bits >> 52) - (f64::from_bits(TWO_52) + 1023.0);
+    let m = f64::from_bits((bits & 0x000F_FFFF_FFFF_FFFF) + ROOT_HALF);
+    // 2 artanh s; the first term left out is below 1e-12
     let s = (m - 1.0) / (m + 1.0);
     let z = s * s;
-    // 2 artanh s; the first term left out is below 1e-14
-    let tail = 1.0 / 3.0
-        + z * (1.0 / 5.0 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z * (1.0 / 11.0 + z * (1.0 / 13.0 + z * (1.0 / 15.0))))));
+    let tail = polynomial(z, [1.0 / 3.0, 1.0 / 5.0, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0]);
     exponent * std::f64::consts::LN_2 + 2.0 * (s + s * z * tail)
 }
 
-/// Sine and cosine of an angle between −π/4 and π/4, by Taylor's series: the first terms left out are below 1e-13.
+/// Sine and cosine of an angle between −π/2 and π/2, by Taylor's series: the first terms left out are below 1e-12.
 #[inline(always)]
 fn sin_cos(x: f64) -> (f64, f64) {
+    const SIN: [f64; 9] = taylor(1);
+    const COS: [f64; 9] = taylor(0);
     let z = x * x;
-    let sin =
-        1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0 * (1.0 - z / 156.0)))));
-    let cos =
-        1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0 * (1.0 - z / 132.0)))));
-    (x * sin, cos)
+    (x * polynomial(z, SIN), polynomial(z, COS))
+}
+
+/// 1/k!, −1/(k+2)!, 1/(k+4)!, … for k = 0 or 1.
+const fn taylor<const N: usize>(mut k: usize) -> [f64; N] {
+    let mut terms = [1.0; N];
+    let mut n = 1;
+    while n < N {
+        terms[n] = -terms[n - 1] / ((k + 1) * (k + 2)) as f64;
+        k += 2;
+        n += 1;
+    }
+    terms
+}
+
+/// c₀ + c₁ z + c₂ z² + …
+#[inline(always)]
+fn polynomial<const N: usize>(z: f64, c: [f64; N]) -> f64 {
+    let mut sum = c[N - 1];
+    for k in (0..N - 1).rev() {
+        sum = sum * z + c[k];
+    }
+    sum
 }
 
 #[cfg(test)]

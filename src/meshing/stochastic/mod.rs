@@ -3,6 +3,8 @@
 mod interpolation;
 mod lattice_walk;
 mod monte_carlo;
+mod paths;
+mod surface;
 
 pub use interpolation::{Interpolation, Placement};
 pub use lattice_walk::{GridWalk, ResidualWalk};

@@ -1,14 +1,11 @@
-use super::super::sides::jump;
 use super::lattice_walk::Samples;
+use super::paths::{Domain, LANES, Lanes};
 use super::{Estimate, Estimates, Estimator, Problem};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::Lattice;
-use crate::numerics::difference::derivative;
 use crate::parallel;
-use crate::random::{Philox, normals, uniform};
+use crate::random::normals;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
-use statrs::function::erf::erfc_inv;
 
 /// Diffusion paths in the continuous computational domain, as published
 ///
@@ -48,13 +45,11 @@ pub struct MonteCarlo {
     pub common: bool,
 }
 
-/// Paths that are computed side by side.
-const LANES: usize = 8;
 const MAX_PATHS: usize = 1 << 31;
 const MAX_SOBOL_PATHS: usize = 1 << 16;
 const MAX_SUBSTEPS: usize = 100_000;
-/// Beyond this exponent a bridge does not leave: e⁻⁴⁰ = 4e-18.
-const FAR: f64 = 40.0;
+/// Blocks of random words from here on decide exits; those before are for increments.
+const EXITS: u32 = 1 << 31;
 
 impl MonteCarlo {
     /// Independent paths, as published.
@@ -107,53 +102,56 @@ impl Estimator for MonteCarlo {
     }
 }
 
-/// Increments of all steps along both axes, for paths side by side.
-type Increments = Vec<[[f64; LANES]; 2]>;
-
 impl MonteCarlo {
     /// The estimate at one node, and the number of path steps it took.
+    #[inline(always)]
     fn point(&self, problem: &Problem<'_>, domain: &Domain, bridge: &Bridge, k: usize) -> (Estimate, usize) {
         let node = if self.common { u32::MAX } else { k as u32 };
         let base = problem.mesh.x()[k];
-        let from = domain.lattice.node(k).map(|i| i as f64);
+        let from = problem.mesh.lattice().node(k).map(|i| i as f64);
+        let words = |block: u32, paths: [u32; LANES]| {
+            problem.random.blocks([[block; LANES], paths, [node; LANES], [problem.step; LANES]])
+        };
         let mut increments = vec![[[0.0; LANES]; 2]; self.substeps];
         let mut samples = Samples::new();
-        let mut pair = [0.0; 2];
         let mut steps = 0;
         for first in (0..self.paths).step_by(LANES) {
+            let paths = std::array::from_fn(|l| first as u32 + l as u32);
             if self.sobol {
-                let [[seed], ..] = problem.random.blocks([[0], [u32::MAX], [node], [problem.step]]);
-                bridge.increments(seed, first as u32, &mut increments);
+                let [[seed, ..], ..] = words(0, [u32::MAX; LANES]);
+                bridge.increments(seed, paths, &mut increments);
             } else {
-                self.increments(problem.random, [first as u32, node, problem.step], &mut increments);
+                self.increments(|block, paths| words(block, paths), paths, &mut increments);
             }
-            for lane in 0..LANES.min(self.paths - first) {
-                let path = (first + lane) as u32;
-                let exits = |block: u32| problem.random.blocks([[block], [path], [node], [problem.step]])[0][0];
-                let (paid, taken) = domain.path(from, &increments, lane, exits);
-                steps += taken;
-                let sample = [0, 1].map(|c| paid[c] - base[c]);
-                if !self.antithetic {
-                    samples.add(sample);
-                } else if lane % 2 == 0 {
-                    pair = sample;
-                } else {
-                    samples.add([0, 1].map(|c| 0.5 * (pair[c] + sample[c])));
+            let count = LANES.min(self.paths - first);
+            let (paid, taken) = domain.walk(from, &increments, count, |exit| words(EXITS | exit, paths));
+            steps += taken;
+            let mut sample = [0, 1].map(|c| paid[c].map(|x| x - base[c]));
+            let mut size = 1;
+            if self.antithetic {
+                size = 2;
+                for c in &mut sample {
+                    (0..count).step_by(2).for_each(|l| c[l] = 0.5 * (c[l] + c[l + 1]));
                 }
             }
+            (0..count).step_by(size).for_each(|l| samples.add([sample[0][l], sample[1][l]]));
         }
         (samples.estimate(base), steps)
     }
 
-    /// Independent standard normal increments of the paths from `first` on: each block of four words serves two steps.
+    /// Independent standard normal increments: each block of four words serves two steps.
     #[inline(always)]
-    fn increments(&self, random: Philox, [first, node, step]: [u32; 3], out: &mut Increments) {
-        let paths = std::array::from_fn(|l| {
-            let path = first.wrapping_add(l as u32);
-            if self.antithetic { path / 2 } else { path }
-        });
+    fn increments(
+        &self,
+        words: impl Fn(u32, [u32; LANES]) -> [[u32; LANES]; 4],
+        mut paths: [u32; LANES],
+        out: &mut [[Lanes; 2]],
+    ) {
+        if self.antithetic {
+            paths = paths.map(|path| path / 2);
+        }
         for (block, two) in out.chunks_mut(2).enumerate() {
-            let [a, b, c, d] = random.blocks([[block as u32; LANES], paths, [node; LANES], [step; LANES]]);
+            let [a, b, c, d] = words(block as u32, paths);
             two[0] = normals(a, b);
             if let Some(second) = two.get_mut(1) {
                 *second = normals(c, d);
@@ -165,210 +163,6 @@ impl MonteCarlo {
             }
         }
     }
-}
-
-/// What paths move in, in units of the lattice spacing.
-struct Domain {
-    lattice: Lattice<2>,
-    /// b Δs at all nodes, periodic axes closed.
-    drift: Vec<[f64; 2]>,
-    /// √(2Δs).
-    spread: [f64; 2],
-    /// 1/Δs along each axis: for products of two distances.
-    sharpness: [f64; 2],
-    /// ∇_ξ of both coordinates, closed: x along ξ, x along η, y along ξ, y along η.
-    slopes: Vec<[f64; 4]>,
-    old: Surface,
-    new: Surface,
-    /// How far old and new side are apart in time, in substeps.
-    substeps: f64,
-    /// Subtract the martingale.
-    control: bool,
-    /// Weigh exits instead of drawing them.
-    weigh: bool,
-}
-
-impl Domain {
-    fn new(problem: &Problem<'_>, settings: &MonteCarlo) -> Self {
-        let substeps = settings.substeps;
-        let (mesh, lattice) = (problem.mesh, *problem.mesh.lattice());
-        let ds = problem.dt / (problem.equation.relaxation * substeps as f64);
-        let n = lattice.cells().map(|n| n as f64);
-        let b = problem.equation.gradient.of_log(&lattice, problem.rho);
-        let drift: Vec<[f64; 2]> = b.iter().map(|b| [b[0] * n[0] * ds, b[1] * n[1] * ds]).collect();
-        let jump = jump(mesh);
-        let [along_xi, along_eta] = [0, 1].map(|d| derivative(&lattice, mesh.x(), d, jump[d]));
-        let slopes: Vec<[f64; 4]> = (along_xi.iter().zip(&along_eta))
-            .map(|(a, b)| [a[0] / n[0], b[0] / n[1], a[1] / n[0], b[1] / n[1]])
-            .collect();
-        Self {
-            lattice,
-            drift: lattice.closed(&drift).into_owned(),
-            spread: n.map(|n| n * (2.0 * ds).sqrt()),
-            sharpness: n.map(|n| 1.0 / (ds * n * n)),
-            slopes: lattice.closed(&slopes).into_owned(),
-            old: Surface::new(&lattice, mesh.x(), jump),
-            new: Surface::new(&lattice, problem.new, jump),
-            substeps: substeps as f64,
-            control: settings.control_variate,
-            weigh: settings.antithetic || settings.sobol || settings.control_variate,
-        }
-    }
-
-    /// What one path pays, and how many steps it took.
-    #[inline(always)]
-    fn path(
-        &self,
-        from: [f64; 2],
-        increments: &Increments,
-        lane: usize,
-        exits: impl Fn(u32) -> u32,
-    ) -> ([f64; 2], usize) {
-        let (cells, periodic) = (self.lattice.cells(), self.lattice.periodic());
-        let mut at = from;
-        let mut martingale = [0.0; 2];
-        let (mut inside, mut paid) = (1.0, [0.0; 2]);
-        for (step, w) in increments.iter().enumerate() {
-            // position in the lattice, turns around periodic axes taken off
-            let place = [0, 1].map(|d| if periodic[d] { at[d].rem_euclid(cells[d] as f64) } else { at[d] });
-            let (k, share) = self.cell(place);
-            let drift = bilinear(&self.drift, cells[1] + 1, k, share);
-            let noise = [0, 1].map(|d| self.spread[d] * w[d][lane]);
-            if self.control {
-                let slope = bilinear(&self.slopes, cells[1] + 1, k, share);
-                (0..2).for_each(|c| martingale[c] += slope[2 * c] * noise[0] + slope[2 * c + 1] * noise[1]);
-            }
-            let next = [0, 1].map(|d| at[d] + drift[d] + noise[d]);
-            for d in (0..2).filter(|&d| !periodic[d]) {
-                let n = cells[d] as f64;
-                for (end, (before, after)) in [(at[d], next[d]), (n - at[d], n - next[d])].into_iter().enumerate() {
-                    let exponent = before * after * self.sharpness[d];
-                    if exponent > FAR {
-                        continue;
-                    }
-                    let mut leaves = if after <= 0.0 { 1.0 } else { (-exponent).exp() };
-                    if !self.weigh && after > 0.0 {
-                        // blocks beyond those of the increments
-                        let word = exits(0x8000_0000 | (step as u32) << 2 | (d as u32) << 1 | end as u32);
-                        leaves = if uniform(word) < leaves { 1.0 } else { 0.0 };
-                    }
-                    if leaves > 0.0 {
-                        let part = before / (before + after.abs()).max(f64::MIN_POSITIVE);
-                        let mut exit = [0, 1].map(|e| at[e] + part * (next[e] - at[e]));
-                        exit[d] = if end == 0 { 0.0 } else { n };
-                        if !periodic[1 - d] {
-                            exit[1 - d] = exit[1 - d].clamp(0.0, cells[1 - d] as f64);
-                        }
-                        let elapsed = (step as f64 + part) / self.substeps;
-                        let (old, new) = (self.old.at(&self.lattice, exit), self.new.at(&self.lattice, exit));
-                        for c in 0..2 {
-                            paid[c] += inside * leaves * (new[c] + elapsed * (old[c] - new[c]) - martingale[c]);
-                        }
-                        inside *= 1.0 - leaves;
-                    }
-                }
-            }
-            if inside <= 0.0 {
-                return (paid, step + 1);
-            }
-            at = next;
-        }
-        let end = self.old.at(&self.lattice, at);
-        ([0, 1].map(|c| paid[c] + inside * (end[c] - martingale[c])), increments.len())
-    }
-
-    /// The first node of the cell that holds a place, and where the place is in it.
-    #[inline(always)]
-    fn cell(&self, place: [f64; 2]) -> (usize, [f64; 2]) {
-        let cells = self.lattice.cells();
-        let [i, j] = [0, 1].map(|d| (place[d] as usize).min(cells[d] - 1));
-        (i * (cells[1] + 1) + j, [place[0] - i as f64, place[1] - j as f64])
-    }
-}
-
-/// Bilinear interpolation in the cell of node k of an array with rows of `width`.
-#[inline(always)]
-fn bilinear<const K: usize>(table: &[[f64; K]], width: usize, k: usize, [s, r]: [f64; 2]) -> [f64; K] {
-    let (low, high) = (&table[k..k + 2], &table[k + width..k + width + 2]);
-    std::array::from_fn(|c| {
-        let below = low[0][c] + r * (low[1][c] - low[0][c]);
-        let above = high[0][c] + r * (high[1][c] - high[0][c]);
-        below + s * (above - below)
-    })
-}
-
-/// Positions as a bicubic function of the lattice coordinates: the cubic through the two nodes on either side
-///
-/// Stored with one more line of nodes around: images on periodic axes, extrapolated ones beyond bounded sides.
-struct Surface {
-    values: Vec<[f64; 2]>,
-    width: usize,
-    jump: [[f64; 2]; 2],
-}
-
-impl Surface {
-    fn new(lattice: &Lattice<2>, x: &[[f64; 2]], jump: [[f64; 2]; 2]) -> Self {
-        let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
-        // lines −1 … cells + 1 along each axis
-        let lines = lattice.cells().map(|n| n + 3);
-        let width = lines[1];
-        let mut values = vec![[0.0; 2]; lines[0] * width];
-        let known = |d: usize, i: usize| periodic[d] || (1..=nodes[d]).contains(&i);
-        for i in (0..lines[0]).filter(|&i| known(0, i)) {
-            for j in (0..width).filter(|&j| known(1, j)) {
-                let lifted = [i + nodes[0] - 1, j + nodes[1] - 1];
-                let value = x[lattice.index([lifted[0] % nodes[0], lifted[1] % nodes[1]])];
-                values[i * width + j] = [0, 1].map(|c| {
-                    value[c] + (0..2).map(|d| ((lifted[d] / nodes[d]) as f64 - 1.0) * jump[d][c]).sum::<f64>()
-                });
-            }
-        }
-        let mut extrapolate = |out: usize, step: isize, lines: usize| {
-            let at = |m: isize| values[out.wrapping_add_signed(m * step)];
-            values[out] = std::array::from_fn(|c| match lines {
-                // three nodes carry a parabola, four a cubic
-                5 => 3.0 * at(1)[c] - 3.0 * at(2)[c] + at(3)[c],
-                _ => 4.0 * at(1)[c] - 6.0 * at(2)[c] + 4.0 * at(3)[c] - at(4)[c],
-            });
-        };
-        if !periodic[0] {
-            for j in (0..width).filter(|&j| known(1, j)) {
-                extrapolate(j, width as isize, lines[0]);
-                extrapolate((lines[0] - 1) * width + j, -(width as isize), lines[0]);
-            }
-        }
-        if !periodic[1] {
-            for i in 0..lines[0] {
-                extrapolate(i * width, 1, width);
-                extrapolate((i + 1) * width - 1, -1, width);
-            }
-        }
-        Self { values, width, jump }
-    }
-
-    #[inline(always)]
-    fn at(&self, lattice: &Lattice<2>, at: [f64; 2]) -> [f64; 2] {
-        let (cells, periodic) = (lattice.cells(), lattice.periodic());
-        let turns = [0, 1].map(|d| if periodic[d] { (at[d] / cells[d] as f64).floor() } else { 0.0 });
-        let place = [0, 1].map(|d| (at[d] - turns[d] * cells[d] as f64).max(0.0));
-        let [i, j] = [0, 1].map(|d| (place[d] as usize).min(cells[d] - 1));
-        let (p, q) = (cubic(place[0] - i as f64), cubic(place[1] - j as f64));
-        let mut sum = [0, 1].map(|c| turns[0] * self.jump[0][c] + turns[1] * self.jump[1][c]);
-        for (line, p) in p.into_iter().enumerate() {
-            let four = &self.values[(i + line) * self.width + j..][..4];
-            for c in 0..2 {
-                sum[c] += p * (q[0] * four[0][c] + q[1] * four[1][c] + q[2] * four[2][c] + q[3] * four[3][c]);
-            }
-        }
-        sum
-    }
-}
-
-/// Weights of nodes −1, 0, 1, 2 in the cubic through them.
-#[inline(always)]
-fn cubic(s: f64) -> [f64; 4] {
-    let (before, after, beyond) = (s + 1.0, s - 1.0, s - 2.0);
-    [-s * after * beyond / 6.0, 0.5 * before * after * beyond, -0.5 * before * s * beyond, before * s * after / 6.0]
 }
 
 /// A path of M steps built from its end, then its middle, then the middles of the halves …, so that the first and best
@@ -402,25 +196,30 @@ impl Bridge {
         Self { knots }
     }
 
-    /// Increments of the paths from `first` on of a scrambled Sobol sequence.
-    fn increments(&self, seed: u32, first: u32, out: &mut Increments) {
-        let mut places = vec![0.0; self.knots.len() + 1];
-        for lane in 0..LANES {
+    /// Increments of paths of a scrambled Sobol sequence.
+    #[inline(always)]
+    fn increments(&self, seed: u32, paths: [u32; LANES], out: &mut [[Lanes; 2]]) {
+        let mut places = vec![[[0.0; LANES]; 2]; self.knots.len() + 1];
+        for (number, knot) in self.knots.iter().enumerate() {
+            // a single-precision number stands for the 2⁻²³ above it: take the middle
+            let [a, b] = [0, 1].map(|axis| {
+                paths.map(|path| {
+                    let point = sobol_burley::sample(path & 0xFFFF, 2 * number as u32 + axis, seed);
+                    ((point * 8_388_608.0) as u32) << 9 | 1 << 8
+                })
+            });
+            let normal = normals(a, b);
+            let ends = knot.ends.map(|end| places[end]);
             for axis in 0..2 {
-                for (number, knot) in self.knots.iter().enumerate() {
-                    let index = (first + lane as u32) & 0xFFFF;
-                    let point = sobol_burley::sample(index, (2 * number + axis) as u32, seed);
-                    // the middle of the 2⁻²³ that a single-precision number stands for
-                    let normal =
-                        -std::f64::consts::SQRT_2 * erfc_inv(2.0 * (f64::from(point) + 0.5 / f64::from(1 << 23)));
-                    let [a, b] = knot.ends.map(|end| places[end]);
-                    places[knot.at] = knot.weights[0] * a + knot.weights[1] * b + knot.deviation * normal;
+                for l in 0..LANES {
+                    places[knot.at][axis][l] = knot.weights[0] * ends[0][axis][l]
+                        + knot.weights[1] * ends[1][axis][l]
+                        + knot.deviation * normal[axis][l];
                 }
-                for (step, w) in out.iter_mut().enumerate() {
-                    w[axis][lane] = places[step + 1] - places[step];
-                }
-                places[0] = 0.0;
             }
+        }
+        for (w, ends) in out.iter_mut().zip(places.windows(2)) {
+            *w = [0, 1].map(|axis| std::array::from_fn(|l| ends[1][axis][l] - ends[0][axis][l]));
         }
     }
 }
