@@ -3,8 +3,8 @@ use crate::density::{Arclength, Strength};
 use crate::error::{Failure, Result};
 use crate::geometry::{Lattice, Mesh, compare};
 use crate::meshing::{
-    Decomposition, Estimator, EstimatorKind, GridWalk, MeshGenerator, MeshOperator, Mmpde, MonteCarlo, Moved, Problem,
-    ResidualWalk, Stochastic, Whole, move_sides,
+    Decomposition, Estimator, EstimatorKind, GridWalk, Interpolation, MeshGenerator, MeshOperator, Mmpde, MonteCarlo,
+    Moved, Placement, Problem, ResidualWalk, Stochastic, Whole, move_sides,
 };
 use crate::numerics::linear::{Robust, Smoother};
 use crate::physics::{Burgers, Convection};
@@ -381,10 +381,15 @@ fn coupled(options: Options) -> Result<Table> {
         simulation.run(&mut state, &mut Record::default(), &mut [])?;
         Ok(state.mesh)
     };
-    let whole = run(Box::new(Whole::default()))?;
+    let whole = run(Box::<Whole>::default())?;
     let jacobi = |walks| ResidualWalk { sweeps: Auto::Value(4), walks, smoother: Smoother::Jacobi };
     let walking = |walk: ResidualWalk| -> Box<dyn MeshGenerator> {
         Box::new(Stochastic::new([4, 4], 1, EstimatorKind::ResidualWalk(walk)))
+    };
+    let sampled = |placement| -> Box<dyn MeshGenerator> {
+        let mut generator = Stochastic::new([4, 4], 1, EstimatorKind::default());
+        generator.interface = Some(Interpolation { sample: 9, placement });
+        Box::new(generator)
     };
     let alone = |walk: ResidualWalk| -> Result<Box<dyn MeshGenerator>> {
         Ok(Box::new(SweepsAlone { walk, decomposition: Decomposition::new(&lattice, [4, 4])? }))
@@ -395,6 +400,8 @@ fn coupled(options: Options) -> Result<Table> {
         ("k=4 by Jacobi, N=10", walking(jacobi(10))),
         ("the default's sweeps, no walk", alone(ResidualWalk::default())?),
         ("the default", walking(ResidualWalk::default())),
+        ("the default on 9 nodes of each interface, by density", sampled(Placement::Density)),
+        ("the default on 9 nodes of each interface, evenly", sampled(Placement::Uniform)),
     ];
     if options.quick {
         rows.remove(1);

@@ -270,9 +270,9 @@ impl Samples {
     #[inline(always)]
     pub fn add(&mut self, sample: [f64; 2]) {
         self.count += 1.0;
-        for c in 0..2 {
-            self.sums[c] += sample[c];
-            self.squares[c] += sample[c] * sample[c];
+        for (c, sample) in sample.into_iter().enumerate() {
+            self.sums[c] += sample;
+            self.squares[c] += sample * sample;
         }
     }
 

@@ -121,7 +121,7 @@ impl MonteCarlo {
                 let [[seed, ..], ..] = words(0, [u32::MAX; LANES]);
                 bridge.increments(seed, paths, &mut increments);
             } else {
-                self.increments(|block, paths| words(block, paths), paths, &mut increments);
+                self.increments(words, paths, &mut increments);
             }
             let count = LANES.min(self.paths - first);
             let (paid, taken) = domain.walk(from, &increments, count, |exit| words(EXITS | exit, paths));
