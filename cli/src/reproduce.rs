@@ -1,4 +1,4 @@
-use crate::terminal::say;
+use crate::terminal::{say, use_threads};
 use clap::Args;
 use driftmesh::Error;
 use driftmesh::reproduce::{ITEMS, Options};
@@ -13,6 +13,9 @@ pub struct Reproduce {
     /// Fewer rows and samples: everything in about a minute.
     #[arg(long)]
     quick: bool,
+    /// Threads to use; all cores where nothing is said.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Directory for the tables, one Markdown file an item.
     #[arg(long, value_name = "DIR", default_value = "out/reproduce")]
     out: PathBuf,
@@ -22,6 +25,7 @@ impl Reproduce {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
         let unwritable =
             |path: &PathBuf, error: std::io::Error| Error::Unwritable { path: path.clone(), reason: error.to_string() };
+        use_threads(self.threads)?;
         std::fs::create_dir_all(&self.out).map_err(|error| unwritable(&self.out, error))?;
         for item in ITEMS.iter().filter(|item| self.items.is_empty() || self.items.iter().any(|name| name == item.name))
         {

@@ -27,10 +27,7 @@ impl Run {
         let study = self.study.read()?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&study.study.name));
         RunDirectory::check(&out)?;
-        if let Some(threads) = self.threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-            pool.map_err(|error| Error::invalid("--threads", threads, format!("no such pool can be made: {error}")))?;
-        }
+        terminal::use_threads(self.threads)?;
         let mut progress = Progress::new();
         let finished = if self.quiet {
             study::run(&study, &out, &mut [])

@@ -157,7 +157,9 @@ impl<const D: usize> MeshOperator<D> {
         jump: [[f64; K]; D],
     ) -> Vec<[f64; K]> {
         let padded = patch.gather(&self.lattice, old, jump);
-        patch.places().map(|place| padded[place]).collect()
+        let mut right = Vec::with_capacity(patch.len());
+        patch.pencils().for_each(|start| right.extend_from_slice(&padded[start..start + patch.pencil_len()]));
+        right
     }
 }
 

@@ -188,28 +188,30 @@ impl Table {
     fn new(problem: &Problem<'_>) -> Result<Self, Failure> {
         let lattice = problem.mesh.lattice();
         problem.operator.check_weights(problem.mesh)?;
-        let (nodes, strides) = (lattice.nodes(), lattice.strides());
-        let row = |(k, weights): (usize, &[[f64; 2]; 2])| {
-            let node = lattice.node(k);
+        let (nodes, strides, periodic) = (lattice.nodes(), lattice.strides(), lattice.periodic());
+        let places = (0..nodes[0]).flat_map(|i| (0..nodes[1]).map(move |j| [i, j]));
+        let row = |(k, (node, weights)): (usize, ([usize; 2], &[[f64; 2]; 2]))| {
             let mut row = Row { thresholds: [0; 4], neighbours: [k as u32; 4] };
-            if (0..2).any(|d| !lattice.periodic()[d] && (node[d] == 0 || node[d] + 1 == nodes[d])) {
+            if (0..2).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d])) {
                 return row; // a side: the walk ends here
             }
-            let diagonal = 1.0 + weights.as_flattened().iter().sum::<f64>();
+            let scale = 4_294_967_296.0 / (1.0 + weights.as_flattened().iter().sum::<f64>());
             let mut sum = 0.0;
             for d in 0..2 {
-                let first = k - node[d] * strides[d];
-                for (end, weight) in weights[d].into_iter().enumerate() {
-                    let to = (node[d] + nodes[d] + 2 * end - 1) % nodes[d];
+                // one step, or back along the whole axis
+                let (step, back) = (strides[d], strides[d] * (nodes[d] - 1));
+                let below = if node[d] == 0 { k + back } else { k - step };
+                let above = if node[d] + 1 == nodes[d] { k - back } else { k + step };
+                for (e, (to, weight)) in [below, above].into_iter().zip(weights[d]).enumerate() {
                     sum += weight;
-                    row.neighbours[2 * d + end] = (first + to * strides[d]) as u32;
+                    row.neighbours[2 * d + e] = to as u32;
                     // casts of floats saturate
-                    row.thresholds[2 * d + end] = (sum / diagonal * 4_294_967_296.0).round() as u32;
+                    row.thresholds[2 * d + e] = (sum * scale + 0.5) as u32;
                 }
             }
             row
         };
-        Ok(Self { rows: problem.operator.weights().iter().enumerate().map(row).collect() })
+        Ok(Self { rows: places.zip(problem.operator.weights()).enumerate().map(row).collect() })
     }
 
     /// For each point the mean of `pay` − `base` of the point over where walks from there stop, plus `base`; `jump` is
