@@ -151,8 +151,12 @@ impl Failure {
     /// The keys of a study that may cure it.
     pub fn help(&self) -> &'static str {
         match self {
-            Self::Folded { .. } => "raise monitor.smoothing, lower monitor.strength or lower time.step",
-            Self::NonFinite { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
+            Self::Folded { .. } => {
+                "raise monitor.smoothing, lower monitor.strength or lower time.step; where walks or paths are few, raise their number"
+            }
+            Self::NonFinite { .. } => {
+                "mend the formula that gives it, if one does; else lower time.step, refine grid.cells or raise monitor.smoothing"
+            }
             Self::NotPositive { .. } => {
                 "mend the formula that gives it, if one does; else lower time.step or refine grid.cells"
             }

@@ -1,6 +1,5 @@
 use crate::{StudyArgs, progress::Progress, terminal};
 use clap::Args;
-use driftmesh::Error;
 use driftmesh::meshing::Interface;
 use driftmesh::simulation::{Observer, RunDirectory, Summary};
 use driftmesh::study;

@@ -72,7 +72,7 @@ impl PdeKind {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`](crate::Error::Invalid).
+    /// [`Error::Invalid`] or [`Error::Formula`].
     pub fn check(&self) -> Result<()> {
         match self {
             Self::Burgers(burgers) => burgers.check(),

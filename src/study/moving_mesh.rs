@@ -360,7 +360,7 @@ impl MovingMesh {
         };
         let help = error.help()?;
         let words = help.split(' ').map(|word| {
-            let key = word.trim_end_matches(',');
+            let key = word.trim_end_matches([',', ';']);
             present(key).map_or(word.to_string(), |text| text + &word[key.len()..])
         });
         Some(words.collect::<Vec<_>>().join(" "))
