@@ -13,7 +13,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Failure {
     /// A mesh cell has a corner whose Jacobian is not positive.
-    #[error("the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {}, y = {}", cell[0], cell[1], short(x[0]), short(x[1]))]
+    #[error("the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {}, y = {}{}", cell[0], cell[1], short(x[0]), short(x[1]), noisy(*noise))]
     Folded {
         /// Indices of the cell along ξ and η.
         cell: [usize; 2],
@@ -21,6 +21,8 @@ pub enum Failure {
         jacobian: f64,
         /// Where the corner is.
         x: [f64; 2],
+        /// Standard error of the interface values that made the mesh, as a share of its shortest edge before.
+        noise: Option<f64>,
     },
     /// A quantity stopped being finite.
     #[error("{what} is {value} at node ({}, {}), x = {}, y = {}", node[0], node[1], short(x[0]), short(x[1]))]
@@ -88,6 +90,20 @@ pub enum Failure {
         /// Where the node is.
         x: Vec<f64>,
     },
+    /// Random walks that would not end in any time worth waiting for.
+    #[error(
+        "{walks} random walks from each of {points} points would take too long: Δt/(τh²) = {stiffness:.1e}, about {jumps:.1e} jumps a walk"
+    )]
+    LongWalks {
+        /// Δt/(τh²), the larger of both axes.
+        stiffness: f64,
+        /// Mean jumps of a walk, about.
+        jumps: f64,
+        /// Walks from each point.
+        walks: usize,
+        /// Points.
+        points: usize,
+    },
     /// Interface values are so noisy that cells can fold.
     #[error(
         "interface values are too noisy: standard error {noise:.1e}, shortest edge of the mesh {edge:.1e}, Δt/(τh²) = {stiffness:.3}"
@@ -141,6 +157,7 @@ impl Failure {
             Self::NewtonStalled { .. } => "newton-stalled",
             Self::LinearStalled { .. } => "linear-stalled",
             Self::SteepDensity { .. } => "steep-density",
+            Self::LongWalks { .. } => "long-walks",
             Self::NoisyInterface { .. } => "noisy-interface",
             Self::SchwarzStalled { .. } => "schwarz-stalled",
             Self::Subdomains { .. } => "subdomains",
@@ -152,7 +169,7 @@ impl Failure {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Folded { .. } => {
-                "raise monitor.smoothing, lower monitor.strength or lower time.step; where walks or paths are few, raise their number"
+                "raise monitor.smoothing, lower monitor.strength or lower time.step; set monitor.gradient to \"safe\" where the density is very steep"
             }
             Self::NonFinite { .. } => {
                 "mend the formula that gives it, if one does; else lower time.step, refine grid.cells or raise monitor.smoothing"
@@ -162,14 +179,21 @@ impl Failure {
             }
             Self::NotPeriodic { .. } => "set domain.periodic to [true, true]",
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
-            Self::LinearStalled { .. } => "lower time.step or raise mesh.relaxation",
+            Self::LinearStalled { .. } => {
+                "lower time.step or raise mesh.relaxation; set monitor.gradient to \"safe\" where the density is very steep"
+            }
             Self::SteepDensity { .. } => {
-                "set monitor.gradient = \"safe\", which bounds |b|h, or raise monitor.smoothing"
+                "set monitor.gradient to \"safe\", which bounds |b|h, or raise monitor.smoothing"
+            }
+            Self::LongWalks { .. } => {
+                "raise mesh.relaxation, lower time.step or the number of walks, or use the generator \"whole\""
             }
             Self::NoisyInterface { .. } => {
-                "raise mesh.generator.estimator.walks or its sweeps (paths for monte-carlo), or set them to \"auto\""
+                "raise mesh.generator.estimator.walks (or paths), or use the residual walk with sweeps = \"auto\""
             }
-            Self::SchwarzStalled { .. } => "raise mesh.generator.overlap or lower time.step",
+            Self::SchwarzStalled { .. } => {
+                "raise mesh.generator.iterations or mesh.generator.overlap, or lower time.step"
+            }
             Self::Subdomains { .. } => "give every axis between one subdomain and one a cell",
             Self::WrongLength { .. } => "give one value a node, in lattice order",
         }
@@ -260,6 +284,16 @@ fn tuple(items: impl Iterator<Item = impl std::fmt::Display>) -> String {
     format!("({})", items.map(|item| item.to_string()).collect::<Vec<_>>().join(", "))
 }
 
+/// What noise may have to do with a mesh that folded.
+fn noisy(noise: Option<f64>) -> String {
+    noise.map_or(String::new(), |noise| {
+        format!(
+            "; its interface values had a standard error of {:.1} % of the shortest edge: more walks lower it",
+            100.0 * noise
+        )
+    })
+}
+
 /// A coordinate in a few characters, whatever its size.
 fn short(x: f64) -> String {
     if x == 0.0 || (1e-3..1e6).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.3e}") }
@@ -288,7 +322,7 @@ impl Error {
         let text = value.to_string();
         // very large and very small numbers as powers of ten
         let value = match text.parse::<f64>() {
-            Ok(number) if text.len() > 14 => format!("{number:e}"),
+            Ok(number) if text.len() > 20 || text.len() > 14 && text.contains('.') => format!("{number:e}"),
             _ => text,
         };
         Self::Invalid { key: key.into(), value, rule: rule.into() }

@@ -112,7 +112,7 @@ fn steep_density() {
     let error = step(Stochastic::new([2, 2], 0, EstimatorKind::default()), 1e3, 1e-3);
     assert_eq!(error.name(), "steep-density");
     let message = "the density is too steep for random walks: |b|h = 499.500 at node (3, 1), x = (0.3750, 0.1250)";
-    assert_says(error, &[message, "at most 2"], Some("monitor.gradient = \"safe\""), true);
+    assert_says(error, &[message, "at most 2"], Some("monitor.gradient to \"safe\""), true);
 }
 
 #[test]
@@ -122,6 +122,15 @@ fn noisy_interface() {
     assert_eq!(error.name(), "noisy-interface");
     let message = ["interface values are too noisy: standard error", "shortest edge", "Δt/(τh²) = 64"];
     assert_says(error, &message, Some("estimator.walks"), true);
+}
+
+#[test]
+fn long_walks() {
+    let walks = EstimatorKind::GridWalk(GridWalk { walks: 1 << 31, increment: false });
+    let error = step(Stochastic::new([2, 2], 0, walks), 1.5, 1.0);
+    assert_eq!(error.name(), "long-walks");
+    let message = ["2147483648 random walks from each of 13 points", "Δt/(τh²) = 6.4e1", "jumps a walk"];
+    assert_says(error, &message, Some("mesh.relaxation"), true);
 }
 
 #[test]

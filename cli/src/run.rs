@@ -76,8 +76,9 @@ fn table(summary: &Summary) -> String {
         }
         text.push('\n');
     }
-    if let Some(interface) = summary.reports.last().and_then(|report| report.interface) {
-        text += &interfaces(&interface);
+    let last = summary.reports.last().and_then(|report| Some((report.t, report.interface?)));
+    if let Some((t, interface)) = last.filter(|(_, interface)| interface.points > 0) {
+        text += &interfaces(t, &interface);
     }
     let (total, s) = (summary.work, summary.seconds);
     text += &format!(
@@ -97,9 +98,9 @@ fn table(summary: &Summary) -> String {
     )
 }
 
-/// How well the subdomains fit together at the end.
-fn interfaces(interface: &Interface) -> String {
-    let mut text = format!("between  {} interface points", interface.points);
+/// How well the subdomains fit together at the last report.
+fn interfaces(t: f64, interface: &Interface) -> String {
+    let mut text = format!("between  {} interface points at t = {t}", interface.points);
     if let (Some(error), Some(noise)) = (interface.standard_error, interface.noise) {
         text += &format!(", standard error {error:.1e}, {noise:.1e} of the shortest edge");
     }

@@ -191,7 +191,9 @@ fn bad_settings_are_refused_by_name() {
         ("monitor.gradient=save", &["did you mean `safe`?"]),
         ("study.name=\"../x\"", &["`study.name`"]),
         ("output.frames.every=0", &["`output.frames.every` is 0"]),
-        ("output.frames.times=[nan]", &["`output.frames.times`", "finite"]),
+        ("output.frames.times=[nan]", &["`output.frames.times` is NaN"]),
+        ("output.frames.times=[7.0]", &["is 7, but must lie between time.start = 0.25"]),
+        ("monitor.strength=30", &["must be a table", "write strength = { relative = 30.0 }"]),
         // wrong types and names
         ("pde.viscosty=1", &["unknown key `viscosty`", "did you mean `viscosity`?"]),
         ("pdes.viscosity=1", &["unknown key `pdes`", "did you mean `pde`?"]),
@@ -228,6 +230,14 @@ fn formulas_are_warned_of_and_checked() {
     assert_eq!(output.status.code(), Some(0), "{said}");
     let expected = "warning: `pde.u` is not periodic along x: from x = 1 to x = 0 it jumps by up to 2.0e0";
     assert!(said.contains(expected) && !said.contains("along y"), "{said}");
+    std::fs::remove_dir_all(sandbox.path("out")).unwrap();
+    // rounding is no jump, whatever the values on the seam
+    let rounding = with("u=\"sin(2*pi*x)*cos(2*pi*y)\"");
+    assert!(rounding.status.success() && !words(&rounding).contains("warning"), "{}", words(&rounding));
+    let burgers = "pde={kind=\"burgers\",viscosity=0.01,initial=\"0.5 + 0.1*cos(2*pi*x)\",boundary=\"0.6 + 0.1*t*x\"}";
+    let said = words(&sandbox.run(&["domain.periodic=[true,false]", "compare.generator.kind=whole", burgers]));
+    assert!(said.contains("`pde.boundary` is not periodic along x") && said.contains("by up to 2.7e-2"), "{said}");
+    assert!(said.contains("`pde.boundary` is not `pde.initial` at the start"), "{said}");
     std::fs::remove_dir_all(sandbox.path("out")).unwrap();
 
     // the arc-length table of the study is refused for a prescribed density, not ignored

@@ -352,8 +352,9 @@ impl Parser<'_> {
             .collect();
         let lower = name.to_ascii_lowercase();
         // short names all lie near each other: at most every other letter may differ
-        let nearest = (known.iter().map(|k| (strsim::damerau_levenshtein(&lower, &k.to_ascii_lowercase()), *k)))
-            .filter(|(distance, k)| *distance <= (k.len().min(name.len()) / 2).min(2))
+        let distance = |k: &str| strsim::damerau_levenshtein(&lower, &k.to_ascii_lowercase());
+        let nearest = (known.iter().map(|k| (distance(k), (!lower.starts_with(k), k.len().abs_diff(name.len())), *k)))
+            .filter(|(distance, _, k)| *distance <= (k.len().min(name.len()) / 2).min(2))
             .min();
         let inverse = ["a", "arc", "ar"].iter().filter_map(|prefix| lower.strip_prefix(prefix));
         let inverse = inverse
@@ -361,7 +362,7 @@ impl Parser<'_> {
             .any(|rest| ["sin", "cos", "tan", "sinh", "cosh", "tanh"].contains(&rest));
         let help = match (ABSENT.iter().find(|(absent, _)| *absent == lower), nearest) {
             (Some((_, help)), _) => help.to_string(),
-            (None, Some((_, nearest))) if !inverse => format!("did you mean `{nearest}`?"),
+            (None, Some((_, _, nearest))) if !inverse => format!("did you mean `{nearest}`?"),
             _ => format!("known here: {}", known.join(", ")),
         };
         Mistake::new(span, format!("unknown name `{}`", shortened(name))).help(help)

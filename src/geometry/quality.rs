@@ -99,11 +99,13 @@ pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
 /// ```
 pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
     let rho = mesh.lattice().closed(rho);
+    // its scale cancels, and must not overflow
+    let scale = rho.iter().fold(0.0_f64, |m, &rho| m.max(rho)).recip();
     let (mut q_max, mut q_sum, mut j_min) = (0.0_f64, 0.0, f64::INFINITY);
     let (mut share_max, mut share_sum, mut count) = (0.0_f64, 0.0, 0.0);
     for_each_cell(mesh, |_, nodes, corners| {
         let q = shape(corners);
-        let share = 0.25 * nodes.iter().map(|&k| rho[k]).sum::<f64>() * area(corners);
+        let share = 0.25 * nodes.iter().map(|&k| rho[k] * scale).sum::<f64>() * area(corners);
         q_max = q_max.max(q);
         q_sum += q;
         share_max = share_max.max(share);
@@ -188,7 +190,9 @@ pub fn check_unfolded(mesh: &Mesh<2>) -> Result<(), Failure> {
     });
     match worst {
         None => Ok(()),
-        Some((jacobian, cell, x)) => Err(Failure::Folded { cell, jacobian: jacobian / uniform_jacobian(mesh), x }),
+        Some((jacobian, cell, x)) => {
+            Err(Failure::Folded { cell, jacobian: jacobian / uniform_jacobian(mesh), x, noise: None })
+        }
     }
 }
 

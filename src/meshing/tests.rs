@@ -4,6 +4,7 @@ use crate::numerics::difference::Gradient;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, SparseLu};
 use crate::setting::Auto;
 use proptest::prelude::*;
+use std::f64::consts::PI;
 
 const DT: f64 = 1e-3;
 
@@ -13,7 +14,7 @@ fn mesh(cells: [usize; 2], periodic: [bool; 2]) -> Mesh<2> {
 
 /// A smooth density with a bump of the given height, periodic on the box.
 fn bump(mesh: &Mesh<2>, height: f64, centre: f64) -> Vec<f64> {
-    let wave = |s: f64| (2.0 * std::f64::consts::PI * (s - centre)).cos();
+    let wave = |s: f64| (2.0 * PI * (s - centre)).cos();
     let place = |x: [f64; 2]| [0.5 * (x[0] + 1.0), x[1] - 2.0];
     mesh.x().iter().map(|&x| place(x)).map(|[s, r]| 1.0 + height * (2.0 * (wave(s) + wave(r) - 2.0)).exp()).collect()
 }
@@ -210,6 +211,65 @@ fn monte_carlo_has_a_bias_of_first_order() {
     let (coarse, fine) = (bias(2), bias(8));
     let expected = (1.0 / 2.0 - 1.0 / 64.0) / (1.0 / 8.0 - 1.0 / 64.0);
     assert!((coarse / fine / expected - 1.0).abs() < 0.25, "{coarse:e} and {fine:e}: {} for {expected}", coarse / fine);
+}
+
+/// However stiff the step, automatic sweeps leave so little that walks can fold nothing; where walks would take too long
+/// there are none, and the bound that the residual gives holds.
+#[test]
+fn automatic_sweeps_meet_any_stiffness() {
+    for periodic in [[false, false], [true, true]] {
+        let start = mesh([20, 24], periodic);
+        let rho = bump(&start, 20.0, 0.3);
+        for relaxation in [1.0, 1e-2, 1e-4, 1e-6] {
+            let equation = Mmpde { relaxation, gradient: Gradient::Safe };
+            let exact = Whole::default().step(&equation, &start, &rho, DT).unwrap().mesh;
+            let mut walks = Stochastic::new([3, 3], 1, EstimatorKind::default());
+            let found = walks.step(&equation, &start, &rho, DT).unwrap();
+            let (error, edge) = (largest_difference(&found.mesh, &exact), start.shortest_edge());
+            assert!(error < 0.01 * edge, "{periodic:?}, τ = {relaxation}: {error:e} of {edge:e}");
+            let interface = found.interface.unwrap();
+            if found.work.path_steps == 0 {
+                // a bound on what the sweeps leave; the reference is solved to round-off
+                assert!(error <= interface.standard_error.unwrap() + 1e-9, "{error:e} for {interface:?}");
+            }
+        }
+    }
+    // on an axis without sides nothing else stops a walk
+    let start = mesh([20, 24], [true, true]);
+    let equation = Mmpde { relaxation: 1e-9, gradient: Gradient::Safe };
+    let grid = EstimatorKind::GridWalk(GridWalk { walks: 100, increment: false });
+    let refused = Stochastic::new([3, 3], 1, grid).step(&equation, &start, &bump(&start, 20.0, 0.3), DT);
+    let long = matches!(refused, Err(Failure::LongWalks { stiffness, .. }) if stiffness > 1e8);
+    assert!(long, "{:?}", refused.err());
+}
+
+/// Paths that leave pay the side where and when they leave: y_t = ∇²y on the unit square with the sides at ξ = 0 and 1
+/// moving evenly in time has the exact solution y = η + sin(πη) (s A(ξ) + B(ξ)) c/Δt.
+#[test]
+fn paths_pay_moving_sides() {
+    let (dt, c) = (0.02, 0.1);
+    let at_end = |[xi, eta]: [f64; 2], s: f64| {
+        let (z, half) = (PI * (xi - 0.5), PI / 2.0);
+        let a = z.cosh() / half.cosh();
+        let b = (z * z.sinh() - half * half.tanh() * z.cosh()) / (2.0 * PI * PI * half.cosh());
+        [xi, eta + (PI * eta).sin() * c / dt * (s * a + b)]
+    };
+    let uniform = Mesh::uniform(Lattice::bounded([24, 24]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+    let positions = |s: f64| -> Vec<[f64; 2]> { uniform.x().iter().map(|&x| at_end(x, s)).collect() };
+    let (start, rho) = (uniform.moved(positions(0.0)).unwrap(), vec![1.0; uniform.x().len()]);
+    let equation = Mmpde::default();
+    let operator = equation.operator(start.lattice(), &rho, dt).unwrap();
+    let new = positions(dt);
+    let problem = Problem::new(&equation, &operator, &start, &rho, dt, &new, 3, 0);
+    let points: Vec<usize> = [[1, 12], [3, 12], [6, 9]].map(|node| start.lattice().index(node)).to_vec();
+    for control_variate in [false, true] {
+        let monte = MonteCarlo { control_variate, ..MonteCarlo::new(20_000, 40) };
+        for (&k, found) in points.iter().zip(monte.estimate(&problem, &points).unwrap().points) {
+            let (error, standard) = (found.x[1] - new[k][1], found.standard_error[1]);
+            assert!(error.abs() < 3.0 * standard + 2e-4, "{control_variate}: off by {error:e}, ± {standard:e}");
+            assert!((new[k][1] - start.x()[k][1]).abs() > 2e-3, "nothing moves: the test cannot fail");
+        }
+    }
 }
 
 /// The same bits for 1, 2 and 4 threads, for every estimator and for Schwarz, also over several steps.

@@ -96,7 +96,7 @@ impl PdeKind {
     /// The formulas of x, y and t that are meant on the whole domain, by their keys.
     pub fn formulas(&self) -> Vec<(&'static str, &str)> {
         let all = match self {
-            Self::Burgers(burgers) => vec![("initial", &burgers.initial)],
+            Self::Burgers(burgers) => vec![("initial", &burgers.initial), ("boundary", &burgers.boundary)],
             Self::ShallowWater(_) => vec![],
             Self::Prescribed(prescribed) => vec![("u", &prescribed.u), ("rho", &prescribed.rho)],
         };

@@ -1,4 +1,4 @@
-use super::{Seconds, Simulation, State, timed};
+use super::{NOISE_WORTH_A_WARNING, Seconds, Simulation, State, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
@@ -73,7 +73,11 @@ pub(super) fn advance(
                 let carried = if sub == 0 { None } else { Some(interpolate(&state.mesh, &rho, &mesh)) };
                 let rho = carried.as_ref().unwrap_or(&rho);
                 let moved = generator.step(equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
-                check_unfolded(&moved.mesh)?;
+                let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
+                check_unfolded(&moved.mesh).map_err(|failure| match failure {
+                    Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
+                    other => other,
+                })?;
                 mesh = moved.mesh;
                 work += moved.work;
                 spent += moved.interface.map_or(0.0, |i| i.seconds);

@@ -90,6 +90,7 @@ pub struct Simulation {
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
 pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
 const NOISY: &str = "interface values are noisy";
+const UNKNOWN: &str = "the standard error of interface values is not known";
 
 impl Simulation {
     /// The state at the start, on a given mesh.
@@ -152,18 +153,24 @@ impl Simulation {
         self.show(Event::Finished, state, record, observers, 0.0, started)
     }
 
-    /// Says once in a run that interface values are noisy.
+    /// Says once in a run that interface values are noisy, or that nobody knows.
     fn warn_of_noise(&self, state: &State, record: &mut Record) {
-        let Some(noise) = record.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING) else {
-            return;
-        };
-        if !record.warnings.iter().any(|warning| warning.starts_with(NOISY)) {
-            let (percent, limit) = (100.0 * noise, 100.0 * NOISE_WORTH_A_WARNING);
-            record.warnings.push(format!(
-                "{NOISY}: from t = {} on their standard error is {percent:.1} % of the shortest edge of the mesh or more \
-                 (said above {limit} %); more walks, or more sweeps, lower it",
+        let Some(interface) = record.interface.filter(|i| i.points > 0 && i.contraction.is_none()) else { return };
+        let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * NOISE_WORTH_A_WARNING);
+        let warning = match percent {
+            None => format!(
+                "{UNKNOWN}: at t = {} it cannot be told from these samples; it takes two or more a point",
                 state.t
-            ));
+            ),
+            Some(percent) if percent > limit => format!(
+                "{NOISY}: from t = {} on their standard error is {percent:.1} % of the shortest edge of the mesh or more \
+                 (said above {limit} %); more walks or paths, or more sweeps, lower it",
+                state.t
+            ),
+            Some(_) => return,
+        };
+        if !record.warnings.iter().any(|said| said.split(':').next() == warning.split(':').next()) {
+            record.warnings.push(warning);
         }
     }
 

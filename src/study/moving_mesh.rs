@@ -3,7 +3,7 @@ use crate::density::{Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{GeneratorKind, Mmpde};
-use crate::physics::{PdeKind, formula};
+use crate::physics::{Burgers, PdeKind, formula};
 use crate::setting::pair;
 use crate::simulation::{Coupling, FramesAt, Schedule, Simulation};
 use serde::{Deserialize, Serialize};
@@ -164,6 +164,10 @@ pub struct Output {
 /// reserve.
 const BYTES_PER_NODE: u128 = 2600;
 const FRAMES_BY_DEFAULT: usize = 20;
+/// Places along an axis at which formulas are looked at.
+const SAMPLES: usize = 100;
+/// A difference, as a share of the largest value, that is not of rounding.
+const NOT_ROUNDING: f64 = 1e-9;
 
 impl MovingMesh {
     /// Reads and checks a study, every default filled in.
@@ -201,9 +205,9 @@ impl MovingMesh {
             false => MonitorKind::default(),
         });
         monitor.check().map_err(|error| error.within("monitor"))?;
-        if prescribed_density && !matches!(monitor, MonitorKind::Given(_)) {
+        if let (true, MonitorKind::Arclength(_)) = (prescribed_density, monitor) {
             let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
-            return Err(Error::invalid("monitor.kind", "another", rule));
+            return Err(Error::invalid("monitor.kind", "\"arclength\"", rule));
         }
         self.equation().check().map_err(|error| error.within("mesh"))?;
         self.mesh.coupling.check().map_err(|error| error.within("coupling").within("mesh"))?;
@@ -212,7 +216,7 @@ impl MovingMesh {
         }
         let steps = self.schedule()?.steps();
         let frames = self.output.frames.get_or_insert(FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)));
-        frames.check().map_err(|error| error.within("output"))
+        frames.check([self.time.start, self.time.end]).map_err(|error| error.within("output"))
     }
 
     /// Refuses axes that the equation is not made for.
@@ -243,34 +247,59 @@ impl MovingMesh {
         Err(Error::invalid("domain.periodic", format!("{periodic:?}"), rule))
     }
 
-    /// What is allowed but probably not meant: formulas that are not periodic on periodic axes.
+    /// What is allowed but probably not meant: formulas that are not periodic on periodic axes, or that contradict each
+    /// other on a side.
     ///
     /// # Errors
     /// As [`MovingMesh::resolve`].
     pub fn warnings(&self) -> Result<Vec<String>> {
-        const ALONG: usize = 100;
         let mut warnings = Vec::new();
         let Domain { lower, upper, periodic } = self.domain;
+        let samples =
+            |d: usize| (0..=SAMPLES).map(move |k| lower[d] + (upper[d] - lower[d]) * k as f64 / SAMPLES as f64);
         for (key, text) in self.pde.formulas() {
             let f = formula(key, text).map_err(|error| error.within("pde"))?;
             for d in (0..2).filter(|&d| periodic[d]) {
-                let (mut jump, mut size) = (0.0_f64, 0.0_f64);
-                for k in 0..=ALONG {
-                    let along = lower[1 - d] + (upper[1 - d] - lower[1 - d]) * k as f64 / ALONG as f64;
-                    let [a, b] = [lower[d], upper[d]].map(|across| {
+                let mut jump = 0.0_f64;
+                let mut size = 0.0_f64;
+                for (t, along) in
+                    [self.time.start, self.time.end].iter().flat_map(|t| samples(1 - d).map(move |s| (t, s)))
+                {
+                    let at = |across: f64| {
                         let x = if d == 0 { [across, along] } else { [along, across] };
-                        f.eval(&[x[0], x[1], self.time.start])
-                    });
-                    jump = jump.max((a - b).abs());
-                    size = size.max(a.abs()).max(b.abs());
+                        f.eval(&[x[0], x[1], *t])
+                    };
+                    jump = jump.max((at(lower[d]) - at(upper[d])).abs());
+                    size = samples(d).fold(size, |size, across| size.max(at(across).abs()));
                 }
-                if jump > 1e-9 * size {
+                if jump > NOT_ROUNDING * size {
                     let axis = ["x", "y"][d];
                     warnings.push(format!(
                         "`pde.{key}` is not periodic along {axis}: from {axis} = {} to {axis} = {} it jumps by up to {jump:.1e}",
                         upper[d], lower[d]
                     ));
                 }
+            }
+        }
+        if let PdeKind::Burgers(Burgers { initial: Some(initial), boundary: Some(boundary), .. }) = &self.pde {
+            let [initial, boundary] = [formula("initial", initial)?, formula("boundary", boundary)?];
+            let mut worst = (0.0_f64, [0.0; 2]);
+            let mut size = 0.0_f64;
+            for d in (0..2).filter(|&d| !periodic[d]) {
+                for (across, along) in [lower[d], upper[d]].iter().flat_map(|x| samples(1 - d).map(move |s| (*x, s))) {
+                    let x = if d == 0 { [across, along] } else { [along, across] };
+                    let [u, side] = [&initial, &boundary].map(|f| f.eval(&[x[0], x[1], self.time.start]));
+                    size = size.max(u.abs()).max(side.abs());
+                    if (u - side).abs() > worst.0 {
+                        worst = ((u - side).abs(), x);
+                    }
+                }
+            }
+            if worst.0 > NOT_ROUNDING * size {
+                let (gap, [x, y]) = worst;
+                warnings.push(format!(
+                    "`pde.boundary` is not `pde.initial` at the start: on the sides they differ by up to {gap:.1e}, at x = {x}, y = {y}"
+                ));
             }
         }
         Ok(warnings)

@@ -108,7 +108,15 @@ impl Source {
         for path in sections.iter().map(String::as_str).chain(KINDED).chain(CHOICES).chain(["mesh.coupling"]) {
             if let Some((_, value)) = entry(&mut root, path).filter(|(_, value)| !value.get_ref().is_table()) {
                 let message = format!("`{path}` must be a table, but this is of type {}", value.get_ref().type_str());
-                return Err(self.diagnostic(&message, value.span(), None));
+                let form = match path {
+                    "monitor.strength" => "{ relative = 30.0 }",
+                    "output.frames" => "{ every = 50 }",
+                    "mesh.coupling" => "{ mesh_steps = 1, iterations = 1 }",
+                    path if KINDED.contains(&path) => "{ kind = \"…\" }",
+                    _ => return Err(self.diagnostic(&message, value.span(), Some(format!("begin it with [{path}]")))),
+                };
+                let name = path.rsplit('.').next().unwrap_or(path);
+                return Err(self.diagnostic(&message, value.span(), Some(format!("write {name} = {form}"))));
             }
         }
         for path in KINDED {
@@ -157,8 +165,21 @@ impl Source {
     fn inside(&self, span: Range<usize>, text: &str, at: &Range<usize>) -> Range<usize> {
         let piece = self.pieces.iter().rev().find(|p| span.start >= p.begins).unwrap_or(&self.pieces[0]);
         let token = piece.padded.get(span.clone()).unwrap_or_default();
-        match token.find(text) {
-            Some(offset) => span.start + offset + at.start..span.start + offset + at.end.max(at.start + 1),
+        // the bytes of the token that are text: a backslash at the end of a line takes the space after it along
+        let mut places = Vec::with_capacity(token.len());
+        let mut plain = Vec::with_capacity(token.len());
+        let mut rest = token.char_indices().peekable();
+        while let Some((place, c)) = rest.next() {
+            if c == '\\' && token[place + 1..].starts_with(['\n', '\r']) {
+                while rest.next_if(|(_, c)| c.is_whitespace()).is_some() {}
+            } else {
+                places.extend(place..place + c.len_utf8());
+                plain.extend_from_slice(&token.as_bytes()[place..place + c.len_utf8()]);
+            }
+        }
+        let place = |n: usize| span.start + places.get(n).copied().unwrap_or(token.len());
+        match std::str::from_utf8(&plain).ok().and_then(|plain| plain.find(text)) {
+            Some(offset) => place(offset + at.start)..place(offset + at.end.max(at.start + 1)),
             None => span, // written with escapes
         }
     }
@@ -191,7 +212,10 @@ impl Source {
             return Err(self.diagnostic(&format!("`{path}.kind` is not a string"), span, help));
         };
         let inner = std::mem::take(table);
-        table.insert(Spanned::new(span, kind), Spanned::new(name, DeValue::Table(inner)));
+        // what is missing in it is missing where its kind was set last
+        let from_file = span.start <= self.pieces[0].text.len();
+        let place = if from_file { name } else { span.clone() };
+        table.insert(Spanned::new(span, kind), Spanned::new(place, DeValue::Table(inner)));
         Ok(())
     }
 
@@ -220,7 +244,11 @@ impl Source {
                 false => format!("the key `{missing}` is missing here"),
             };
             let span = if whole { last_line(&self.pieces[0].text) } else { span };
-            return self.diagnostic(&message, span, None);
+            let help = match whole {
+                true => format!("add [{missing}] with its keys; studies/burgers.toml has every table"),
+                false => format!("add {missing} = …"),
+            };
+            return self.diagnostic(&message, span, Some(help));
         }
         let message = if message.starts_with("wanted exactly 1 element") {
             "exactly one of its keys must be given here".to_string()
@@ -229,6 +257,7 @@ impl Source {
             message
                 .replace("expected f64", "expected a number")
                 .replace("expected usize", "expected a whole number, 0 or more")
+                .replace(" as i128", "")
                 .replace("expected u64", "expected a whole number from 0 to 2^63 - 1")
                 .replace("a sequence", "an array")
                 .replace("a map", "a table")
@@ -278,7 +307,8 @@ fn printable(c: char) -> char {
     }
 }
 
-/// Puts one table over another. A new `kind` drops what the file gave for the old one; a choice is replaced whole.
+/// Puts one table over another. A new `kind` drops what the file gave for the old one; a choice, and a table that is
+/// given with its kind and more, is replaced whole.
 fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>, path: &str, file: usize) {
     for (key, value) in over {
         let name = key.get_ref().to_string();
@@ -288,7 +318,9 @@ fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>, path: &str, file: usize
         }
         let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
         match (under.get_mut(name.as_str()).map(Spanned::get_mut), value.get_ref()) {
-            (Some(DeValue::Table(below)), DeValue::Table(_)) if !CHOICES.contains(&inner.as_str()) => {
+            (Some(DeValue::Table(below)), DeValue::Table(above))
+                if !CHOICES.contains(&inner.as_str()) && (!above.contains_key("kind") || above.len() == 1) =>
+            {
                 if let DeValue::Table(above) = value.into_inner() {
                     merge(below, above, &inner, file);
                 }

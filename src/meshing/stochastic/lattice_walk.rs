@@ -40,7 +40,10 @@ pub struct GridWalk {
 /// unbiased for any P, and its variance falls with the square of the residual.
 ///
 /// `sweeps = "auto"` takes k = ⌈8√a⌉, a = Δt/(τh²) averaged over the axes and bounded by what the sides leave of the
-/// slowest mode; as many as Chebyshev's sweeps need to shrink any error some hundred times.
+/// slowest mode; as many as Chebyshev's sweeps need to shrink any error some hundred times. Where a is large, k more
+/// follow until no residual, the most that a walk can pay, is above 1 % of the shortest edge of the mesh. Where walks
+/// would take more than 1000 jumps, sweeps are cheaper: they follow to 10⁻⁶ of the edge and no walk is done; this bound
+/// on the error is then given as its standard error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ResidualWalk {
@@ -61,6 +64,15 @@ impl Default for ResidualWalk {
 /// More than this of anything takes longer than anyone waits.
 const MAX_WALKS: usize = 1 << 31;
 const MAX_SWEEPS: usize = 1_000_000;
+/// Jumps in one step beyond which walks are refused: hours.
+const MAX_JUMPS: f64 = 1e11;
+/// Jumps of a walk beyond which more sweeps are certainly cheaper.
+const WORTH_WALKING: f64 = 1e3;
+/// Largest residual, as a share of the shortest edge, that automatic sweeps leave to walks, and where there are none.
+const LEFT_TO_WALKS: f64 = 1e-2;
+const LEFT_ALONE: f64 = 1e-6;
+/// Automatic sweeps, in units of ⌈8√a⌉, each of which gains two digits: some more than there are.
+const MAX_ROUNDS: usize = 12;
 
 fn check_walks(walks: usize) -> Result<()> {
     match walks {
@@ -93,14 +105,21 @@ impl ResidualWalk {
             _ => check_walks(self.walks),
         }
     }
+}
 
-    /// k for a step.
-    pub fn count(&self, problem: &Problem<'_>) -> usize {
-        match self.sweeps {
-            Auto::Value(sweeps) => sweeps,
-            Auto::Auto => (8.0 * (0.25 * (1.0 / lowest(problem) - 1.0)).sqrt()).ceil().max(4.0) as usize,
-        }
+/// ⌈8√a⌉ sweeps.
+fn sweeps_for(lowest: f64) -> usize {
+    (8.0 * (0.25 * (1.0 / lowest - 1.0)).sqrt()).ceil().clamp(4.0, MAX_SWEEPS as f64) as usize
+}
+
+/// Refuses walks that nobody lives to see stop.
+fn check_jumps(problem: &Problem<'_>, walks: usize, points: usize) -> Result<(), Failure> {
+    let jumps = mean_jumps(problem);
+    if walks as f64 * points as f64 * jumps <= MAX_JUMPS {
+        return Ok(());
     }
+    let [a, b] = problem.stiffness();
+    Err(Failure::LongWalks { stiffness: a.max(b), jumps, walks, points })
 }
 
 /// Lower end of the spectrum of the step, over its diagonal: the slowest mode has half a wave across a bounded axis.
@@ -113,11 +132,17 @@ fn lowest(problem: &Problem<'_>) -> f64 {
     (1.0 + slowest) / (1.0 + 2.0 * a[0] + 2.0 * a[1])
 }
 
+/// Jumps of a walk, about.
+fn mean_jumps(problem: &Problem<'_>) -> f64 {
+    1.0 / lowest(problem)
+}
+
 impl Estimator for GridWalk {
     fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
         if self.increment {
-            return on_residual(problem, points, self.walks, Smoother::Jacobi, 0);
+            return on_residual(problem, points, self.walks, Smoother::Jacobi, Auto::Value(0));
         }
+        check_jumps(problem, self.walks, points.len())?;
         let table = Table::new(problem)?;
         let (estimates, path_steps) =
             table.walk(problem, points, self.walks, problem.new, jump(problem.mesh), |k| problem.mesh.x()[k]);
@@ -132,7 +157,7 @@ impl Estimator for GridWalk {
 
 impl Estimator for ResidualWalk {
     fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
-        on_residual(problem, points, self.walks, self.smoother, self.count(problem))
+        on_residual(problem, points, self.walks, self.smoother, self.sweeps)
     }
 }
 
@@ -142,7 +167,7 @@ fn on_residual(
     points: &[usize],
     walks: usize,
     smoother: Smoother,
-    sweeps: usize,
+    sweeps: Auto<usize>,
 ) -> Result<Estimates, Failure> {
     let (mesh, lattice) = (problem.mesh, problem.mesh.lattice());
     let (jump, patch) = (jump(mesh), Patch::whole(lattice));
@@ -152,21 +177,48 @@ fn on_residual(
     let mut x = patch.gather(lattice, problem.new, jump);
     let mut padded = vec![[0.0; 2]; x.len()];
     let mut sizes = matrix.residual(&right, &x, &mut padded);
+    let exact = exactness(&matrix, size(mesh));
+    let lowest = lowest(problem);
+    let alone = sweeps == Auto::Auto && mean_jumps(problem) > WORTH_WALKING;
+    let share = |share: f64| exact.map(|exact| exact.max(share * mesh.shortest_edge()));
+    let (round, left) = match sweeps {
+        Auto::Value(sweeps) => (sweeps, [f64::INFINITY; 2]),
+        Auto::Auto => (sweeps_for(lowest), share(if alone { LEFT_ALONE } else { LEFT_TO_WALKS })),
+    };
+    let within = |sizes: [f64; 2], limits: [f64; 2]| sizes.iter().zip(limits).all(|(r, limit)| *r <= limit);
+    let mut sweeps = 0;
     // a mesh that is at rest but for round-off stays, to the last bit
-    let at_rest = sizes.iter().zip(exactness(&matrix, size(mesh))).all(|(r, tolerance)| *r <= tolerance);
-    if !at_rest {
-        relax(&matrix, &right, &mut x, smoother, sweeps, lowest(problem));
-        sizes = matrix.residual(&right, &x, &mut padded);
+    if !within(sizes, exact) {
+        for _ in 0..MAX_ROUNDS {
+            relax(&matrix, &right, &mut x, smoother, round, lowest);
+            sweeps += round;
+            let before = std::mem::replace(&mut sizes, matrix.residual(&right, &x, &mut padded));
+            // not `>=`: what is not finite has not shrunk either
+            let shrunk = sizes[0].max(sizes[1]) < 0.5 * before[0].max(before[1]);
+            if within(sizes, left) || !shrunk {
+                break;
+            }
+        }
     }
     let mut guess = problem.new.to_vec();
     patch.scatter(lattice, &x, &mut guess, jump);
+    if within(sizes, if alone { share(LEFT_TO_WALKS) } else { exact }) {
+        // nothing is left to pay: rows that add up to one bound the error by the residual
+        let points = points.iter().map(|&k| Estimate { x: guess[k], standard_error: sizes }).collect();
+        return Ok(Estimates { points, guess, work: Work::default(), sweeps });
+    }
+    check_jumps(problem, walks, points.len())?;
     let mut residual = vec![[0.0; 2]; lattice.len()];
-    if !at_rest && sizes.iter().all(|r| r.is_finite()) {
+    if sizes.iter().all(|r| r.is_finite()) {
         patch.scatter(lattice, &padded, &mut residual, [[0.0; 2]; 2]);
     }
     let (mut estimates, path_steps) = table.walk(problem, points, walks, &residual, [[0.0; 2]; 2], |_| [0.0; 2]);
     for (estimate, &k) in estimates.iter_mut().zip(points) {
         estimate.x = [0, 1].map(|c| guess[k][c] + estimate.x[c]);
+    }
+    if estimates.iter().all(|estimate| estimate.standard_error == [0.0; 2]) {
+        // no walk stopped where there is something to pay: that says nothing of what others would have paid
+        estimates.iter_mut().for_each(|estimate| estimate.standard_error = [f64::NAN; 2]);
     }
     Ok(Estimates { points: estimates, guess, work: Work { path_steps, ..Work::default() }, sweeps })
 }

@@ -253,7 +253,7 @@ fn summary(mesh: &Mesh<2>, points: usize, estimates: &[Estimate], stiffness: [f6
     if rms > edge {
         return Err(Failure::NoisyInterface { noise: rms, edge, stiffness: stiffness[0].max(stiffness[1]) });
     }
-    let known = rms.is_finite();
+    let known = rms.is_finite() && !estimates.is_empty();
     Ok(Interface {
         points,
         standard_error: known.then_some(rms),

@@ -33,8 +33,8 @@ pub struct MonteCarlo {
     /// Every second path takes the increments of the one before with opposite sign.
     #[serde(default)]
     pub antithetic: bool,
-    /// Increments from a scrambled Sobol sequence in the order of a Brownian bridge. The standard error reported is
-    /// then that of independent paths, an upper bound.
+    /// Increments from a Sobol sequence in the order of a Brownian bridge, in up to four independent scramblings whose
+    /// means tell the standard error.
     #[serde(default)]
     pub sobol: bool,
     /// Subtracts the martingale Σ ∇xⁿ(Φ)·√(2Δs) W, whose mean is zero.
@@ -48,6 +48,8 @@ pub struct MonteCarlo {
 const MAX_PATHS: usize = 1 << 31;
 const MAX_SOBOL_PATHS: usize = 1 << 16;
 const MAX_SUBSTEPS: usize = 100_000;
+/// Independent scramblings of a Sobol sequence.
+const SCRAMBLINGS: usize = 4;
 /// Blocks of random words from here on decide exits; those before are for increments.
 const EXITS: u32 = 1 << 31;
 
@@ -113,12 +115,15 @@ impl MonteCarlo {
             problem.random.blocks([[block; LANES], paths, [node; LANES], [problem.step; LANES]])
         };
         let mut increments = vec![[[0.0; LANES]; 2]; self.substeps];
-        let mut samples = Samples::new();
+        let chunks = self.paths.div_ceil(LANES);
+        let groups = if self.sobol { SCRAMBLINGS.min(chunks) } else { 1 };
+        let mut samples = vec![Samples::new(); groups];
         let mut steps = 0;
         for first in (0..self.paths).step_by(LANES) {
             let paths = std::array::from_fn(|l| first as u32 + l as u32);
+            let group = first / LANES * groups / chunks;
             if self.sobol {
-                let [[seed, ..], ..] = words(0, [u32::MAX; LANES]);
+                let [[seed, ..], ..] = words(0, [u32::MAX - group as u32; LANES]);
                 bridge.increments(seed, paths, &mut increments);
             } else {
                 self.increments(words, paths, &mut increments);
@@ -134,9 +139,17 @@ impl MonteCarlo {
                     (0..count).step_by(2).for_each(|l| c[l] = 0.5 * (c[l] + c[l + 1]));
                 }
             }
-            (0..count).step_by(size).for_each(|l| samples.add([sample[0][l], sample[1][l]]));
+            (0..count).step_by(size).for_each(|l| samples[group].add([sample[0][l], sample[1][l]]));
         }
-        (samples.estimate(base), steps)
+        let estimate = match samples.as_slice() {
+            [all] => all.estimate(base),
+            groups => {
+                let mut means = Samples::new();
+                groups.iter().for_each(|group| means.add(group.estimate([0.0; 2]).x));
+                means.estimate(base)
+            }
+        };
+        (estimate, steps)
     }
 
     /// Independent standard normal increments: each block of four words serves two steps.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub enum FramesAt {
     /// After so many steps each.
     Every(usize),
-    /// At the first step not before each of these times.
+    /// At the first step not before each of these times, which lie within the run.
     Times(Vec<f64>),
 }
 
@@ -19,14 +19,18 @@ impl FramesAt {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for every = 0 or a time that is not finite.
-    pub fn check(&self) -> Result<()> {
+    /// [`Error::Invalid`] for every = 0 or a time that is not within the run.
+    pub fn check(&self, [start, end]: [f64; 2]) -> Result<()> {
         match self {
             Self::Every(0) => Err(Error::invalid("frames.every", 0, "must be 1 or more")),
-            Self::Times(times) if times.iter().any(|t| !t.is_finite()) => {
-                Err(Error::invalid("frames.times", format!("{times:?}"), "every time must be finite"))
-            }
-            _ => Ok(()),
+            Self::Every(_) => Ok(()),
+            Self::Times(times) => match times.iter().find(|t| !(start..=end).contains(*t)) {
+                Some(t) => {
+                    let rule = format!("must lie between time.start = {start} and time.end = {end}");
+                    Err(Error::invalid("frames.times", t, rule))
+                }
+                None => Ok(()),
+            },
         }
     }
 
