@@ -22,7 +22,7 @@ fn developed(n: usize) -> State {
     }
     let study = MovingMesh::from_source(&source).unwrap();
     let mut simulation = study.simulation().unwrap();
-    let mut state = simulation.start(study.initial_mesh().unwrap()).unwrap();
+    let mut state = study.start(&simulation, &mut Vec::new()).unwrap();
     simulation.run(&mut state, &mut Record::default(), &mut []).unwrap();
     state
 }

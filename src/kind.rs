@@ -21,6 +21,13 @@ macro_rules! kinds {
         impl $enum {
             /// Name and description of every kind.
             pub const KINDS: &'static [(&'static str, &'static str)] = &[$(($kind, $line)),+];
+
+            /// Its name in a study.
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$type(_) => $kind,)+
+                }
+            }
         }
 
         impl serde::Serialize for $enum {

@@ -21,7 +21,7 @@
 //! let mut mesh = Mesh::uniform(Lattice::bounded([40, 40])?, [0.0, 0.0], [1.0, 1.0])?;
 //! let front = |[x, y]: [f64; 2]| (40.0 * (x + y - 1.0)).tanh();
 //! let (monitor, mut generator) = (Arclength::default(), Whole::default());
-//! let equation = Mmpde { relaxation: 0.1, ..Mmpde::default() };
+//! let equation = Mmpde { relaxation: 0.1.into(), ..Mmpde::default() };
 //! for _ in 0..50 {
 //!     let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
 //!     let rho = monitor.density(&mesh, &u, None)?;

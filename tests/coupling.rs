@@ -45,7 +45,7 @@ fn simulate(
         physics,
         monitor,
         generator: Box::new(Whole::default()),
-        equation: Mmpde { relaxation: 0.2, ..Mmpde::default() },
+        equation: Mmpde { relaxation: 0.2.into(), ..Mmpde::default() },
         coupling,
         schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),
     };

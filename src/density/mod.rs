@@ -4,10 +4,12 @@
 
 mod arclength;
 mod given;
+mod root_gradient;
 mod smoothing;
 
 pub use arclength::{Arclength, Strength};
 pub use given::Given;
+pub use root_gradient::RootGradient;
 pub use smoothing::smooth;
 
 use crate::error::{Failure, Result};
@@ -31,6 +33,7 @@ pub trait Monitor: Send {
 kinds! {
     /// `[monitor]` of a study.
     MonitorKind {
+        "auto" = RootGradient: "rho = 1 + 4 sqrt(|grad u|) over its mean, smoothed; nothing to set",
         "arclength" = Arclength: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
         "given" = Given: "rho = the first unknown itself, smoothed",
     }
@@ -38,7 +41,7 @@ kinds! {
 
 impl Default for MonitorKind {
     fn default() -> Self {
-        Self::Arclength(Arclength::default())
+        Self::RootGradient(RootGradient::default())
     }
 }
 
@@ -49,6 +52,7 @@ impl MonitorKind {
     /// [`Error::Invalid`](crate::Error::Invalid).
     pub fn check(&self) -> Result<()> {
         match self {
+            Self::RootGradient(_) => Ok(()),
             Self::Arclength(arclength) => arclength.check(),
             Self::Given(given) => given.check(),
         }
@@ -57,6 +61,7 @@ impl MonitorKind {
     /// How the mesh equation differences this density.
     pub fn gradient(&self) -> Gradient {
         match self {
+            Self::RootGradient(_) => Gradient::Safe,
             Self::Arclength(arclength) => arclength.gradient,
             Self::Given(given) => given.gradient,
         }
@@ -65,6 +70,7 @@ impl MonitorKind {
     /// The monitor, ready to use.
     pub fn into_monitor(self) -> Box<dyn Monitor> {
         match self {
+            Self::RootGradient(root) => Box::new(root),
             Self::Arclength(arclength) => Box::new(arclength),
             Self::Given(given) => Box::new(given),
         }

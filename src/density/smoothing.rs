@@ -13,14 +13,18 @@ use crate::geometry::Lattice;
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: usize) {
-    let (nodes, strides) = (lattice.nodes(), lattice.strides());
+    smooth_values(lattice.nodes(), lattice.periodic(), values, passes);
+}
+
+/// The same over any grid of values, last axis fastest.
+pub(super) fn smooth_values<const D: usize>(size: [usize; D], periodic: [bool; D], values: &mut [f64], passes: usize) {
     let mut source = Vec::with_capacity(values.len());
     for axis in (0..passes).flat_map(|_| 0..D) {
         source.clear();
         source.extend_from_slice(values);
-        let (n, s) = (nodes[axis], strides[axis]);
+        let (n, s) = (size[axis], size[axis + 1..].iter().product::<usize>());
         for (f, out) in source.chunks_exact(s * n).zip(values.chunks_exact_mut(s * n)) {
-            let ends = if lattice.periodic()[axis] { [n - 1, 0] } else { [0, n - 1] };
+            let ends = if periodic[axis] { [n - 1, 0] } else { [0, n - 1] };
             let mut set = |i: usize, below: usize, above: usize| {
                 let (f, b, a) =
                     (&f[i * s..(i + 1) * s], &f[below * s..(below + 1) * s], &f[above * s..(above + 1) * s]);
@@ -28,9 +32,9 @@ pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: 
                     *out = 0.25 * (b + 2.0 * f + a);
                 }
             };
-            set(0, ends[0], 1);
-            (1..n - 1).for_each(|i| set(i, i - 1, i + 1));
-            set(n - 1, n - 2, ends[1]);
+            for i in 0..n {
+                set(i, if i == 0 { ends[0] } else { i - 1 }, if i + 1 == n { ends[1] } else { i + 1 });
+            }
         }
     }
 }

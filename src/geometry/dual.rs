@@ -1,5 +1,5 @@
 use super::quality::{cross, minus};
-use super::{Mesh, Patch};
+use super::{Lattice, Mesh, Patch};
 use crate::parallel;
 
 /// Finite-volume geometry of a mesh: the dual cell of every node
@@ -39,20 +39,7 @@ impl DualCells {
         let ([n, m], wraps) = (lattice.nodes(), lattice.periodic());
         let patch = Patch { origin: [0; 2], size: [n, m], wraps };
         let s = m + 2;
-        // the node at a padded place, and how often it lies around the axis
-        let along = |d: usize, place: usize, n: usize| {
-            let above = place + n - 1;
-            if wraps[d] { (above % n, (above / n) as f64 - 1.0) } else { (place.clamp(1, n) - 1, 0.0) }
-        };
-        let mut x = Vec::with_capacity(patch.padded_len());
-        for p in 0..n + 2 {
-            let (i, turns) = along(0, p, n);
-            for q in 0..s {
-                let ((j, up), [a, b]) = (along(1, q, m), [turns * extent[0], extent[1]]);
-                let [x0, y0] = mesh.x()[i * m + j];
-                x.push([x0 + a, y0 + up * b]);
-            }
-        }
+        let x = padded(lattice, mesh.x(), [[extent[0], 0.0], [0.0, extent[1]]]);
 
         let mut centres = vec![[0.0; 2]; x.len()];
         parallel::for_each_row(&mut centres[..(n + 1) * s], s, |p, row| {
@@ -140,10 +127,30 @@ impl DualCells {
     }
 }
 
+/// Nodal values with a ring around them, padded like [`DualCells::patch`]: images across periodic axes, `jump[d]` further
+/// for each turn around axis d, and beyond bounded sides the side's own values again.
+pub fn padded<const K: usize>(lattice: &Lattice<2>, values: &[[f64; K]], jump: [[f64; K]; 2]) -> Vec<[f64; K]> {
+    let ([n, m], wraps) = (lattice.nodes(), lattice.periodic());
+    // the node at a padded place, and how often it lies around the axis
+    let along = |d: usize, place: usize, n: usize| {
+        let above = place + n - 1;
+        if wraps[d] { (above % n, (above / n) as f64 - 1.0) } else { (place.clamp(1, n) - 1, 0.0) }
+    };
+    let mut out = Vec::with_capacity((n + 2) * (m + 2));
+    for p in 0..n + 2 {
+        let (i, right) = along(0, p, n);
+        for q in 0..m + 2 {
+            let (j, up) = along(1, q, m);
+            let value = values[i * m + j];
+            out.push(std::array::from_fn(|c| value[c] + (right * jump[0][c] + up * jump[1][c])));
+        }
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Lattice;
     use proptest::prelude::*;
 
     /// A mesh of [0, 2] × [−1, 2] with every node up to 0.3 cells away from its uniform place, side nodes on their sides.

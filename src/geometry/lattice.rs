@@ -100,6 +100,17 @@ impl<const D: usize> Lattice<D> {
         )
     }
 
+    /// Which bounded sides a node stands on: at the lower and upper end of each axis.
+    pub fn beyond(&self, index: usize) -> [[bool; 2]; D] {
+        let (node, nodes) = (self.node(index), self.nodes());
+        std::array::from_fn(|d| [node[d] == 0, node[d] + 1 == nodes[d]].map(|at_end| at_end && !self.periodic[d]))
+    }
+
+    /// True for a node on a bounded side.
+    pub fn on_side(&self, index: usize) -> bool {
+        self.beyond(index).as_flattened().contains(&true)
+    }
+
     /// Positions in memory of all nodes on bounded sides, axis by axis; a corner comes once for each of its sides.
     ///
     /// # Example

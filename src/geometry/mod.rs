@@ -8,7 +8,7 @@ mod mesh;
 mod patch;
 mod quality;
 
-pub use dual::DualCells;
+pub use dual::{DualCells, padded};
 pub use field::Field;
 pub use lattice::Lattice;
 pub(crate) use lattice::strides;

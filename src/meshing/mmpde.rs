@@ -1,26 +1,44 @@
-use crate::error::{Error, Failure, Result};
+use super::Relaxation;
+use crate::error::{Failure, Result};
 use crate::geometry::{Lattice, Mesh, Patch};
 use crate::numerics::difference::Gradient;
 use crate::numerics::larger;
-use crate::numerics::linear::{LatticeMatrix, LinearSolver};
+use crate::numerics::linear::{LatticeMatrix, LinearSolver, Pcg};
 use crate::work::Work;
 
 /// The moving mesh equation, with ρ frozen over a step
 ///
 /// ```text
-/// x_t = (1/τ) (b·∇_ξ x + ∇²_ξ x),   b = ∇_ξ ρ / ρ,   the same for y
+/// x_t = (1/τ) (b·∇_ξ x + ∇²_ξ x),   b = ∇_ξ ρ / ρ      or the same as      ρ x_t = (1/τ) ∇_ξ·(ρ ∇_ξ x),
 /// ```
 ///
-/// τ > 0 (`relaxation`) has the unit of time: how long the mesh takes to follow its density across the domain.
+/// the same for y. τ > 0 (`relaxation`) has the unit of time: how long the mesh takes to follow its density across the
+/// domain.
 ///
 /// # Source
 /// (2.4) of Bihlo, Haynes and Walsh (2015), MMPDE5 divided by ρ before it is relaxed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mmpde {
     /// τ.
-    pub relaxation: f64,
-    /// How b is differenced.
-    pub gradient: Gradient,
+    pub relaxation: Relaxation,
+    /// How it is discretised.
+    pub form: Form,
+}
+
+/// How the mesh equation is discretised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Form {
+    /// b·∇x + ∇²x at the nodes, as published, with this difference for b.
+    Gradient(Gradient),
+    /// Fluxes ρ∇x through the faces of dual cells
+    ///
+    /// ```text
+    /// W_i (xⁿ⁺¹ − xⁿ)_i = Δt/(τh²) Σ_e ρ_e (x_e − x_i)ⁿ⁺¹
+    /// ```
+    ///
+    /// with the ρ of mesh cells, the mean of their nodes: ρ_e that of the cells beside an edge, W_i of those around a
+    /// node. Over W a symmetric M-matrix for any ρ, the same for x and y.
+    Conservative,
 }
 
 /// How exactly mesh equations are solved, as a share of the largest coordinate: far below any cell.
@@ -28,7 +46,7 @@ const EXACTNESS: f64 = 1e-12;
 
 impl Default for Mmpde {
     fn default() -> Self {
-        Self { relaxation: 1.0, gradient: Gradient::Central }
+        Self { relaxation: Relaxation::Time(1.0), form: Form::Gradient(Gradient::Central) }
     }
 }
 
@@ -36,12 +54,14 @@ impl Mmpde {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless τ is positive and finite.
+    /// As [`Relaxation::check`].
     pub fn check(&self) -> Result<()> {
-        if self.relaxation.is_finite() && self.relaxation > 0.0 {
-            return Ok(());
-        }
-        Err(Error::invalid("relaxation", self.relaxation, "must be a finite number above 0"))
+        self.relaxation.check()
+    }
+
+    /// Δt/(τh²) along each axis.
+    pub fn stiffness<const D: usize>(&self, lattice: &Lattice<D>, dt: f64) -> [f64; D] {
+        lattice.spacing().map(|h| dt / (self.relaxation.over(dt) * h * h))
     }
 
     /// The implicit step over `dt` on a lattice with density `rho`, one value a node.
@@ -57,9 +77,11 @@ impl Mmpde {
         if rho.len() != lattice.len() {
             return Err(Failure::WrongLength { what: "the density", found: rho.len(), expected: lattice.len() });
         }
-        let h = lattice.spacing();
-        let a = h.map(|h| dt / (self.relaxation * h * h));
-        let b = self.gradient.of_log(lattice, rho);
+        let Form::Gradient(gradient) = self.form else {
+            return Ok(self.on_cells(lattice, &cell_means(lattice, rho), dt));
+        };
+        let (h, a) = (lattice.spacing(), self.stiffness(lattice, dt));
+        let b = gradient.of_log(lattice, rho);
         let weights = b
             .into_iter()
             .map(|b| {
@@ -69,8 +91,59 @@ impl Mmpde {
                 })
             })
             .collect();
-        Ok(MeshOperator { lattice: *lattice, weights })
+        Ok(MeshOperator { lattice: *lattice, weights, volumes: None })
     }
+
+    /// The conservative form from one ρ a mesh cell. Nodes on sides, where no row stands, have weights of zero.
+    pub(super) fn on_cells<const D: usize>(
+        &self,
+        lattice: &Lattice<D>,
+        cells: &[f64],
+        dt: f64,
+    ) -> MeshOperator<D> {
+        let (a, nodes, periodic) = (self.stiffness(lattice, dt), lattice.nodes(), lattice.periodic());
+        let mut weights = vec![[[0.0; 2]; D]; lattice.len()];
+        let mut volumes = vec![1.0; lattice.len()];
+        for (k, (weights, volume)) in weights.iter_mut().zip(&mut volumes).enumerate() {
+            let node = lattice.node(k);
+            if (0..D).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d])) {
+                continue;
+            }
+            *volume = 0.0;
+            for corner in 0..1 << D {
+                let above: [usize; D] = std::array::from_fn(|d| corner >> d & 1);
+                let around = |d: usize| if node[d] + above[d] == 0 { nodes[d] - 1 } else { node[d] + above[d] - 1 };
+                let cell = (0..D).fold(0, |place, d| place * lattice.cells()[d] + around(d));
+                *volume += cells[cell];
+                (0..D).for_each(|d| weights[d][above[d]] += cells[cell]);
+            }
+            *volume /= (1 << D) as f64;
+            let share = 1.0 / ((1 << (D - 1)) as f64 * *volume);
+            (0..D).for_each(|d| weights[d] = weights[d].map(|sum| a[d] * share * sum));
+        }
+        MeshOperator { lattice: *lattice, weights, volumes: Some(volumes) }
+    }
+}
+
+/// Means of nodal values over the mesh cells, last axis fastest.
+pub(super) fn cell_means<const D: usize>(lattice: &Lattice<D>, values: &[f64]) -> Vec<f64> {
+    let (cells, nodes, strides) = (lattice.cells(), lattice.nodes(), lattice.strides());
+    let count: usize = cells.iter().product();
+    let mean = |cell: usize| {
+        let mut rest = cell;
+        let mut index = [0; D];
+        for d in (0..D).rev() {
+            (index[d], rest) = (rest % cells[d], rest / cells[d]);
+        }
+        let sum: f64 = (0..1 << D)
+            .map(|corner| {
+                let place = |d: usize| (index[d] + (corner >> d & 1)) % nodes[d] * strides[d];
+                values[(0..D).map(place).sum::<usize>()]
+            })
+            .sum();
+        sum / (1 << D) as f64
+    };
+    (0..count).map(mean).collect()
 }
 
 /// One implicit Euler step of a mesh equation, as what each node draws from its neighbours
@@ -87,6 +160,8 @@ pub struct MeshOperator<const D: usize> {
     lattice: Lattice<D>,
     /// For each node and axis the weights toward the neighbour below and above.
     weights: Vec<[[f64; 2]; D]>,
+    /// W at each node where rows times W are symmetric.
+    volumes: Option<Vec<f64>>,
 }
 
 impl<const D: usize> MeshOperator<D> {
@@ -107,6 +182,34 @@ impl<const D: usize> MeshOperator<D> {
             }
         }
         matrix
+    }
+
+    /// True in the conservative form.
+    pub fn is_symmetric(&self) -> bool {
+        self.volumes.is_some()
+    }
+
+    /// Solves a symmetric step on one patch like [`solve`](Self::solve), by conjugate gradients, each position to
+    /// `closeness` or better; none where the operator is not symmetric or they fail.
+    pub fn solve_symmetric<const S: usize, const K: usize>(
+        &self,
+        patch: Patch<D>,
+        old: &[[f64; K]],
+        new: &[[f64; K]],
+        jump: [[f64; K]; D],
+        solver: &mut Pcg<K>,
+        closeness: f64,
+    ) -> Option<(Vec<[f64; K]>, Work)> {
+        let volumes = self.volumes.as_ref()?;
+        let weights: Vec<f64> = patch.nodes(&self.lattice).map(|node| volumes[node]).collect();
+        let mut matrix = self.matrix::<S>(patch);
+        let mut right = self.right(patch, old, jump);
+        for ((row, right), weight) in matrix.rows.iter_mut().zip(&mut right).zip(&weights) {
+            row.iter_mut().chain(right).for_each(|entry| *entry *= weight);
+        }
+        let mut x = patch.gather(&self.lattice, new, jump);
+        let linear_iterations = solver.solve(&matrix, &weights, &right, &mut x, [closeness; K]).ok()?;
+        Some((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
     }
 
     /// Refuses an operator whose weights cannot be probabilities: |b|h > 2 at a node that is not on a side.

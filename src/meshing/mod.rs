@@ -3,6 +3,7 @@
 mod decomposition;
 mod fixed;
 mod mmpde;
+mod relaxation;
 mod schwarz;
 mod sides;
 mod stochastic;
@@ -10,7 +11,8 @@ mod whole;
 
 pub use decomposition::{Cut, Decomposition};
 pub use fixed::Fixed;
-pub use mmpde::{MeshOperator, Mmpde};
+pub use mmpde::{Form, MeshOperator, Mmpde};
+pub use relaxation::{Relaxation, STEPS_WORTH_A_WARNING};
 pub use schwarz::Schwarz;
 pub use sides::move_sides;
 pub use stochastic::{

@@ -1,4 +1,5 @@
-use super::Mmpde;
+use super::mmpde::cell_means;
+use super::{Form, Mmpde};
 use crate::error::{Failure, Result};
 use crate::geometry::{Lattice, Mesh, Patch};
 use crate::numerics::linear::Robust;
@@ -19,6 +20,10 @@ pub fn move_sides(
     let lattice = mesh.lattice();
     let (cells, nodes, strides) = (lattice.cells(), lattice.nodes(), lattice.strides());
     let mut work = Work::default();
+    let cell_rho = match equation.form {
+        Form::Gradient(_) => None,
+        Form::Conservative => Some(cell_means(lattice, rho)),
+    };
     for across in (0..2).filter(|&d| !lattice.periodic()[d]) {
         let along = 1 - across;
         let line = Lattice::<1>::new([cells[along]], [lattice.periodic()[along]]).expect("an axis of a lattice is one");
@@ -28,7 +33,15 @@ pub fn move_sides(
             let side_rho: Vec<f64> = (0..nodes[along]).map(|i| rho[place(i)]).collect();
             let old: Vec<[f64; 1]> = (0..nodes[along]).map(|i| [mesh.x()[place(i)][along]]).collect();
             let patch = Patch::whole(&line);
-            let operator = equation.operator(&line, &side_rho, dt)?;
+            let operator = match &cell_rho {
+                None => equation.operator(&line, &side_rho, dt)?,
+                Some(rho) => {
+                    // the one row of cells beside the side
+                    let row = if end == 0 { 0 } else { cells[across] - 1 };
+                    let cell = |i: usize| if across == 0 { row * cells[1] + i } else { i * cells[1] + row };
+                    equation.on_cells(&line, &(0..cells[along]).map(|i| rho[cell(i)]).collect::<Vec<_>>(), dt)
+                }
+            };
             let (new, cost) = operator.solve::<3, 1>(patch, &old, &old, jump, solver, [size(mesh)[along]])?;
             work += cost;
             for (i, k) in patch.nodes(&line).zip(patch.places()) {

@@ -221,7 +221,7 @@ fn automatic_sweeps_meet_any_stiffness() {
         let start = mesh([20, 24], periodic);
         let rho = bump(&start, 20.0, 0.3);
         for relaxation in [1.0, 1e-2, 1e-4, 1e-6] {
-            let equation = Mmpde { relaxation, gradient: Gradient::Safe };
+            let equation = Mmpde { relaxation: Relaxation::Time(relaxation), form: Form::Gradient(Gradient::Safe) };
             let exact = Whole::default().step(&equation, &start, &rho, DT).unwrap().mesh;
             let mut walks = Stochastic::new([3, 3], 1, EstimatorKind::default());
             let found = walks.step(&equation, &start, &rho, DT).unwrap();
@@ -236,7 +236,7 @@ fn automatic_sweeps_meet_any_stiffness() {
     }
     // on an axis without sides nothing else stops a walk
     let start = mesh([20, 24], [true, true]);
-    let equation = Mmpde { relaxation: 1e-9, gradient: Gradient::Safe };
+    let equation = Mmpde { relaxation: Relaxation::Time(1e-9), form: Form::Gradient(Gradient::Safe) };
     let grid = EstimatorKind::GridWalk(GridWalk { walks: 100, increment: false });
     let refused = Stochastic::new([3, 3], 1, grid).step(&equation, &start, &bump(&start, 20.0, 0.3), DT);
     let long = matches!(refused, Err(Failure::LongWalks { stiffness, .. }) if stiffness > 1e8);
@@ -329,10 +329,10 @@ fn steep_densities_are_named_and_the_safe_gradient_carries_them() {
     let rho: Vec<f64> = start.x().iter().map(|[x, _]| if *x < 0.0 { 1.0 } else { 1e4 }).collect();
     let mut generator = Stochastic::new([2, 2], 0, EstimatorKind::default());
     for gradient in [Gradient::Central, Gradient::Log] {
-        let error = generator.step(&Mmpde { relaxation: 1.0, gradient }, &start, &rho, DT).unwrap_err();
+        let error = generator.step(&Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(gradient) }, &start, &rho, DT).unwrap_err();
         assert!(matches!(error, Failure::SteepDensity { skew, .. } if skew > 2.0), "{error}");
     }
-    let safe = Mmpde { relaxation: 1.0, gradient: Gradient::Safe };
+    let safe = Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(Gradient::Safe) };
     let moved = generator.step(&safe, &start, &rho, DT).unwrap();
     let whole = Whole::default().step(&safe, &start, &rho, DT).unwrap().mesh;
     let (difference, noise) =
@@ -392,7 +392,7 @@ fn the_mesh_follows_its_density() {
     };
     let mut generator = Whole::default();
     let moved = (0..300).fold(start.clone(), |mesh, _| {
-        generator.step(&Mmpde { relaxation: 0.1, ..Mmpde::default() }, &mesh, &density(&mesh), DT).unwrap().mesh
+        generator.step(&Mmpde { relaxation: 0.1.into(), ..Mmpde::default() }, &mesh, &density(&mesh), DT).unwrap().mesh
     });
     let figure = |mesh: &Mesh<2>| crate::geometry::quality(mesh, &density(mesh)).equidistribution;
     assert!(figure(&moved) < 0.5 * figure(&start), "{} from {}", figure(&moved), figure(&start));
@@ -408,7 +408,7 @@ fn the_mesh_equation_is_second_order_in_space() {
             let lattice = Lattice::bounded([n, n]).unwrap();
             let start = Mesh::uniform(lattice, [0.0; 2], [1.0; 2]).unwrap();
             let rho: Vec<f64> = start.x().iter().map(|&[s, r]| 1.0 / (slope(s) * slope(r))).collect();
-            let equation = Mmpde { relaxation: 1.0, gradient };
+            let equation = Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(gradient) };
             // three steps of 100 relaxation times leave 1e-9 of the start
             let steady =
                 (0..3).fold(start.clone(), |m, _| Whole::default().step(&equation, &m, &rho, 100.0).unwrap().mesh);
@@ -444,7 +444,7 @@ proptest! {
         let start = mesh([n, m], [px, py]);
         let rho = bump(&start, height, 0.3);
         let dt = 10_f64.powf(log_dt);
-        let equation = Mmpde { relaxation: 1.0, gradient: Gradient::Log };
+        let equation = Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(Gradient::Log) };
         let Moved { mesh: moved, work, .. } = Whole::default().step(&equation, &start, &rho, dt).unwrap();
         prop_assert!(work.linear_solves >= 2);
         let lattice = start.lattice();

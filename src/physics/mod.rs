@@ -2,10 +2,11 @@
 
 mod burgers;
 mod curvilinear;
+mod finite_volumes;
 mod prescribed;
 mod shallow_water;
 
-pub use burgers::{Burgers, Convection};
+pub use burgers::{Burgers, BurgersFlux, Convection};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
 

@@ -2,7 +2,7 @@ use super::{NOISE_WORTH_A_WARNING, Seconds, Simulation, State, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
-use crate::meshing::Interface;
+use crate::meshing::{Interface, Mmpde};
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
@@ -64,6 +64,7 @@ pub(super) fn advance(
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
+    let equation = Mmpde { relaxation: equation.relaxation.at(dt), ..*equation };
     let mut latest = None;
     for _ in 0..coupling.iterations {
         let mut spent = 0.0;
@@ -72,7 +73,7 @@ pub(super) fn advance(
             for sub in 0..coupling.mesh_steps {
                 let carried = if sub == 0 { None } else { Some(interpolate(&state.mesh, &rho, &mesh)) };
                 let rho = carried.as_ref().unwrap_or(&rho);
-                let moved = generator.step(equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
+                let moved = generator.step(&equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
                 let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
                 check_unfolded(&moved.mesh).map_err(|failure| match failure {
                     Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },

@@ -14,7 +14,7 @@ pub use schedule::Schedule;
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
-use crate::meshing::{Interface, MeshGenerator, Mmpde};
+use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, Whole};
 use crate::physics::Physics;
 use crate::work::Work;
 use std::time::Instant;
@@ -89,6 +89,11 @@ pub struct Simulation {
 
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
 pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
+/// τ of the mesh at the start, in its steps: longer than in a run, since nothing else slows the mesh down.
+const STEPS_OF_THE_START: f64 = 50.0;
+const MAX_STEPS_OF_THE_START: usize = 500;
+/// Motion in one step, as a share of the shortest edge, below which the mesh at the start rests.
+const AT_REST: f64 = 4e-4;
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
@@ -99,8 +104,7 @@ impl Simulation {
     /// [`Error::Failed`] where the mesh is folded or the initial solution has no finite density.
     pub fn start(&self, mesh: Mesh<2>) -> Result<State> {
         let t = self.schedule.start();
-        let moment = Some(Moment { t, step: 0 });
-        let at_start = |failure| Error::Failed { failure, moment };
+        let at_start = |failure| self.at_start(failure);
         check_unfolded(&mesh).map_err(at_start)?;
         let u = self.physics.initial(t, &mesh);
         if let Some(place) = u.values().iter().position(|v| !v.is_finite()) {
@@ -110,6 +114,37 @@ impl Simulation {
         }
         let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
         Ok(State { t, step: 0, mesh, u, rho })
+    }
+
+    /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
+    ///
+    /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more than a
+    /// small share of the shortest edge.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds.
+    pub fn adapted(&self, mut mesh: Mesh<2>) -> Result<(Mesh<2>, bool)> {
+        let equation = Mmpde { relaxation: Relaxation::Steps(STEPS_OF_THE_START), ..self.equation };
+        let mut whole = Whole::default();
+        for _ in 0..MAX_STEPS_OF_THE_START {
+            let state = self.start(mesh)?;
+            let moved = whole.step(&equation, &state.mesh, &state.rho, 1.0).and_then(|moved| {
+                check_unfolded(&moved.mesh)?;
+                Ok(moved.mesh)
+            });
+            let moved = moved.map_err(|failure| self.at_start(failure))?;
+            let motion = state.mesh.x().iter().zip(moved.x()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
+            let at_rest = motion.fold(0.0, f64::max) <= AT_REST * moved.shortest_edge();
+            mesh = moved;
+            if at_rest {
+                return Ok((mesh, true));
+            }
+        }
+        Ok((mesh, false))
+    }
+
+    fn at_start(&self, failure: Failure) -> Error {
+        Error::Failed { failure, moment: Some(Moment { t: self.schedule.start(), step: 0 }) }
     }
 
     /// Runs to the end of the schedule

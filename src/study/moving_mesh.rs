@@ -2,10 +2,10 @@ use super::Source;
 use crate::density::{Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
-use crate::meshing::{GeneratorKind, Mmpde};
+use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING};
 use crate::physics::{Burgers, PdeKind, formula};
 use crate::setting::pair;
-use crate::simulation::{Coupling, FramesAt, Schedule, Simulation};
+use crate::simulation::{Coupling, FramesAt, Schedule, Simulation, State};
 use serde::{Deserialize, Serialize};
 
 /// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
@@ -112,12 +112,13 @@ pub struct Time {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable {
-    /// τ of the mesh equation, in units of time.
-    pub relaxation: f64,
+    /// τ of the mesh equation.
+    pub relaxation: Relaxation,
     /// Form of the mesh equation.
-    pub form: Form,
-    /// The mesh at the start.
-    pub start: StartMesh,
+    pub form: MeshForm,
+    /// The mesh at the start; adapted where nothing is said, but uniform where the mesh does not move.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<StartMesh>,
     /// How the mesh moves.
     pub generator: GeneratorKind,
     /// How mesh and physics alternate.
@@ -127,9 +128,9 @@ pub struct MeshTable {
 impl Default for MeshTable {
     fn default() -> Self {
         Self {
-            relaxation: 1.0,
-            form: Form::Gradient,
-            start: StartMesh::Uniform,
+            relaxation: Relaxation::Steps(25.0),
+            form: MeshForm::Conservative,
+            start: None,
             generator: GeneratorKind::default(),
             coupling: Coupling::default(),
         }
@@ -139,9 +140,11 @@ impl Default for MeshTable {
 /// Form of the mesh equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Form {
-    /// As published: x_t = (1/τ)(∇ρ/ρ·∇x + ∇²x).
+pub enum MeshForm {
+    /// As published: x_t = (1/τ)(∇ρ/ρ·∇x + ∇²x), with `monitor.gradient`.
     Gradient,
+    /// ρ x_t = (1/τ) ∇·(ρ∇x), symmetric and stable for any ρ.
+    Conservative,
 }
 
 /// The mesh at the start.
@@ -150,6 +153,8 @@ pub enum Form {
 pub enum StartMesh {
     /// Equal cells.
     Uniform,
+    /// Moved to the density of the initial solution, until it rests there.
+    Adapted,
 }
 
 /// `[output]`.
@@ -194,7 +199,7 @@ impl MovingMesh {
         self.pde.check().map_err(|error| error.within("pde"))?;
         self.check_axes()?;
         self.check_size()?;
-        let lattice = *self.initial_mesh()?.lattice();
+        let lattice = *self.uniform_mesh()?.lattice();
         self.mesh.generator.check(&lattice).map_err(|error| error.within("generator").within("mesh"))?;
         if let Some(compare) = &self.compare {
             compare.generator.check(&lattice).map_err(|error| error.within("generator").within("compare"))?;
@@ -205,10 +210,14 @@ impl MovingMesh {
             false => MonitorKind::default(),
         });
         monitor.check().map_err(|error| error.within("monitor"))?;
-        if let (true, MonitorKind::Arclength(_)) = (prescribed_density, monitor) {
+        if prescribed_density && !matches!(monitor, MonitorKind::Given(_)) {
             let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
-            return Err(Error::invalid("monitor.kind", "\"arclength\"", rule));
+            return Err(Error::invalid("monitor.kind", format!("\"{}\"", monitor.name()), rule));
         }
+        self.mesh.start.get_or_insert(match self.mesh.generator {
+            GeneratorKind::Fixed(_) => StartMesh::Uniform,
+            _ => StartMesh::Adapted,
+        });
         self.equation().check().map_err(|error| error.within("mesh"))?;
         self.mesh.coupling.check().map_err(|error| error.within("coupling").within("mesh"))?;
         if self.time.report.is_empty() {
@@ -281,6 +290,13 @@ impl MovingMesh {
                 }
             }
         }
+        if let Relaxation::Steps(steps) = self.mesh.relaxation
+            && steps < STEPS_WORTH_A_WARNING
+        {
+            warnings.push(format!(
+                "`mesh.relaxation` is {steps} steps: below {STEPS_WORTH_A_WARNING} the mesh overshoots its density from step to step"
+            ));
+        }
         if let PdeKind::Burgers(Burgers { initial: Some(initial), boundary: Some(boundary), .. }) = &self.pde {
             let [initial, boundary] = [formula("initial", initial)?, formula("boundary", boundary)?];
             let mut worst = (0.0_f64, [0.0; 2]);
@@ -340,14 +356,38 @@ impl MovingMesh {
     }
 
     fn equation(&self) -> Mmpde {
-        Mmpde { relaxation: self.mesh.relaxation, gradient: self.monitor().gradient() }
+        let form = match self.mesh.form {
+            MeshForm::Gradient => Form::Gradient(self.monitor().gradient()),
+            MeshForm::Conservative => Form::Conservative,
+        };
+        Mmpde { relaxation: self.mesh.relaxation, form }
     }
 
-    /// The mesh that the run starts from.
+    /// The state that the run starts from; warns where the mesh does not come to rest.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] where there is none.
+    pub fn start(&self, simulation: &Simulation, warnings: &mut Vec<String>) -> Result<State> {
+        let mut mesh = self.uniform_mesh()?;
+        if self.mesh.start == Some(StartMesh::Adapted) {
+            let (adapted, at_rest) = simulation.adapted(mesh)?;
+            mesh = adapted;
+            if !at_rest {
+                warnings.push(
+                    "`mesh.start`: the mesh does not come to rest on the initial solution, which may be too thin for \
+                     grid.cells or not continuous"
+                        .into(),
+                );
+            }
+        }
+        simulation.start(mesh)
+    }
+
+    /// Equal cells.
     ///
     /// # Errors
     /// [`Error::Invalid`] where the grid or the domain makes no mesh.
-    pub fn initial_mesh(&self) -> Result<Mesh<2>> {
+    pub fn uniform_mesh(&self) -> Result<Mesh<2>> {
         let lattice = Lattice::new(self.grid.cells, self.domain.periodic).map_err(|error| error.within("grid"))?;
         Mesh::uniform(lattice, self.domain.lower, self.domain.upper).map_err(|error| error.within("domain"))
     }

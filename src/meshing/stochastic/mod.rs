@@ -100,7 +100,7 @@ impl<'a> Problem<'a> {
 
     /// Δt/(τh²) along each axis.
     pub fn stiffness(&self) -> [f64; 2] {
-        self.mesh.lattice().spacing().map(|h| self.dt / (self.equation.relaxation * h * h))
+        self.equation.stiffness(self.mesh.lattice(), self.dt)
     }
 }
 

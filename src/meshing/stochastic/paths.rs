@@ -1,7 +1,8 @@
 use super::super::sides::jump;
 use super::surface::{Bilinear, Grid, Surface};
 use super::{MonteCarlo, Problem};
-use crate::numerics::difference::derivative;
+use crate::meshing::Form;
+use crate::numerics::difference::{Gradient, derivative};
 use crate::random::{ln, uniform};
 
 /// Paths that are computed side by side.
@@ -48,9 +49,13 @@ impl Domain {
     pub fn new(problem: &Problem<'_>, settings: &MonteCarlo) -> Self {
         let substeps = settings.substeps;
         let (mesh, lattice) = (problem.mesh, problem.mesh.lattice());
-        let ds = problem.dt / (problem.equation.relaxation * substeps as f64);
+        let ds = problem.dt / (problem.equation.relaxation.over(problem.dt) * substeps as f64);
         let n = lattice.cells().map(|n| n as f64);
-        let b = problem.equation.gradient.of_log(lattice, problem.rho);
+        let gradient = match problem.equation.form {
+            Form::Gradient(gradient) => gradient,
+            Form::Conservative => Gradient::Log,
+        };
+        let b = gradient.of_log(lattice, problem.rho);
         let drift: Vec<[f64; 2]> = b.iter().map(|b| [b[0] * n[0] * ds, b[1] * n[1] * ds]).collect();
         let jump = jump(mesh);
         let [along_xi, along_eta] = [0, 1].map(|d| derivative(lattice, mesh.x(), d, jump[d]));

@@ -54,7 +54,7 @@ impl<const D: usize, const S: usize, const B: usize> LinearSolver<D, S, B, [[f64
 }
 
 /// The inverse by Gauss and Jordan with row pivots; not finite where there is none.
-fn invert<const B: usize>(mut a: [[f64; B]; B]) -> [[f64; B]; B] {
+pub(super) fn invert<const B: usize>(mut a: [[f64; B]; B]) -> [[f64; B]; B] {
     let mut inverse: [[f64; B]; B] = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
     for k in 0..B {
         let pivot = (k..B).max_by(|&p, &q| a[p][k].abs().total_cmp(&a[q][k].abs())).unwrap_or(k);

@@ -94,7 +94,7 @@ pub(super) fn add<const K: usize>(x: &mut [[f64; K]], s: [f64; K], v: &[[f64; K]
 }
 
 /// Quotients; zero for a right-hand side that is solved already, which then stands still.
-fn divide<const K: usize>(active: [bool; K], a: [f64; K], b: [f64; K]) -> [f64; K] {
+pub(super) fn divide<const K: usize>(active: [bool; K], a: [f64; K], b: [f64; K]) -> [f64; K] {
     std::array::from_fn(|c| if active[c] && b[c] != 0.0 { a[c] / b[c] } else { 0.0 })
 }
 
@@ -116,7 +116,7 @@ fn update<const K: usize>(
 }
 
 /// Scalar products in a fixed order; rings are zero and add nothing.
-fn dot<const K: usize>(a: &[[f64; K]], b: &[[f64; K]]) -> [f64; K] {
+pub(super) fn dot<const K: usize>(a: &[[f64; K]], b: &[[f64; K]]) -> [f64; K] {
     parallel::sum(a.len(), |range| {
         // four running sums hide the latency of the addition
         let mut sums = [[0.0; K]; 4];

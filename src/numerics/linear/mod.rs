@@ -7,13 +7,17 @@
 mod adi;
 mod bicgstab;
 mod block;
+mod ilu;
 mod krylov;
 mod lu;
+mod pcg;
 mod relaxation;
 
 pub use bicgstab::Bicgstab;
 pub use block::BlockBicgstab;
+pub use ilu::IluBicgstab;
 pub use lu::SparseLu;
+pub use pcg::Pcg;
 pub use relaxation::{Smoother, relax};
 
 use super::larger;
@@ -219,6 +223,9 @@ pub struct Fallback<First, Then>(First, Then);
 
 /// What the library uses: fast where it converges, direct where it does not.
 pub type Robust<const K: usize> = Fallback<Bicgstab<K>, SparseLu>;
+
+/// [`Robust`] for B unknowns a node that convection and diffusion couple to all nine points around it.
+pub type RobustTransport<const B: usize> = Fallback<IluBicgstab<B>, SparseLu>;
 
 /// [`Robust`] for B coupled unknowns a node.
 pub type RobustBlock<const B: usize> = Fallback<BlockBicgstab<B>, SparseLu>;

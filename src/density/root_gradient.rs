@@ -1,0 +1,125 @@
+use super::{Monitor, smoothing::smooth_values};
+use crate::error::{Failure, Result};
+use crate::geometry::Mesh;
+use crate::numerics::{larger, sum};
+use serde::{Deserialize, Serialize};
+
+/// The root of the slope, over its mean: no number to set
+///
+/// ```text
+/// ρ = 1 + 4 √|∇u| / ⟨√|∇u|⟩,   ⟨·⟩ the mean over the domain
+/// ```
+///
+/// with ∇u in each mesh cell, then round(8 (N/41²)) passes of the (1 2 1)⊗(1 2 1)/16 filter over cells, at least one, N
+/// the number of nodes. A layer of any width then gets the same share of the nodes, about half of them: the mean of the
+/// root falls with the width as fast as its largest value grows. Where u is constant, ρ = 1.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RootGradient {}
+
+/// Share of the layer in the density.
+const BETA: f64 = 4.0;
+/// Passes of the filter on 41 × 41 nodes.
+const PASSES: f64 = 8.0;
+/// Differences of u below this share of its size are rounding.
+const ROUNDING: f64 = 1e-10;
+
+impl Monitor for RootGradient {
+    fn density(&self, mesh: &Mesh<2>, u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
+        let lattice = mesh.lattice();
+        let ([n, m], periodic) = (lattice.cells(), lattice.periodic());
+        let (x, values) = (mesh.closed(), lattice.closed(u));
+        let mut roots = vec![0.0; n * m];
+        let mut areas = vec![0.0; n * m];
+        let mut steepest = 0.0;
+        for (cell, (root, area)) in roots.iter_mut().zip(&mut areas).enumerate() {
+            let k = cell / m * (m + 1) + cell % m;
+            let [low, high, left, right] = [k, k + m + 2, k + 1, k + m + 1];
+            let ([px, py], [qx, qy]) = (minus(x[high], x[low]), minus(x[left], x[right]));
+            let (p, q) = (values[high] - values[low], values[left] - values[right]);
+            let twice = px * qy - py * qx;
+            let slope = ((p * qy - q * py) / twice).hypot((q * px - p * qx) / twice);
+            steepest = larger(steepest, slope);
+            (*root, *area) = (slope.sqrt(), 0.5 * twice);
+        }
+        let size = values.iter().fold(0.0, |m, u| larger(m, *u));
+        let mean = sum(roots.iter().zip(&areas).map(|(root, area)| root * area)) / sum(areas.iter().copied());
+        if steepest * mesh.extent()[0].max(mesh.extent()[1]) <= ROUNDING * size {
+            return Ok(vec![1.0; lattice.len()]);
+        }
+        let mut rho: Vec<f64> = roots.iter().map(|root| 1.0 + BETA * root / mean).collect();
+        // from cells to nodes and back is a pass
+        let passes = (PASSES * ((n + 1) * (m + 1)) as f64 / (41.0 * 41.0)).round().max(1.0) as usize - 1;
+        smooth_values([n, m], periodic, &mut rho, passes);
+        let nodal: Vec<f64> = (0..lattice.len())
+            .map(|k| {
+                let node = lattice.node(k);
+                let beside = |d: usize, cells: usize| match (periodic[d], node[d]) {
+                    (true, 0) => [cells - 1, 0],
+                    (false, 0) => [0, 0],
+                    (false, i) if i == cells => [cells - 1, cells - 1],
+                    (_, i) => [i - 1, i],
+                };
+                let ([a, b], [c, d]) = (beside(0, n), beside(1, m));
+                0.25 * ((rho[a * m + c] + rho[b * m + d]) + (rho[a * m + d] + rho[b * m + c]))
+            })
+            .collect();
+        match nodal.iter().position(|rho| !rho.is_finite()) {
+            None => Ok(nodal),
+            Some(k) => Err(Failure::NonFinite {
+                what: "the mesh density",
+                value: nodal[k],
+                node: lattice.node(k),
+                x: mesh.x()[k],
+            }),
+        }
+    }
+}
+
+fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Lattice;
+
+    /// Layers of width 10⁻² and 10⁻³ take the same share of ∫ρ.
+    #[test]
+    fn the_share_of_a_layer_does_not_depend_on_its_width() {
+        let mesh = Mesh::uniform(Lattice::bounded([4000, 4]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+        let share = |width: f64| {
+            let u: Vec<f64> = mesh.x().iter().map(|x| ((x[0] - 0.5) / width).tanh()).collect();
+            let rho = RootGradient {}.density(&mesh, &u, None).unwrap();
+            let inside = |x: &[f64; 2]| (x[0] - 0.5).abs() < 4.0 * width;
+            let layer: f64 = mesh.x().iter().zip(&rho).filter(|(x, _)| inside(x)).map(|(_, rho)| rho).sum();
+            layer / rho.iter().sum::<f64>()
+        };
+        let [wide, thin] = [share(1e-2), share(2.5e-3)];
+        assert!((wide - thin).abs() < 0.07 && thin > 0.5, "{wide} and {thin}");
+    }
+
+    /// A constant has the density 1 to the last bit, and so has its rounding.
+    #[test]
+    fn a_constant_has_no_slope() {
+        let mesh = Mesh::uniform(Lattice::new([7, 5], [true, false]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+        for noise in [0.0, 1e-15] {
+            let u: Vec<f64> = (0..mesh.x().len()).map(|k| 3.0 + noise * (k % 3) as f64).collect();
+            assert_eq!(RootGradient {}.density(&mesh, &u, None).unwrap(), vec![1.0; mesh.x().len()]);
+        }
+    }
+
+    /// ∇u is exact for linear u on any cells, ρ = 5 then, and nothing depends on the unit of u.
+    #[test]
+    fn linear_functions_have_an_even_density() {
+        let mesh = Mesh::uniform(Lattice::bounded([6, 8]).unwrap(), [0.0; 2], [2.0, 1.0]).unwrap();
+        let bent = mesh.x().iter().map(|&[x, y]| [x + 0.1 * (x * (2.0 - x)) * y, y + 0.1 * (y * (1.0 - y)) * x]);
+        let mesh = mesh.moved(bent.collect()).unwrap();
+        for unit in [1.0, 1e-6] {
+            let u: Vec<f64> = mesh.x().iter().map(|[x, y]| unit * (3.0 * x - 2.0 * y)).collect();
+            let rho = RootGradient {}.density(&mesh, &u, None).unwrap();
+            assert!(rho.iter().all(|rho| (rho - 5.0).abs() < 1e-9), "{rho:?}");
+        }
+    }
+}

@@ -1,0 +1,363 @@
+//! Conservation laws on the dual cells of a moving mesh.
+
+use super::{Motion, check_finite};
+use crate::error::Failure;
+use crate::geometry::{DualCells, Mesh, padded};
+use crate::numerics::larger;
+use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport};
+use crate::parallel;
+use crate::work::Work;
+
+/// What B unknowns conserve: u_t + ∇·F(u) = ∇·(D(u)∇u) + S(u, x, t)
+///
+/// Faces see their two nodes through what [`nodes`](Self::nodes) makes of these; derivatives are by the unknowns there.
+pub(super) trait Law<const B: usize>: Sync {
+    /// What faces need to know of a node.
+    type Node: Copy + Send + Sync;
+
+    /// Names of the unknowns, for messages.
+    fn names(&self) -> [&'static str; B];
+    /// One for each place of padded vectors.
+    fn nodes(&self, t: f64, x: &[[f64; 2]], u: &[[f64; B]]) -> Vec<Self::Node>;
+    /// F·N through a face with normal N.
+    fn convection(&self, below: &Self::Node, above: &Self::Node, normal: [f64; 2]) -> Crossing<B>;
+    /// D at a face.
+    fn diffusivity(&self, below: &Self::Node, above: &Self::Node) -> Crossing<B>;
+    /// S at a node, and its derivative; none where there is no source.
+    fn source(&self, _node: &Self::Node) -> Option<([f64; B], Block<B>)> {
+        None
+    }
+    /// The unknowns on bounded sides, where they are given; where not, nothing passes the side.
+    fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; B];
+}
+
+/// Derivatives of B equations by B unknowns.
+pub(super) type Block<const B: usize> = [[f64; B]; B];
+
+/// A value at a face for each equation, and its derivatives by the nodes below and above.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing<const B: usize> {
+    pub value: [f64; B],
+    pub by_below: Block<B>,
+    pub by_above: Block<B>,
+}
+
+/// Steps of a conservation law on a moving mesh
+///
+/// ```text
+/// (A u)ⁿ⁺¹ − (A u)ⁿ + Σ ½ (g(uⁿ, meshⁿ) + g(uⁿ⁺¹, meshⁿ⁺¹)) = ½ Δt ((A S)ⁿ + (A S)ⁿ⁺¹)
+/// g = Δt (F·N − D ∇u·N) − s (u_i + u_k)/2,   ∇u·N = (|N|² (u_k − u_i) − (d·t) (u_b − u_a)) / J
+/// ```
+///
+/// over the faces of each dual cell, N the normal and t the face from a to b, d = x_k − x_i, J = d·N, s the area that the
+/// face sweeps between the meshes, u_a and u_b the means of the four nodes around its ends. What leaves a cell enters the
+/// next, and a constant stays constant on any moving mesh. Crank and Nicolson in time, Newton with the true Jacobian.
+#[derive(Debug, Clone)]
+pub(super) struct FiniteVolumes<const B: usize> {
+    solver: RobustTransport<B>,
+    /// The newest mesh: the next step starts on it.
+    newest: Option<(Mesh<2>, DualCells)>,
+}
+
+impl<const B: usize> Default for FiniteVolumes<B> {
+    fn default() -> Self {
+        Self { solver: RobustTransport::default(), newest: None }
+    }
+}
+
+/// Newton stops where all residuals are below this share of the size of the solution: far below what a step leaves out.
+const TOLERANCE: f64 = 1e-8;
+const MAX_NEWTON: usize = 20;
+
+/// One face in one half of a step: g/2, its derivatives, and the weight of u_b − u_a in it.
+#[derive(Debug, Clone, Copy)]
+struct Face<const B: usize> {
+    crossing: Crossing<B>,
+    tangent: [f64; B],
+}
+
+/// One mesh of the two that a step connects.
+struct Half<'a> {
+    dt: f64,
+    t: f64,
+    cells: &'a DualCells,
+    /// Padded.
+    x: &'a [[f64; 2]],
+    swept: &'a [[f64; 2]],
+}
+
+impl<const B: usize> FiniteVolumes<B> {
+    /// The solution on the new mesh, one value a node.
+    pub fn step(
+        &mut self,
+        law: &impl Law<B>,
+        motion: Motion<'_>,
+        start: &[[f64; B]],
+    ) -> Result<(Vec<[f64; B]>, Work), Failure> {
+        let Motion { t, dt, old, new } = motion;
+        let lattice = new.lattice();
+        let old_cells = match self.newest.take() {
+            Some((mesh, cells)) if mesh == *old => cells,
+            _ => DualCells::new(old),
+        };
+        let cells = DualCells::new(new);
+        let swept = old_cells.swept(&cells);
+        let [width, height] = new.extent();
+        let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), [[width, 0.0], [0.0, height]]));
+        let patch = *cells.patch();
+        let n = patch.pencil_len();
+        let places = |p: usize| (p * n..(p + 1) * n).zip(patch.pencil(p)..);
+
+        let mut u = padded(lattice, start, [[0.0; B]; 2]);
+        let mut known = vec![[0.0; B]; patch.len()];
+        {
+            let half = Half { dt, t, cells: &old_cells, x: &x_old, swept: &swept };
+            let nodes = law.nodes(t, half.x, &u);
+            let faces = half.faces(law, &nodes, &u);
+            parallel::for_each_row(&mut known, n, |p, known| {
+                for (known, (i, k)) in known.iter_mut().zip(places(p)) {
+                    let (leaving, area) = (half.leaving(&faces, k), half.cells.areas()[i]);
+                    let source = law.source(&nodes[k]).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * dt * s));
+                    *known = std::array::from_fn(|c| area * (u[k][c] + source[c]) - leaving[c]);
+                }
+            });
+        }
+
+        // given values stand from the start
+        let given = |i: usize| lattice.on_side(i).then(|| law.side(t + dt, new.x()[i]));
+        for (i, k) in patch.places().enumerate() {
+            for (u, given) in u[k].iter_mut().zip(given(i).into_iter().flatten()) {
+                *u = given.unwrap_or(*u);
+            }
+        }
+        repeat_sides(&patch, &mut u);
+
+        let size = u.as_flattened().iter().fold(0.0, |m, u| larger(m, *u)).max(f64::MIN_POSITIVE);
+        let half = Half { dt, t: t + dt, cells: &cells, x: &x_new, swept: &swept };
+        let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
+        let mut residual = vec![[0.0; B]; patch.len()];
+        let mut work = Work::default();
+        // where much passes a cell in a step, round-off alone leaves more than the tolerance
+        let mut wanted = TOLERANCE * size;
+        let stalled = loop {
+            let nodes = law.nodes(half.t, half.x, &u);
+            let faces = half.faces(law, &nodes, &u);
+            parallel::for_each_row(&mut residual, n, |p, residual| {
+                for (residual, (i, k)) in residual.iter_mut().zip(places(p)) {
+                    let (leaving, area) = (half.leaving(&faces, k), half.cells.areas()[i]);
+                    let source = law.source(&nodes[k]).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * dt * s));
+                    *residual =
+                        std::array::from_fn(|c| (known[i][c] - leaving[c]) / area - (u[k][c] - source[c]));
+                    for (residual, given) in residual.iter_mut().zip(given(i).into_iter().flatten()) {
+                        *residual = if given.is_some() { 0.0 } else { *residual };
+                    }
+                }
+            });
+            let largest = residual.as_flattened().iter().fold(0.0, |m, r| larger(m, *r));
+            if largest <= wanted {
+                break None;
+            }
+            let iterations = work.newton_iterations;
+            if iterations == MAX_NEWTON || !largest.is_finite() {
+                break Some(Failure::NewtonStalled { residual: largest, tolerance: wanted, iterations });
+            }
+            parallel::for_each_row(&mut matrix.rows, n, |p, rows| {
+                for (row, (i, k)) in rows.iter_mut().zip(places(p)) {
+                    *row = half.row(&faces, i, k);
+                    if let Some((_, derivative)) = law.source(&nodes[k]) {
+                        add(&mut row[0], -0.5 * dt, &derivative);
+                    }
+                    fold_sides(lattice.beyond(i), row);
+                    for (c, given) in given(i).into_iter().flatten().enumerate() {
+                        if given.is_some() {
+                            row.iter_mut().for_each(|block| block[c] = [0.0; B]);
+                            row[0][c][c] = 1.0;
+                        }
+                    }
+                }
+            });
+            let stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
+            wanted = size * TOLERANCE.max(16.0 * f64::EPSILON * stiffest);
+            let mut correction = vec![[0.0; B]; patch.padded_len()];
+            // Newton squares the residual: solving for much less than that is wasted
+            let tolerance = (0.01 * largest * (largest / size).min(1.0)).max(0.1 * wanted);
+            work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, [tolerance; B])?;
+            work.linear_solves += 1;
+            work.newton_iterations += 1;
+            for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
+                *u += correction;
+            }
+            repeat_sides(&patch, &mut u);
+        };
+        let mut values = vec![[0.0; B]; patch.len()];
+        for (i, k) in patch.places().enumerate() {
+            values[i] = u[k];
+        }
+        if lattice.periodic() == [true, true] {
+            settle(&cells, &residual, &mut values);
+        }
+        check_finite(law.names(), new, &values)?;
+        self.newest = Some((new.clone(), cells));
+        stalled.map_or(Ok((values, work)), Err)
+    }
+}
+
+/// Adds what the residuals leave of each sum to all values alike: sums are then conserved to round-off, however well the
+/// step was solved.
+fn settle<const B: usize>(cells: &DualCells, residual: &[[f64; B]], values: &mut [[f64; B]]) {
+    let area = crate::numerics::sum(cells.areas().iter().copied());
+    for c in 0..B {
+        let left = crate::numerics::sum(cells.areas().iter().zip(residual).map(|(area, r)| area * r[c])) / area;
+        values.iter_mut().for_each(|value| value[c] += left);
+    }
+}
+
+impl Half<'_> {
+    /// All faces, stored with the node below them; those on bounded sides let nothing pass.
+    fn faces<const B: usize, L: Law<B>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; 2]> {
+        let patch = self.cells.patch();
+        let ([n, m], wraps) = (patch.size, patch.wraps);
+        let s = m + 2;
+        let nothing = Crossing { value: [0.0; B], by_below: [[0.0; B]; B], by_above: [[0.0; B]; B] };
+        let mut faces = vec![[Face { crossing: nothing, tangent: [0.0; B] }; 2]; u.len()];
+        parallel::for_each_row(&mut faces, s, |p, row| {
+            if p == 0 || p > n {
+                return;
+            }
+            for (q, faces) in row.iter_mut().enumerate().take(m + 1).skip(1) {
+                let k = p * s + q;
+                if p < n || wraps[0] {
+                    let ends = [k + 1, k + s + 1, k - 1, k + s - 1].map(|k| &u[k]);
+                    faces[0] = self.face(law, nodes, u, k, k + s, 0, ends);
+                }
+                if q < m || wraps[1] {
+                    let ends = [k - s, k - s + 1, k + s, k + s + 1].map(|k| &u[k]);
+                    faces[1] = self.face(law, nodes, u, k, k + 1, 1, ends);
+                }
+            }
+        });
+        patch.wrap(&mut faces);
+        faces
+    }
+
+    /// The face between two places; `ends` are the nodes beside its end b, then those beside a.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)] // what a face is made of
+    fn face<const B: usize, L: Law<B>>(
+        &self,
+        law: &L,
+        nodes: &[L::Node],
+        u: &[[f64; B]],
+        i: usize,
+        k: usize,
+        axis: usize,
+        ends: [&[f64; B]; 4],
+    ) -> Face<B> {
+        let ([nx, ny], swept) = (self.cells.normals()[i][axis], self.swept[i][axis]);
+        let d = [0, 1].map(|c| self.x[k][c] - self.x[i][c]);
+        let half = 0.5 * self.dt;
+        let scale = half / (d[0] * nx + d[1] * ny);
+        let (across, along) = (scale * (nx * nx + ny * ny), 0.25 * scale * (d[0] * ny - d[1] * nx));
+        let passing = law.convection(&nodes[i], &nodes[k], [nx, ny]);
+        let spread = law.diffusivity(&nodes[i], &nodes[k]);
+        let mut face = Face { crossing: passing, tangent: [0.0; B] };
+        let Crossing { value, by_below, by_above } = &mut face.crossing;
+        for c in 0..B {
+            let slope = across * (u[k][c] - u[i][c]) + along * ((ends[0][c] + ends[1][c]) - (ends[2][c] + ends[3][c]));
+            value[c] = half * value[c] - spread.value[c] * slope - 0.25 * swept * (u[i][c] + u[k][c]);
+            for e in 0..B {
+                by_below[c][e] = half * by_below[c][e] - spread.by_below[c][e] * slope;
+                by_above[c][e] = half * by_above[c][e] - spread.by_above[c][e] * slope;
+            }
+            by_below[c][c] += spread.value[c] * across - 0.25 * swept;
+            by_above[c][c] -= spread.value[c] * across + 0.25 * swept;
+            face.tangent[c] = -spread.value[c] * along;
+        }
+        face
+    }
+
+    /// What leaves the dual cell of a place in this half of the step.
+    #[inline(always)]
+    fn leaving<const B: usize>(&self, faces: &[[Face<B>; 2]], k: usize) -> [f64; B] {
+        let [right, left, top, bottom] = self.around(faces, k);
+        std::array::from_fn(|c| {
+            (right.crossing.value[c] - left.crossing.value[c]) + (top.crossing.value[c] - bottom.crossing.value[c])
+        })
+    }
+
+    /// The faces of a dual cell: above and below along ξ, above and below along η.
+    fn around<'f, const B: usize>(&self, faces: &'f [[Face<B>; 2]], k: usize) -> [&'f Face<B>; 4] {
+        let s = self.cells.patch().size[1] + 2;
+        [&faces[k][0], &faces[k - s][0], &faces[k][1], &faces[k - 1][1]]
+    }
+
+    /// Derivatives of u + (what leaves) / area by the nine nodes around.
+    #[inline(always)]
+    fn row<const B: usize>(&self, faces: &[[Face<B>; 2]], i: usize, k: usize) -> [Block<B>; 9] {
+        let [right, left, top, bottom] = self.around(faces, k);
+        let share = 1.0 / self.cells.areas()[i];
+        let mut row = [[[0.0; B]; B]; 9];
+        for (face, sign, own, other) in [(right, share, true, 2), (left, -share, false, 1), (top, share, true, 4), (bottom, -share, false, 3)] {
+            let Crossing { by_below, by_above, .. } = &face.crossing;
+            let (mine, theirs) = if own { (by_below, by_above) } else { (by_above, by_below) };
+            add(&mut row[0], sign, mine);
+            add(&mut row[other], sign, theirs);
+        }
+        for c in 0..B {
+            row[0][c][c] += 1.0;
+            // ends b of the four faces, and ends a, as points of the stencil
+            for (weight, b, a) in [
+                (share * right.tangent[c], [4, 8], [3, 7]),
+                (-share * left.tangent[c], [6, 4], [5, 3]),
+                (share * top.tangent[c], [1, 6], [2, 8]),
+                (-share * bottom.tangent[c], [5, 1], [7, 2]),
+            ] {
+                b.into_iter().for_each(|point| row[point][c][c] += weight);
+                a.into_iter().for_each(|point| row[point][c][c] -= weight);
+            }
+        }
+        row
+    }
+}
+
+/// Beyond a bounded side stand the side's own values: couplings to them belong to the nodes on the side.
+fn fold_sides<const B: usize>([[left, right], [below, above]]: [[bool; 2]; 2], row: &mut [Block<B>; 9]) {
+    let mut fold = |from: usize, to: usize| {
+        let block = std::mem::replace(&mut row[from], [[0.0; B]; B]);
+        add(&mut row[to], 1.0, &block);
+    };
+    // (from, to) for the three points beyond each side
+    for (beyond, points) in [
+        (left, [(1, 0), (5, 3), (6, 4)]),
+        (right, [(2, 0), (7, 3), (8, 4)]),
+        (below, [(3, 0), (5, 1), (7, 2)]),
+        (above, [(4, 0), (6, 1), (8, 2)]),
+    ] {
+        if beyond {
+            points.into_iter().for_each(|(from, to)| fold(from, to));
+        }
+    }
+}
+
+/// Sets the ring beyond bounded sides to the values on the side, and images of periodic axes.
+fn repeat_sides<const B: usize>(patch: &crate::geometry::Patch<2>, u: &mut [[f64; B]]) {
+    let [n, m] = patch.size;
+    let s = m + 2;
+    patch.wrap(u);
+    if !patch.wraps[1] {
+        for p in 0..n + 2 {
+            (u[p * s], u[p * s + m + 1]) = (u[p * s + 1], u[p * s + m]);
+        }
+    }
+    if !patch.wraps[0] {
+        u.copy_within(s..2 * s, 0);
+        u.copy_within(n * s..(n + 1) * s, (n + 1) * s);
+    }
+}
+
+#[inline(always)]
+fn add<const B: usize>(sum: &mut Block<B>, scale: f64, block: &Block<B>) {
+    for (sum, entry) in sum.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
+        *sum += scale * entry;
+    }
+}
