@@ -32,13 +32,14 @@ impl Monitor for RootGradient {
         let mut roots = vec![0.0; n * m];
         let mut areas = vec![0.0; n * m];
         let mut steepest = 0.0;
-        for (cell, (root, area)) in roots.iter_mut().zip(&mut areas).enumerate() {
-            let k = cell / m * (m + 1) + cell % m;
+        let cells = (0..n).flat_map(|i| i * (m + 1)..i * (m + 1) + m);
+        for (k, (root, area)) in cells.zip(roots.iter_mut().zip(&mut areas)) {
             let [low, high, left, right] = [k, k + m + 2, k + 1, k + m + 1];
             let ([px, py], [qx, qy]) = (minus(x[high], x[low]), minus(x[left], x[right]));
             let (p, q) = (values[high] - values[low], values[left] - values[right]);
             let twice = px * qy - py * qx;
-            let slope = ((p * qy - q * py) / twice).hypot((q * px - p * qx) / twice);
+            let (gx, gy) = (p * qy - q * py, q * px - p * qx);
+            let slope = (gx * gx + gy * gy).sqrt() / twice;
             steepest = larger(steepest, slope);
             (*root, *area) = (slope.sqrt(), 0.5 * twice);
         }

@@ -114,22 +114,18 @@ impl<const D: usize> Mesh<D> {
 
     /// Length of the shortest edge between neighbouring nodes.
     pub fn shortest_edge(&self) -> f64 {
-        let (lattice, extent) = (&self.lattice, self.extent());
-        let (nodes, strides) = (lattice.nodes(), lattice.strides());
+        let x = self.closed();
+        let size = self.lattice.cells().map(|n| n + 1);
         let mut shortest = f64::INFINITY;
-        for (k, x) in self.x.iter().enumerate() {
-            let node = lattice.node(k);
-            for d in 0..D {
-                let (next, jump) = match node[d] + 1 < nodes[d] {
-                    true => (k + strides[d], 0.0),
-                    false if lattice.periodic()[d] => (k - node[d] * strides[d], extent[d]),
-                    false => continue,
-                };
-                let length2: f64 = (0..D)
-                    .map(|c| self.x[next][c] + if c == d { jump } else { 0.0 } - x[c])
-                    .map(|side| side * side)
-                    .sum();
-                shortest = shortest.min(length2);
+        let mut measure = |a: &[f64; D], b: &[f64; D]| {
+            let length2: f64 = (0..D).map(|c| (b[c] - a[c]) * (b[c] - a[c])).sum();
+            shortest = if length2 < shortest { length2 } else { shortest };
+        };
+        for d in 0..D {
+            // neighbours along an axis are a stride apart, within blocks of all its nodes
+            let stride = size[d + 1..].iter().product::<usize>();
+            for block in x.chunks_exact(stride * size[d]) {
+                block.iter().zip(&block[stride..]).for_each(|(a, b)| measure(a, b));
             }
         }
         shortest.sqrt()

@@ -95,55 +95,80 @@ impl Mmpde {
     }
 
     /// The conservative form from one ρ a mesh cell. Nodes on sides, where no row stands, have weights of zero.
-    pub(super) fn on_cells<const D: usize>(
-        &self,
-        lattice: &Lattice<D>,
-        cells: &[f64],
-        dt: f64,
-    ) -> MeshOperator<D> {
-        let (a, nodes, periodic) = (self.stiffness(lattice, dt), lattice.nodes(), lattice.periodic());
+    pub(super) fn on_cells<const D: usize>(&self, lattice: &Lattice<D>, cells: &[f64], dt: f64) -> MeshOperator<D> {
+        let a = self.stiffness(lattice, dt);
         let mut weights = vec![[[0.0; 2]; D]; lattice.len()];
         let mut volumes = vec![1.0; lattice.len()];
-        for (k, (weights, volume)) in weights.iter_mut().zip(&mut volumes).enumerate() {
-            let node = lattice.node(k);
-            if (0..D).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d])) {
-                continue;
-            }
-            *volume = 0.0;
+        let cells = around_nodes(lattice, cells);
+        // cells around a node have its own place, or one less along some axes
+        let below = strides(lattice.nodes().map(|n| n + 1));
+        let patch = Patch::whole(lattice);
+        for (k, place) in patch.nodes(lattice).zip(places(&patch, below)) {
+            let (mut sums, mut volume) = ([[0.0; 2]; D], 0.0);
             for corner in 0..1 << D {
-                let above: [usize; D] = std::array::from_fn(|d| corner >> d & 1);
-                let around = |d: usize| if node[d] + above[d] == 0 { nodes[d] - 1 } else { node[d] + above[d] - 1 };
-                let cell = (0..D).fold(0, |place, d| place * lattice.cells()[d] + around(d));
-                *volume += cells[cell];
-                (0..D).for_each(|d| weights[d][above[d]] += cells[cell]);
+                let rho = cells[place + (0..D).map(|d| (corner >> d & 1) * below[d]).sum::<usize>()];
+                volume += rho;
+                (0..D).for_each(|d| sums[d][corner >> d & 1] += rho);
             }
-            *volume /= (1 << D) as f64;
-            let share = 1.0 / ((1 << (D - 1)) as f64 * *volume);
-            (0..D).for_each(|d| weights[d] = weights[d].map(|sum| a[d] * share * sum));
+            volumes[k] = volume / (1 << D) as f64;
+            let share = 1.0 / ((1 << (D - 1)) as f64 * volumes[k]);
+            weights[k] = std::array::from_fn(|d| sums[d].map(|sum| a[d] * share * sum));
         }
         MeshOperator { lattice: *lattice, weights, volumes: Some(volumes) }
     }
 }
 
+/// Places of the cells below the nodes of a patch in an array with these strides.
+fn places<const D: usize>(patch: &Patch<D>, strides: [usize; D]) -> impl Iterator<Item = usize> {
+    let (size, origin) = (patch.size, patch.origin);
+    (0..patch.pencil_count()).flat_map(move |p| {
+        let (mut rest, mut first) = (p, origin[D - 1] * strides[D - 1]);
+        for d in (0..D - 1).rev() {
+            first += (rest % size[d] + origin[d]) * strides[d];
+            rest /= size[d];
+        }
+        first..first + size[D - 1]
+    })
+}
+
+/// Cell values with one cell more along each axis: entry i lies below node i, entry i + 1 above it. Below the first
+/// node of a bounded axis and above its last lie zeros.
+fn around_nodes<const D: usize>(lattice: &Lattice<D>, cells: &[f64]) -> Vec<f64> {
+    let (n, size, periodic) = (lattice.cells(), lattice.nodes().map(|n| n + 1), lattice.periodic());
+    let mut out = Vec::with_capacity(size.iter().product());
+    let mut place = [0; D];
+    for _ in 0..size.iter().product() {
+        let cell = (0..D).try_fold(0, |sum, d| match (place[d], periodic[d]) {
+            (0, true) => Some(sum * n[d] + n[d] - 1),
+            (0, false) => None,
+            (i, _) if i > n[d] => None,
+            (i, _) => Some(sum * n[d] + i - 1),
+        });
+        out.push(cell.map_or(0.0, |cell| cells[cell]));
+        for d in (0..D).rev() {
+            place[d] += 1;
+            if place[d] < size[d] {
+                break;
+            }
+            place[d] = 0;
+        }
+    }
+    out
+}
+
 /// Means of nodal values over the mesh cells, last axis fastest.
 pub(super) fn cell_means<const D: usize>(lattice: &Lattice<D>, values: &[f64]) -> Vec<f64> {
-    let (cells, nodes, strides) = (lattice.cells(), lattice.nodes(), lattice.strides());
-    let count: usize = cells.iter().product();
-    let mean = |cell: usize| {
-        let mut rest = cell;
-        let mut index = [0; D];
-        for d in (0..D).rev() {
-            (index[d], rest) = (rest % cells[d], rest / cells[d]);
-        }
-        let sum: f64 = (0..1 << D)
-            .map(|corner| {
-                let place = |d: usize| (index[d] + (corner >> d & 1)) % nodes[d] * strides[d];
-                values[(0..D).map(place).sum::<usize>()]
-            })
-            .sum();
-        sum / (1 << D) as f64
-    };
-    (0..count).map(mean).collect()
+    let (cells, closed) = (lattice.cells(), lattice.closed(values));
+    let strides = strides(cells.map(|n| n + 1));
+    let patch = Patch { origin: [0; D], size: cells, wraps: [false; D] };
+    let corners: Vec<usize> = (0..1 << D).map(|corner| (0..D).map(|d| (corner >> d & 1) * strides[d]).sum()).collect();
+    let mean = |place: usize| corners.iter().map(|corner| closed[place + corner]).sum::<f64>() / corners.len() as f64;
+    places(&patch, strides).map(mean).collect()
+}
+
+/// How far apart neighbours along each axis are in an array, last axis fastest.
+fn strides<const D: usize>(size: [usize; D]) -> [usize; D] {
+    std::array::from_fn(|d| size[d + 1..].iter().product())
 }
 
 /// One implicit Euler step of a mesh equation, as what each node draws from its neighbours

@@ -329,7 +329,9 @@ fn steep_densities_are_named_and_the_safe_gradient_carries_them() {
     let rho: Vec<f64> = start.x().iter().map(|[x, _]| if *x < 0.0 { 1.0 } else { 1e4 }).collect();
     let mut generator = Stochastic::new([2, 2], 0, EstimatorKind::default());
     for gradient in [Gradient::Central, Gradient::Log] {
-        let error = generator.step(&Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(gradient) }, &start, &rho, DT).unwrap_err();
+        let error = generator
+            .step(&Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(gradient) }, &start, &rho, DT)
+            .unwrap_err();
         assert!(matches!(error, Failure::SteepDensity { skew, .. } if skew > 2.0), "{error}");
     }
     let safe = Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(Gradient::Safe) };

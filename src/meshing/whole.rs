@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// One implicit solve of the mesh equation on the whole domain: the sides first, then all other nodes at once
 ///
 /// The gradient form is solved to round-off. The conservative form is solved by conjugate gradients from the mesh that
-/// the last step would lead to if it went on, to a thousandth of the shortest edge or better.
+/// the last step would lead to if it went on, to a hundredth of the shortest edge or better.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Whole {
@@ -32,7 +32,7 @@ struct Step {
 
 /// How exactly conjugate gradients solve for positions, as a share of the shortest edge. A residual of the mesh equation
 /// bounds the error it leaves.
-const CLOSENESS: f64 = 1e-3;
+const CLOSENESS: f64 = 1e-2;
 
 impl MeshGenerator for Whole {
     fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {

@@ -4,8 +4,8 @@ use super::{Motion, Physics, check_finite, curvilinear::Stencils, formula, nodal
 use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
 use crate::geometry::{DualCells, Field, Mesh, Patch, node_areas};
-use crate::numerics::{larger, sum};
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
+use crate::numerics::{larger, sum};
 use crate::parallel;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};

@@ -12,14 +12,16 @@ use crate::error::Failure;
 /// Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed. (2003), section 10.3; van der Vorst, *Bi-CGSTAB* (1992).
 #[derive(Debug, Clone, Default)]
 pub struct IluBicgstab<const B: usize> {
-    /// At each place of a padded vector: the inverse of the pivot, then the entries of both factors; zero on the ring.
+    /// At each place of a padded vector: the inverse of the pivot, then the entries of both factors, those above over the
+    /// pivot; zero on the ring.
     rows: Vec<[[[f64; B]; B]; 9]>,
     krylov: Krylov<B>,
 }
 
-/// The points below a node, in the order of elimination, and those above it.
+/// The points below a node, in the order of elimination, and those above it; the neighbour along the line is the last,
+/// since it is the one to be waited for.
 const BELOW: [usize; 4] = [5, 1, 6, 3];
-const ABOVE: [usize; 4] = [4, 7, 2, 8];
+const ABOVE: [usize; 4] = [7, 2, 8, 4];
 
 /// For a point below and a point above that one: which point of the row both together lead to, if it is there.
 const MEETS: [[Option<usize>; 4]; 4] = {
@@ -75,8 +77,8 @@ fn eliminate<const B: usize>(a: &BlockMatrix<2, 9, B>, factors: &mut Vec<[[[f64;
         let mut row = *row;
         for (l, &below) in BELOW.iter().enumerate() {
             let other = &factors[k.wrapping_add_signed(offsets[below])];
-            let factor = product(&row[below], &other[0]);
-            row[below] = factor;
+            let factor = row[below];
+            row[below] = product(&factor, &other[0]);
             for (u, &above) in ABOVE.iter().enumerate() {
                 if let Some(s) = MEETS[l][u] {
                     let filled = product(&factor, &other[above]);
@@ -87,6 +89,9 @@ fn eliminate<const B: usize>(a: &BlockMatrix<2, 9, B>, factors: &mut Vec<[[[f64;
             }
         }
         row[0] = invert(row[0]);
+        for above in ABOVE {
+            row[above] = product(&row[0], &row[above]);
+        }
         sound &= row[0].as_flattened().iter().all(|v| v.is_finite());
         factors[k] = row;
     }
@@ -115,11 +120,11 @@ fn precondition<const B: usize>(
     for p in (0..a.patch.pencil_count()).rev() {
         let start = a.patch.pencil(p);
         for k in (start..start + n).rev() {
-            let mut sum = x[k];
+            let mut sum: [f64; B] = std::array::from_fn(|r| (0..B).map(|c| factors[k][0][r][c] * x[k][c]).sum());
             for above in ABOVE {
                 subtract(&factors[k][above], &x[k.wrapping_add_signed(offsets[above])], &mut sum);
             }
-            x[k] = std::array::from_fn(|r| (0..B).map(|c| factors[k][0][r][c] * sum[c]).sum());
+            x[k] = sum;
         }
     }
     a.patch.wrap(x);

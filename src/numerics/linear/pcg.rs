@@ -1,4 +1,5 @@
-use super::{LatticeMatrix, krylov::add, krylov::dot, krylov::divide, larger, solved, stalled};
+use super::krylov::{divide, dot};
+use super::{LatticeMatrix, larger, solved, stalled};
 use crate::error::Failure;
 
 /// Conjugate gradients for symmetric M-matrices on a star, preconditioned by modified incomplete elimination
@@ -15,9 +16,17 @@ use crate::error::Failure;
 /// Gustafsson, *A class of first order factorization methods*, BIT 18 (1978).
 #[derive(Debug, Clone, Default)]
 pub struct Pcg<const K: usize> {
-    /// 1/e at each place of a padded vector, 0 on the ring.
-    pivots: Vec<f64>,
+    factors: Factors,
     space: [Vec<[f64; K]>; 4],
+}
+
+/// The incomplete elimination, each number at the place of its unknown in a padded vector and 0 on the ring.
+#[derive(Debug, Clone, Default)]
+struct Factors {
+    /// 1/e.
+    pivots: Vec<f64>,
+    /// Couplings along each axis to the neighbour below and above, over e.
+    couplings: Vec<[Vec<f64>; 2]>,
 }
 
 const MAX_ITERATIONS: usize = 1000;
@@ -38,7 +47,7 @@ impl<const K: usize> Pcg<K> {
         x: &mut [[f64; K]],
         tolerance: [f64; K],
     ) -> Result<usize, Failure> {
-        let Self { pivots, space } = self;
+        let Self { factors, space } = self;
         for v in space.iter_mut() {
             v.clear();
             v.resize(a.patch.padded_len(), [0.0; K]);
@@ -46,10 +55,14 @@ impl<const K: usize> Pcg<K> {
         let [r, z, p, q] = space;
         a.residual(b, x, r);
         let unknowns = a.rows.len();
+        let n = a.patch.pencil_len();
+        let inverse: Vec<f64> = weights.iter().map(|weight| 1.0 / weight).collect();
         let size = |r: &[[f64; K]]| {
             let mut sizes = [0.0; K];
-            for (k, weight) in a.patch.places().zip(weights) {
-                (0..K).for_each(|c| sizes[c] = larger(sizes[c], r[k][c] / weight));
+            for (start, inverse) in a.patch.pencils().zip(inverse.chunks_exact(n)) {
+                for (r, inverse) in r[start..start + n].iter().zip(inverse) {
+                    (0..K).for_each(|c| sizes[c] = larger(sizes[c], r[c] * inverse));
+                }
             }
             sizes
         };
@@ -57,12 +70,12 @@ impl<const K: usize> Pcg<K> {
         if solved(sizes, tolerance) {
             return Ok(0);
         }
-        if !eliminate(a, pivots) {
+        if !factors.eliminate(a) {
             return Err(stalled(unknowns, sizes, tolerance, 0));
         }
         let mut before = [1.0; K];
         for iteration in 1..=MAX_ITERATIONS {
-            precondition(a, pivots, r, z);
+            factors.precondition(a, r, z);
             let now = dot(r, z);
             let active = std::array::from_fn(|c| sizes[c] > tolerance[c]);
             let gain = if iteration == 1 { [0.0; K] } else { divide(active, now, before) };
@@ -73,8 +86,12 @@ impl<const K: usize> Pcg<K> {
             a.patch.wrap(p);
             a.multiply(p, q);
             let step = divide(active, now, dot(p, q));
-            add(x, step, p);
-            add(r, step.map(|s| -s), q);
+            for (((x, p), r), q) in x.iter_mut().zip(p.iter()).zip(r.iter_mut()).zip(q.iter()) {
+                for c in 0..K {
+                    x[c] += step[c] * p[c];
+                    r[c] -= step[c] * q[c];
+                }
+            }
             sizes = size(r);
             if solved(sizes, tolerance) {
                 return Ok(iteration);
@@ -87,53 +104,79 @@ impl<const K: usize> Pcg<K> {
     }
 }
 
-/// The pivots of the incomplete elimination, inverted. False where one is not positive.
-fn eliminate<const D: usize, const S: usize>(a: &LatticeMatrix<D, S>, pivots: &mut Vec<f64>) -> bool {
-    pivots.clear();
-    pivots.resize(a.patch.padded_len(), 0.0);
-    let strides = a.patch.padded_strides();
-    // what each row sends to its neighbours above, kept until they are reached
-    let mut above = vec![[0.0; D]; a.patch.padded_len()];
-    let mut sound = true;
-    for (row, k) in a.rows.iter().zip(a.patch.places()) {
-        let mut pivot = row[0];
-        for d in 0..D {
-            let (below, from) = (row[1 + 2 * d], k - strides[d]);
-            let filled: f64 = (0..D).filter(|&e| e != d).map(|e| above[from][e]).sum();
-            pivot -= below * (below + filled) * pivots[from];
+impl Factors {
+    /// Eliminates. False where a pivot is not positive.
+    fn eliminate<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> bool {
+        let (len, strides, n) = (a.patch.padded_len(), a.patch.padded_strides(), a.patch.pencil_len());
+        let Self { pivots, couplings } = self;
+        pivots.clear();
+        pivots.resize(len, 0.0);
+        couplings.resize_with(D, Default::default);
+        for coupling in couplings.iter_mut().flatten() {
+            coupling.clear();
+            coupling.resize(len, 0.0);
         }
-        sound &= pivot > 0.0;
-        pivots[k] = 1.0 / pivot;
-        above[k] = std::array::from_fn(|d| row[2 + 2 * d]);
+        let mut sound = true;
+        for (p, start) in a.patch.pencils().enumerate() {
+            for (row, k) in a.rows[p * n..(p + 1) * n].iter().zip(start..) {
+                let mut pivot = row[0];
+                for d in 0..D {
+                    // what the row below sends to all its neighbours above, over its pivot
+                    let sent: f64 = couplings.iter().map(|[_, above]| above[k - strides[d]]).sum();
+                    pivot -= row[1 + 2 * d] * sent;
+                }
+                sound &= pivot > 0.0;
+                pivots[k] = 1.0 / pivot;
+                for d in 0..D {
+                    couplings[d][0][k] = row[1 + 2 * d] * pivots[k];
+                    couplings[d][1][k] = row[2 + 2 * d] * pivots[k];
+                }
+            }
+        }
+        sound
     }
-    sound
-}
 
-/// z = M⁻¹ r, the ring of z zero.
-fn precondition<const D: usize, const S: usize, const K: usize>(
-    a: &LatticeMatrix<D, S>,
-    pivots: &[f64],
-    r: &[[f64; K]],
-    z: &mut [[f64; K]],
-) {
-    let (strides, n) = (a.patch.padded_strides(), a.patch.pencil_len());
-    for (p, start) in a.patch.pencils().enumerate() {
-        for (row, k) in a.rows[p * n..(p + 1) * n].iter().zip(start..) {
-            let mut sum = r[k];
-            for d in 0..D {
-                (0..K).for_each(|c| sum[c] -= row[1 + 2 * d] * z[k - strides[d]][c]);
+    /// z = M⁻¹ r, the ring of z zero. The neighbour that was set last comes last, so that little waits for it.
+    fn precondition<const D: usize, const S: usize, const K: usize>(
+        &self,
+        a: &LatticeMatrix<D, S>,
+        r: &[[f64; K]],
+        z: &mut [[f64; K]],
+    ) {
+        let (strides, n) = (a.patch.padded_strides(), a.patch.pencil_len());
+        for start in a.patch.pencils() {
+            let (before, here) = z.split_at_mut(start);
+            let here = &mut here[..n];
+            for ((z, r), pivot) in here.iter_mut().zip(&r[start..]).zip(&self.pivots[start..]) {
+                *z = r.map(|r| pivot * r);
             }
-            z[k] = sum.map(|s| s * pivots[k]);
+            for d in 0..D - 1 {
+                let below = &before[start - strides[d]..][..n];
+                for ((z, below), w) in here.iter_mut().zip(below).zip(&self.couplings[d][0][start..]) {
+                    (0..K).for_each(|c| z[c] -= w * below[c]);
+                }
+            }
+            let mut last = [0.0; K];
+            for (z, w) in here.iter_mut().zip(&self.couplings[D - 1][0][start..]) {
+                (0..K).for_each(|c| z[c] -= w * last[c]);
+                last = *z;
+            }
         }
-    }
-    for p in (0..a.patch.pencil_count()).rev() {
-        let start = a.patch.pencil(p);
-        for (row, k) in a.rows[p * n..(p + 1) * n].iter().zip(start..start + n).rev() {
-            let mut sum = [0.0; K];
-            for d in 0..D {
-                (0..K).for_each(|c| sum[c] += row[2 + 2 * d] * z[k + strides[d]][c]);
+        for p in (0..a.patch.pencil_count()).rev() {
+            let start = a.patch.pencil(p);
+            let (here, after) = z.split_at_mut(start + n);
+            let here = &mut here[start..];
+            for d in 0..D - 1 {
+                let above = &after[strides[d] - n..][..n];
+                for ((z, above), w) in here.iter_mut().zip(above).zip(&self.couplings[d][1][start..]) {
+                    (0..K).for_each(|c| z[c] -= w * above[c]);
+                }
             }
-            (0..K).for_each(|c| z[k][c] -= sum[c] * pivots[k]);
+            let mut last = [0.0; K];
+            for (z, w) in here.iter_mut().zip(&self.couplings[D - 1][1][start..start + n]).rev() {
+                (0..K).for_each(|c| z[c] -= w * last[c]);
+                last = *z;
+            }
         }
     }
 }
