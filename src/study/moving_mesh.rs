@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING};
 use crate::physics::{Burgers, PdeKind, formula};
-use crate::setting::pair;
+use crate::setting::{Auto, pair};
 use crate::simulation::{Coupling, FramesAt, Schedule, Simulation, State};
 use serde::{Deserialize, Serialize};
 
@@ -101,8 +101,9 @@ pub struct Time {
     pub start: f64,
     /// Time of the last state.
     pub end: f64,
-    /// Longest step; steps are shortened evenly such that reports and end are met exactly.
-    pub step: f64,
+    /// Longest step, or as the solution allows; steps are shortened evenly such that reports and end are met exactly.
+    #[serde(default)]
+    pub step: Auto<f64>,
     /// Times at which `summary.json` reports; the end where none are given.
     #[serde(default)]
     pub report: Vec<f64>,
@@ -223,9 +224,16 @@ impl MovingMesh {
         if self.time.report.is_empty() {
             self.time.report = vec![self.time.end];
         }
-        let steps = self.schedule()?.steps();
-        let frames = self.output.frames.get_or_insert(FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)));
-        frames.check([self.time.start, self.time.end]).map_err(|error| error.within("output"))
+        let Time { start, end, .. } = self.time;
+        let frames_by_default = match self.schedule()?.steps() {
+            Some(steps) => FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)),
+            None => {
+                let part = |n: usize| start + (end - start) * n as f64 / FRAMES_BY_DEFAULT as f64;
+                FramesAt::Times((1..FRAMES_BY_DEFAULT).map(part).collect())
+            }
+        };
+        let frames = self.output.frames.get_or_insert(frames_by_default);
+        frames.check([start, end]).map_err(|error| error.within("output"))
     }
 
     /// Refuses axes that the equation is not made for.
@@ -348,7 +356,11 @@ impl MovingMesh {
 
     fn schedule(&self) -> Result<Schedule> {
         let Time { start, end, step, report } = &self.time;
-        Schedule::new(*start, *end, *step, report.clone()).map_err(|error| error.within("time"))
+        match *step {
+            Auto::Value(step) => Schedule::new(*start, *end, step, report.clone()),
+            Auto::Auto => Schedule::automatic(*start, *end, report.clone()),
+        }
+        .map_err(|error| error.within("time"))
     }
 
     fn monitor(&self) -> MonitorKind {
