@@ -126,6 +126,15 @@ impl Burgers {
         1.0 / (1.0 + ((x[0] + x[1] - t) / (2.0 * self.viscosity)).exp())
     }
 
+    /// u on a bounded side, where it is known.
+    pub(super) fn side(&self, t: f64, x: [f64; 2]) -> Option<f64> {
+        match &self.given {
+            [_, Some(boundary)] => Some(boundary.eval(x, &[t])[0]),
+            [Some(_), None] => None,
+            [None, None] => Some(self.front(t, x)),
+        }
+    }
+
     fn on_mesh(&self, t: f64, mesh: &Mesh<2>) -> Field {
         Field::scalar(mesh.x().iter().map(|&x| self.front(t, x)).collect())
     }
@@ -232,12 +241,8 @@ impl Physics for Burgers {
         });
         let mut solution = u.clone();
         for k in lattice.sides() {
-            solution.values_mut()[k] = match &self.given {
-                [_, Some(boundary)] => boundary.eval(new.x()[k], &[t + dt])[0],
-                // a side without a formula keeps its values
-                [Some(_), None] => u.values()[k],
-                [None, None] => self.front(t + dt, new.x()[k]),
-            };
+            // a side without a formula keeps its values
+            solution.values_mut()[k] = self.side(t + dt, new.x()[k]).unwrap_or(u.values()[k]);
         }
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 

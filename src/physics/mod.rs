@@ -4,10 +4,12 @@ mod burgers;
 mod curvilinear;
 mod prescribed;
 mod shallow_water;
+mod uniform;
 
 pub use burgers::{Burgers, Convection};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
+pub use uniform::UniformBurgers;
 
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake};
