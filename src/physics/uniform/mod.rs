@@ -72,14 +72,15 @@ impl UniformBurgers {
             return Err(Error::invalid("order", order, "must be 2 or 4"));
         }
         if order == 4 && burgers.boundary.is_some() {
-            let rule = "looks past the sides, where pde.boundary means nothing; set it to 2, or make both axes periodic";
+            let rule =
+                "looks past the sides, where pde.boundary means nothing; set it to 2, or make both axes periodic";
             return Err(Error::invalid("order", order, rule));
         }
         if burgers.convection != Convection::Conservative {
             let rule = "has conservative convection only; set pde.convection to \"conservative\"";
             return Err(Error::invalid("stepper", "\"rk4\"", rule));
         }
-        Ok(Self { burgers, order })
+        Ok(Self { burgers: burgers.compiled()?, order })
     }
 
     fn advance<const G: usize>(&self, motion: Motion<'_>, start: &[f64]) -> Result<(Field, Work), Failure> {
@@ -274,16 +275,11 @@ impl<'a, const G: usize> Grid<'a, G> {
         for (k, row) in outside.chunks_exact_mut(w).enumerate() {
             self.fill_row(t, if k < G { k as isize - G as isize } else { m + (k - G) as isize }, row);
         }
-        let stages = Stages {
-            t,
-            dt,
-            u,
-            outside: &outside,
-            by: [0.5 * dt, 0.5 * dt, dt, dt / 6.0].map(|s| self.stencil.scaled(s)),
-        };
+        let by = [0.5 * dt, 0.5 * dt, dt, dt / 6.0].map(|s| self.stencil.scaled(s));
+        let stages = Stages { grid: self, t, dt, u, outside: &outside, by };
         parallel::for_each_row_pair(next, self.band * w, scratch, 3 * Self::KEPT * w, |band, next, scratch| {
-            // wider vectors where the machine has them; no fused products, so the bits are the same everywhere
-            pulp::Arch::new().dispatch(|| self.advance_band(&stages, band * self.band, next, scratch));
+            let first = band * self.band;
+            pulp::Arch::new().dispatch(Band { stages: &stages, first, next, scratch });
         });
     }
 
@@ -384,10 +380,29 @@ impl<'a, const G: usize> Grid<'a, G> {
 
 /// What all bands of a substep share.
 struct Stages<'s, const G: usize> {
+    grid: &'s Grid<'s, G>,
     t: f64,
     dt: f64,
     u: &'s [f64],
     outside: &'s [f64],
     /// R times the length of each stage.
     by: [Stencil<G>; 4],
+}
+
+/// A band as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has. Products
+/// and sums are not fused, so that the bits are the same with any.
+struct Band<'s, const G: usize> {
+    stages: &'s Stages<'s, G>,
+    first: usize,
+    next: &'s mut [f64],
+    scratch: &'s mut [f64],
+}
+
+impl<const G: usize> pulp::WithSimd for Band<'_, G> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.stages.grid.advance_band(self.stages, self.first, self.next, self.scratch);
+    }
 }
