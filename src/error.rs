@@ -70,6 +70,14 @@ pub enum Failure {
         /// Where the node is.
         x: [f64; 2],
     },
+    /// An explicit step that would not end in any time worth waiting for.
+    #[error("the step would take {substeps:.1e} explicit substeps for speeds up to {speed:.1e}")]
+    ManySubsteps {
+        /// Substeps that stability needs.
+        substeps: f64,
+        /// Largest |u|.
+        speed: f64,
+    },
     /// Newton's method did not reach its tolerance.
     #[error("Newton's method stalled: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed")]
     NewtonStalled {
@@ -169,6 +177,7 @@ impl Failure {
             Self::NotPositive { .. } => "not-positive",
             Self::NotPeriodic { .. } => "not-periodic",
             Self::NotUniform { .. } => "not-uniform",
+            Self::ManySubsteps { .. } => "many-substeps",
             Self::NewtonStalled { .. } => "newton-stalled",
             Self::LinearStalled { .. } => "linear-stalled",
             Self::SteepDensity { .. } => "steep-density",
@@ -194,6 +203,7 @@ impl Failure {
             }
             Self::NotPeriodic { .. } => "set domain.periodic to [true, true]",
             Self::NotUniform { .. } => "set mesh.generator to { kind = \"fixed\" }, or leave time.stepper out",
+            Self::ManySubsteps { .. } => "leave time.stepper out, or lower grid.cells or pde.viscosity",
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => {
                 "lower time.step or raise mesh.relaxation; set monitor.gradient to \"safe\" where the density is very steep"

@@ -98,6 +98,20 @@ fn not_uniform() {
 }
 
 #[test]
+fn many_substeps() {
+    let mut burgers = UniformBurgers::new(Burgers::new(1e9, Convection::Conservative).unwrap(), 4).unwrap();
+    let u = burgers.initial(0.0, &mesh());
+    let motion = Motion { t: 0.0, dt: 1.0, old: &mesh(), new: &mesh() };
+    let error = burgers.step(motion, &u).unwrap_err();
+    assert_eq!(error.name(), "many-substeps");
+    assert_says(error, &["would take 2.6e11 explicit substeps for speeds up to 5.0e-1"], Some("time.stepper"), true);
+    for huge in [1e150, 1e308] {
+        let error = burgers.step(motion, &Field::scalar(vec![huge; 81])).unwrap_err();
+        assert_eq!(error.name(), "many-substeps");
+    }
+}
+
+#[test]
 fn newton_stalled() {
     let mut burgers = Burgers::new(1e-6, Convection::Conservative).unwrap();
     let u = burgers.initial(0.5, &mesh());

@@ -26,7 +26,8 @@ use stencil::Stencil;
 ///
 /// # Errors
 /// A step returns [`Failure::NotUniform`] where the mesh moves or is not uniform, [`Failure::NotPeriodic`] where
-/// a bounded axis has initial values but no side values, [`Failure::NonFinite`] where u blows up.
+/// a bounded axis has initial values but no side values, [`Failure::NonFinite`] where u blows up,
+/// [`Failure::ManySubsteps`] where stability asks for more than 1e8.
 ///
 /// # Example
 /// ```
@@ -57,6 +58,8 @@ pub struct UniformBurgers {
 const SAFETY: f64 = 0.95;
 /// Substeps between looks at the largest |u|, which side values can raise.
 const ROUND: usize = 64;
+/// Substeps of a step beyond which nobody waits: minutes on the smallest of meshes.
+const MOST: f64 = 1e8;
 /// Rows a band for each ghost row. A band computes 3 rows of the first stage, 2 of the second and 1 of the third twice
 /// at either end for each ghost row: 3 % of all.
 const BAND: usize = 96;
@@ -98,6 +101,10 @@ impl UniformBurgers {
                 break;
             }
             let left = ((t + dt - now) / (SAFETY * grid.stencil.stable_step(largest))).ceil().max(1.0);
+            // not a number is too many, too
+            if left.partial_cmp(&MOST).is_none_or(|o| o.is_gt()) {
+                return Err(Failure::ManySubsteps { substeps: left, speed: largest });
+            }
             let substep = (t + dt - now) / left;
             let round = left.min(ROUND as f64);
             for n in 0..round as usize {
