@@ -5,10 +5,12 @@ mod curvilinear;
 mod finite_volumes;
 mod prescribed;
 mod shallow_water;
+mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
+pub use uniform::UniformBurgers;
 
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake};
