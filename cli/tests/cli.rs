@@ -275,7 +275,7 @@ fn bad_files_are_refused_at_their_place() {
         (without("pde").into(), &["the study has no [pde] table"]),
         (without("grid").into(), &["the study has no [grid] table"]),
         (without("study").into(), &["the study has no [study] table"]),
-        (study.replace("step = 1e-3", "").into(), &["`step` is missing"]),
+        (study.replace("end = 0.27", "").into(), &["the key `end` is missing", "add end = …"]),
         (study.replace("kind = \"burgers\"\n", "").into(), &["`pde` does not say its kind", "driftmesh list"]),
         (study.replace("[time]", "[time").into(), &["study.toml:1"]),
         (

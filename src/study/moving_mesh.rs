@@ -1,5 +1,5 @@
 use super::Source;
-use crate::density::{Given, MonitorKind};
+use crate::density::{Arclength, Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING};
@@ -221,8 +221,11 @@ impl MovingMesh {
             compare.generator.check(&lattice).map_err(|error| error.within("generator").within("compare"))?;
         }
         let prescribed_density = matches!(&self.pde, PdeKind::Prescribed(p) if p.rho.is_some());
+        let stays = matches!(self.mesh.generator, GeneratorKind::Fixed(_));
         let monitor = self.monitor.get_or_insert_with(|| match prescribed_density {
             true => MonitorKind::Given(Given::default()),
+            // no mesh follows it: the cheap one
+            false if stays => MonitorKind::Arclength(Arclength::default()),
             false => MonitorKind::default(),
         });
         monitor.check().map_err(|error| error.within("monitor"))?;

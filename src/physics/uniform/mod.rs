@@ -79,7 +79,7 @@ impl UniformBurgers {
                 "looks past the sides, where pde.boundary means nothing; set it to 2, or make both axes periodic";
             return Err(Error::invalid("order", order, rule));
         }
-        if burgers.convection != Convection::Conservative {
+        if burgers.convection == Convection::Advective {
             let rule = "has conservative convection only; set pde.convection to \"conservative\"";
             return Err(Error::invalid("stepper", "\"rk4\"", rule));
         }
