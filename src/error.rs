@@ -88,6 +88,12 @@ pub enum Failure {
         /// Iterations done.
         iterations: usize,
     },
+    /// Automatic time steps became so short that the run would not end.
+    #[error("automatic time steps shrank to {dt:.1e}: the solution never stops changing by much in a step")]
+    VanishingStep {
+        /// The last step.
+        dt: f64,
+    },
     /// A linear system was not solved to its tolerance by any solver at hand.
     #[error(
         "a linear system of {unknowns} unknowns was not solved: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed"
@@ -179,6 +185,7 @@ impl Failure {
             Self::NotUniform { .. } => "not-uniform",
             Self::ManySubsteps { .. } => "many-substeps",
             Self::NewtonStalled { .. } => "newton-stalled",
+            Self::VanishingStep { .. } => "vanishing-step",
             Self::LinearStalled { .. } => "linear-stalled",
             Self::SteepDensity { .. } => "steep-density",
             Self::LongWalks { .. } => "long-walks",
@@ -204,6 +211,9 @@ impl Failure {
             Self::NotPeriodic { .. } => "set domain.periodic to [true, true]",
             Self::NotUniform { .. } => "set mesh.generator to { kind = \"fixed\" }, or leave time.stepper out",
             Self::ManySubsteps { .. } => "leave time.stepper out, or lower grid.cells or pde.viscosity",
+            Self::VanishingStep { .. } => {
+                "raise mesh.relaxation if the mesh is restless, refine grid.cells, or give time.step as a number"
+            }
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => {
                 "lower time.step or raise mesh.relaxation; set monitor.gradient to \"safe\" where the density is very steep"

@@ -182,7 +182,8 @@ impl Simulation {
                 .map_err(|failure| Error::Failed { failure, moment: Some(Moment { t, step }) })?;
             let before = std::mem::replace(state, next.state);
             if let Some(pace) = &mut pace {
-                timed(&mut record.seconds.monitor, || pace.learn(&before, state));
+                timed(&mut record.seconds.monitor, || pace.learn(&before, state))
+                    .map_err(|failure| Error::Failed { failure, moment: Some(Moment { t, step }) })?;
             }
             record.work.add(next.work);
             record.interface = next.interface;

@@ -1,5 +1,5 @@
 use super::{Simulation, State};
-use crate::error::{Error, Moment, Result};
+use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{DualCells, Mesh, padded};
 use crate::numerics::larger;
 use crate::physics::Motion;
@@ -19,6 +19,8 @@ pub(super) struct Pace {
 const CHANGE: f64 = 0.125;
 /// A step is at most so much longer and shorter than the one before.
 const GROWTH: [f64; 2] = [0.5, 1.2];
+/// A share of the longest step below which the run would take ten million steps or more.
+const SHORTEST: f64 = 1e-5;
 /// Steps at the start of a run that are all learned from.
 const WATCHED: usize = 20;
 /// Steps in a run in which nothing changes.
@@ -59,15 +61,19 @@ impl Pace {
     }
 
     /// Learns from a step; from every fourth only, once the run is under way.
-    pub fn learn(&mut self, before: &State, after: &State) {
+    ///
+    /// # Errors
+    /// [`Failure::VanishingStep`].
+    pub fn learn(&mut self, before: &State, after: &State) -> Result<(), Failure> {
         if after.step > WATCHED && !after.step.is_multiple_of(4) {
-            return;
+            return Ok(());
         }
         let share = change(&before.mesh, &after.mesh, &first(&before.u), &first(&after.u));
         // a step that was cut short to meet a report says what a whole one would have done
         let whole = share * self.dt / (after.t - before.t);
         let factor = if whole.is_finite() { (CHANGE / whole).clamp(GROWTH[0], GROWTH[1]) } else { GROWTH[0] };
         self.dt = (self.dt * factor).min(self.longest);
+        if self.dt < SHORTEST * self.longest { Err(Failure::VanishingStep { dt: self.dt }) } else { Ok(()) }
     }
 }
 
