@@ -189,6 +189,7 @@ impl Failure {
             Self::NonFinite { .. } => {
                 "mend the formula that gives it, if one does; else lower time.step, refine grid.cells or raise monitor.smoothing"
             }
+            Self::Formula { given, .. } if given.is_empty() => "mend the formula",
             Self::Formula { .. } => {
                 "mend the formula, for instance by max(…, 0) under a root; where it is right, lower time.step or raise monitor.smoothing"
             }

@@ -14,6 +14,9 @@ use crate::work::Work;
 pub(super) trait Law<const B: usize>: Sync {
     /// What faces need to know of a node.
     type Node: Copy + Send + Sync;
+    /// Newton stops where all residuals are below this share of the size of their unknown, once a step is solved at all:
+    /// far below what a step leaves out.
+    const TOLERANCE: f64 = 1e-6;
 
     /// Names of the unknowns, for messages.
     fn names(&self) -> [&'static str; B];
@@ -69,8 +72,6 @@ impl<const B: usize> Default for FiniteVolumes<B> {
     }
 }
 
-/// Newton stops where all residuals are below this share of the size of their unknown: far below what a step leaves out.
-const TOLERANCE: f64 = 1e-6;
 const MAX_NEWTON: usize = 20;
 
 /// One face in one half of a step: g/2, its derivatives, and the weight of u_b − u_a in it.
@@ -99,9 +100,9 @@ struct Half<'a> {
 
 impl<const B: usize> FiniteVolumes<B> {
     /// The solution on the new mesh, one value a node.
-    pub fn step(
+    pub fn step<L: Law<B>>(
         &mut self,
-        law: &impl Law<B>,
+        law: &L,
         motion: Motion<'_>,
         start: &[[f64; B]],
     ) -> Result<(Vec<[f64; B]>, Work), Failure> {
@@ -159,7 +160,7 @@ impl<const B: usize> FiniteVolumes<B> {
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
         // where much passes a cell in a step, round-off alone leaves more than the tolerance
-        let mut round_off = 16.0 * f64::EPSILON;
+        let (mut round_off, tolerance) = (16.0 * f64::EPSILON, L::TOLERANCE);
         let stalled = loop {
             let nodes = law.nodes(half.t, half.x, &u);
             law.check(new, &u, &nodes)?;
@@ -182,7 +183,9 @@ impl<const B: usize> FiniteVolumes<B> {
                 size = largest.into_iter().fold(size, larger);
                 sizes = std::array::from_fn(|c| larger(sizes[c], largest[c]).max(f64::EPSILON * size));
             }
-            let wanted: [f64; B] = std::array::from_fn(|c| (TOLERANCE * sizes[c]).max(round_off * size));
+            // small changes add up over many steps: none is left out
+            let share = if iterations == 0 { 0.0 } else { tolerance };
+            let wanted: [f64; B] = std::array::from_fn(|c| (share * sizes[c]).max(round_off * size));
             if (0..B).all(|c| largest[c] <= wanted[c]) {
                 break None;
             }
@@ -212,10 +215,11 @@ impl<const B: usize> FiniteVolumes<B> {
             let mut correction = vec![[0.0; B]; patch.padded_len()];
             // Newton squares the residual: solving for much less than that is wasted
             let share = (0..B).fold(0.0, |m, c| larger(m, largest[c] / sizes[c])).min(1.0);
-            let tolerance = std::array::from_fn(|c| {
-                (0.01 * largest[c] * share).max(0.1 * (TOLERANCE * sizes[c]).max(round_off * size))
+            let enough = std::array::from_fn(|c| {
+                let newton = (0.01 * largest[c] * share).max(0.1 * tolerance * sizes[c]);
+                newton.min(1e-3 * largest[c]).max(0.1 * round_off * size)
             });
-            work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
+            work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, enough)?;
             work.linear_solves += 1;
             work.newton_iterations += 1;
             for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
