@@ -20,7 +20,8 @@ fn main() {
         "#
     ))
     .unwrap();
-    let builtin = Burgers { flux: BurgersFlux::Central, ..Burgers::new(VISCOSITY, Convection::Flux).unwrap() };
+    let mut builtin = Burgers::new(VISCOSITY, Convection::Flux).unwrap();
+    builtin.flux = BurgersFlux::Central;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for n in [40, 120] {
         let square = Mesh::uniform(Lattice::bounded([n, n]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
