@@ -70,6 +70,28 @@ pub enum Failure {
         /// The axis.
         axis: usize,
     },
+    /// An equation that is made for the uniform mesh met another, or one that moves.
+    #[error(
+        "the stepper rk4 needs the uniform mesh, but along axis {axis} node ({}, {}), x = {}, y = {}, is off by {off:.1e}", node[0], node[1], short(x[0]), short(x[1])
+    )]
+    NotUniform {
+        /// Distance from the place in the uniform mesh.
+        off: f64,
+        /// The axis along which it is off.
+        axis: usize,
+        /// Indices of the node along ξ and η.
+        node: [usize; 2],
+        /// Where the node is.
+        x: [f64; 2],
+    },
+    /// An explicit step that would not end in any time worth waiting for.
+    #[error("the step would take {substeps:.1e} explicit substeps for speeds up to {speed:.1e}")]
+    ManySubsteps {
+        /// Substeps that stability needs.
+        substeps: f64,
+        /// Largest |u|.
+        speed: f64,
+    },
     /// Newton's method did not reach its tolerance.
     #[error("Newton's method stalled: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed")]
     NewtonStalled {
@@ -169,6 +191,8 @@ impl Failure {
             Self::Formula { .. } => "formula",
             Self::NotPositive { .. } => "not-positive",
             Self::NotPeriodic { .. } => "not-periodic",
+            Self::NotUniform { .. } => "not-uniform",
+            Self::ManySubsteps { .. } => "many-substeps",
             Self::NewtonStalled { .. } => "newton-stalled",
             Self::LinearStalled { .. } => "linear-stalled",
             Self::SteepDensity { .. } => "steep-density",
@@ -197,6 +221,8 @@ impl Failure {
                 "mend the formula that gives it, if one does; else lower time.step or refine grid.cells"
             }
             Self::NotPeriodic { .. } => "set domain.periodic to [true, true]",
+            Self::NotUniform { .. } => "set mesh.generator to { kind = \"fixed\" }, or leave time.stepper out",
+            Self::ManySubsteps { .. } => "leave time.stepper out, or lower grid.cells or pde.viscosity",
             Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
             Self::LinearStalled { .. } => {
                 "lower time.step or raise mesh.relaxation; set monitor.gradient to \"safe\" where the density is very steep"

@@ -14,6 +14,8 @@ pub struct Work {
     pub linear_iterations: usize,
     /// Newton iterations of the physics.
     pub newton_iterations: usize,
+    /// Explicit substeps of the physics.
+    pub substeps: usize,
     /// Steps of random walks.
     pub path_steps: usize,
 }
@@ -23,6 +25,7 @@ impl std::ops::AddAssign for Work {
         self.linear_solves += other.linear_solves;
         self.linear_iterations += other.linear_iterations;
         self.newton_iterations += other.newton_iterations;
+        self.substeps += other.substeps;
         self.path_steps += other.path_steps;
     }
 }

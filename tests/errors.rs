@@ -4,7 +4,7 @@ use driftmesh::density::{Arclength, Given, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
-use driftmesh::physics::{Burgers, Convection, FormulaPde, Motion, Physics, Prescribed, ShallowWater};
+use driftmesh::physics::{Burgers, Convection, FormulaPde, Motion, Physics, Prescribed, ShallowWater, UniformBurgers};
 use driftmesh::simulation::{RunDirectory, Schedule};
 use driftmesh::study::{MovingMesh, Source};
 use driftmesh::{Error, Failure};
@@ -93,6 +93,34 @@ fn not_periodic() {
     let error = water.step(motion, &u).unwrap_err();
     assert_eq!(error.name(), "not-periodic");
     assert_says(error, &["shallow water equations need periodic axes, but axis 0"], Some("domain.periodic"), true);
+}
+
+#[test]
+fn not_uniform() {
+    let mut x = mesh().x().to_vec();
+    x[40][0] += 0.01;
+    let bent = mesh().moved(x).unwrap();
+    let mut burgers = UniformBurgers::new(Burgers::new(0.1, Convection::Conservative).unwrap(), 2).unwrap();
+    let u = burgers.initial(0.0, &mesh());
+    let motion = Motion { t: 0.0, dt: 1e-3, old: &mesh(), new: &bent };
+    let error = burgers.step(motion, &u).unwrap_err();
+    assert_eq!(error.name(), "not-uniform");
+    let message = ["rk4 needs the uniform mesh", "axis 0 node (4, 4), x = 0.5100, y = 0.5000, is off by 1.0e-2"];
+    assert_says(error, &message, Some("mesh.generator to { kind = \"fixed\" }"), true);
+}
+
+#[test]
+fn many_substeps() {
+    let mut burgers = UniformBurgers::new(Burgers::new(1e9, Convection::Conservative).unwrap(), 4).unwrap();
+    let u = burgers.initial(0.0, &mesh());
+    let motion = Motion { t: 0.0, dt: 1.0, old: &mesh(), new: &mesh() };
+    let error = burgers.step(motion, &u).unwrap_err();
+    assert_eq!(error.name(), "many-substeps");
+    assert_says(error, &["would take 2.6e11 explicit substeps for speeds up to 5.0e-1"], Some("time.stepper"), true);
+    for huge in [1e150, 1e308] {
+        let error = burgers.step(motion, &Field::scalar(vec![huge; 81])).unwrap_err();
+        assert_eq!(error.name(), "many-substeps");
+    }
 }
 
 #[test]

@@ -5,7 +5,13 @@ use std::io::{IsTerminal, Write, stderr};
 /// A live bar on a terminal, ten plain lines elsewhere.
 pub struct Progress {
     bar: Option<ProgressBar>,
+    /// Pieces of the run that were told of.
+    told: usize,
 }
+
+/// Pieces of a run: of the bar, and as lines.
+const OF_THE_BAR: usize = 500;
+const LINES: usize = 10;
 
 impl Progress {
     pub fn new() -> Self {
@@ -14,7 +20,7 @@ impl Progress {
                 .expect("the template is valid");
             ProgressBar::new(0).with_style(style)
         });
-        Self { bar }
+        Self { bar, told: 0 }
     }
 
     /// Clears the bar, so that what follows begins on a clean line.
@@ -27,21 +33,25 @@ impl Progress {
 
 impl Observer for Progress {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let (step, steps) = (snapshot.state.step, snapshot.steps);
         let words = || {
-            let jacobian = snapshot.quality.min_scaled_jacobian;
-            format!("t = {:.4}  step {step} of {steps}  min J {jacobian:.3}", snapshot.state.t)
+            let (state, jacobian) = (snapshot.state, snapshot.quality.min_scaled_jacobian);
+            let of = snapshot.steps.map_or(String::new(), |steps| format!(" of {steps}"));
+            format!("t = {:.4}  step {}{of}  min J {jacobian:.3}", state.t, state.step)
         };
+        let pieces = if self.bar.is_some() { OF_THE_BAR } else { LINES };
+        // a share that is a whole number of pieces up to round-off is one
+        let done = (snapshot.share * pieces as f64 + 1e-9) as usize;
+        let news = done > std::mem::replace(&mut self.told, done);
         match &self.bar {
             Some(bar) if event == Event::Started => {
-                bar.set_length(steps as u64);
+                bar.set_length(pieces as u64);
                 bar.set_message(words());
             }
-            Some(bar) if step.is_multiple_of(steps.div_ceil(500)) => {
-                bar.set_position(step as u64);
+            Some(bar) if news => {
+                bar.set_position(done as u64);
                 bar.set_message(words());
             }
-            None if event == Event::Stepped && step.is_multiple_of(steps.div_ceil(10)) => {
+            None if event == Event::Stepped && news => {
                 let _ = writeln!(stderr(), "{}", words());
             }
             _ => {}

@@ -85,6 +85,9 @@ fn table(summary: &Summary) -> String {
         "work     {} steps, {} Newton iterations, {} linear solves in {} iterations",
         total.steps, total.work.newton_iterations, total.work.linear_solves, total.work.linear_iterations
     );
+    if total.work.substeps > 0 {
+        text += &format!(", {} explicit substeps", total.work.substeps);
+    }
     if total.work.path_steps > 0 {
         text += &format!(", {} path steps", total.work.path_steps);
     }

@@ -98,6 +98,7 @@ fn a_run_leaves_its_directory() {
         "/work/rejected_steps",
         "/work/linear_solves",
         "/work/newton_iterations",
+        "/work/substeps",
         "/work/path_steps",
         "/reports/0/t",
         "/reports/1/error/linf",

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// The gradient form is solved to round-off. The conservative form is solved by conjugate gradients from the mesh that
 /// the last step would lead to if it went on, to a hundredth of the shortest edge or better.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Whole {
     #[serde(skip)]
@@ -18,6 +18,10 @@ pub struct Whole {
     plane: Robust<2>,
     #[serde(skip)]
     symmetric: Pcg<2>,
+    /// How exactly conjugate gradients solve for positions, as a share of the shortest edge. A residual of the mesh
+    /// equation bounds the error it leaves.
+    #[serde(skip, default = "closeness")]
+    closeness: f64,
     /// The last step: from where to where, and how long it took.
     #[serde(skip)]
     last: Option<Step>,
@@ -30,9 +34,23 @@ struct Step {
     dt: f64,
 }
 
-/// How exactly conjugate gradients solve for positions, as a share of the shortest edge. A residual of the mesh equation
-/// bounds the error it leaves.
-const CLOSENESS: f64 = 1e-2;
+/// Ten times as much changes nothing in the digits of an error that are shown.
+fn closeness() -> f64 {
+    1e-2
+}
+
+impl Default for Whole {
+    fn default() -> Self {
+        Self::to(closeness())
+    }
+}
+
+impl Whole {
+    /// Solves the conservative form to a share of the shortest edge of the mesh.
+    pub fn to(closeness: f64) -> Self {
+        Self { line: Robust::default(), plane: Robust::default(), symmetric: Pcg::default(), closeness, last: None }
+    }
+}
 
 impl MeshGenerator for Whole {
     fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
@@ -49,7 +67,7 @@ impl MeshGenerator for Whole {
                     guess[k] = [0, 1].map(|d| x[k][d] + dt / before * (x[k][d] - from.x()[k][d]));
                 }
             }
-            let (solver, closeness) = (&mut self.symmetric, CLOSENESS * mesh.shortest_edge());
+            let (solver, closeness) = (&mut self.symmetric, self.closeness * mesh.shortest_edge());
             if let Some((new, cost)) =
                 operator.solve_symmetric::<5, 2>(patch, mesh.x(), &guess, jump(mesh), solver, closeness)
             {

@@ -149,16 +149,17 @@ impl Burgers {
         1.0 / (1.0 + ((x[0] + x[1] - t) / (2.0 * self.viscosity)).exp())
     }
 
-    fn on_mesh(&self, t: f64, mesh: &Mesh<2>) -> Field {
-        Field::scalar(mesh.x().iter().map(|&x| self.front(t, x)).collect())
+    /// u on a bounded side, where it is known.
+    pub(super) fn side_value(&self, t: f64, x: [f64; 2]) -> Option<f64> {
+        match &self.given {
+            [_, Some(boundary)] => Some(boundary.eval(x, &[t])[0]),
+            [Some(_), None] => None,
+            [None, None] => Some(self.front(t, x)),
+        }
     }
 
-    /// u on a bounded side.
-    fn on_side(&self, t: f64, x: [f64; 2]) -> f64 {
-        match &self.given[1] {
-            Some(boundary) => boundary.eval(x, &[t])[0],
-            None => self.front(t, x),
-        }
+    fn on_mesh(&self, t: f64, mesh: &Mesh<2>) -> Field {
+        Field::scalar(mesh.x().iter().map(|&x| self.front(t, x)).collect())
     }
 
     /// R at one node that moves with velocity v.
@@ -235,7 +236,7 @@ impl Law<1> for Burgers {
     }
 
     fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; 1] {
-        [Some(self.on_side(t, x))]
+        [self.side_value(t, x)]
     }
 }
 
@@ -309,7 +310,8 @@ impl Physics for Burgers {
         });
         let mut solution = u.clone();
         for k in lattice.sides() {
-            solution.values_mut()[k] = self.on_side(t + dt, new.x()[k]);
+            // a side without a formula keeps its values
+            solution.values_mut()[k] = self.side_value(t + dt, new.x()[k]).unwrap_or(u.values()[k]);
         }
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 

@@ -405,3 +405,98 @@ fn add<const B: usize>(sum: &mut Block<B>, scale: f64, block: &Block<B>) {
         *sum += scale * entry;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Lattice;
+    use crate::physics::{Burgers, BurgersFlux, Convection, Physics};
+
+    /// A mesh of the unit square with every node up to 0.3 cells away from its uniform place, side nodes on their sides.
+    fn random(cells: [usize; 2], periodic: [bool; 2], seed: u64) -> Mesh<2> {
+        let mesh = Mesh::uniform(Lattice::new(cells, periodic).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let x = (mesh.x().iter().enumerate()).map(|(k, x)| {
+            let sides = mesh.lattice().beyond(k);
+            std::array::from_fn(|d| {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                let shift = 0.6 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) / cells[d] as f64;
+                x[d] + if sides[d].contains(&true) { 0.0 } else { shift }
+            })
+        });
+        mesh.moved(x.collect()).unwrap()
+    }
+
+    fn burgers(flux: BurgersFlux, initial: &str, boundary: Option<&str>) -> Burgers {
+        let mut burgers = Burgers::new(0.01, Convection::Flux).unwrap().from(initial, boundary).unwrap();
+        burgers.flux = flux;
+        burgers
+    }
+
+    const FLUXES: [BurgersFlux; 3] = [BurgersFlux::Product, BurgersFlux::Energy, BurgersFlux::Central];
+    const WAVE: &str = "1.5 + sin(2*pi*x)*cos(2*pi*y)";
+
+    /// Without viscosity, on a random mesh at rest, Σ A ln u changes only by round-off with the product flux, and Σ A u²
+    /// with the energy-conserving one; neither does with the other.
+    #[test]
+    fn each_flux_keeps_its_own_invariant() {
+        let mesh = random([13, 17], [true, true], 5);
+        let (cells, dt) = (DualCells::new(&mesh), 1.0);
+        let x = padded(mesh.lattice(), mesh.x(), [[1.0, 0.0], [0.0, 1.0]]);
+        let swept = cells.swept(&cells);
+        let rates = |flux: BurgersFlux| -> [f64; 2] {
+            let mut law = burgers(flux, WAVE, None);
+            law.viscosity = 0.0;
+            let u = law.initial(0.0, &mesh);
+            let u = padded(mesh.lattice(), u.values().as_chunks::<1>().0, [[0.0]; 2]);
+            let half = Half { dt, t: 0.0, cells: &cells, x: &x, swept: &swept };
+            let faces = half.faces(&law, &Law::nodes(&law, 0.0, &x, &u), &u);
+            let sum = |f: fn(f64) -> f64| cells.patch().places().map(|k| half.leaving(&faces, k)[0] * f(u[k][0])).sum();
+            [sum(|u| 1.0 / u), sum(|u| u)]
+        };
+        let [[log, not_square], [not_log, square]] = [BurgersFlux::Product, BurgersFlux::Energy].map(rates);
+        assert!(log.abs() < 1e-14 && square.abs() < 1e-14, "{log:e}, {square:e}");
+        assert!(not_square.abs() > 1e-6 && not_log.abs() > 1e-6, "{not_square:e}, {not_log:e}");
+    }
+
+    /// On meshes that jump about at random, a constant stays constant, and ∫u changes only by round-off.
+    #[test]
+    fn random_motion_keeps_constants_and_sums() {
+        for (flux, periodic) in
+            FLUXES.into_iter().flat_map(|flux| [[true, true], [false, true], [false, false]].map(|p| (flux, p)))
+        {
+            let all = periodic == [true, true];
+            for initial in ["0.7", WAVE] {
+                let mut physics = burgers(flux, initial, (!all).then_some(initial));
+                let mut mesh = random([9, 12], periodic, 1);
+                let mut u = physics.initial(0.0, &mesh);
+                let sum = physics.conserved(&mesh, &u);
+                for step in 2..8 {
+                    let new = random([9, 12], periodic, step);
+                    let motion = Motion { t: 0.0, dt: 1e-3, old: &mesh, new: &new };
+                    u = physics.step(motion, &u).unwrap().0;
+                    mesh = new;
+                }
+                if initial == "0.7" {
+                    let off = u.values().iter().fold(0.0_f64, |m, u| m.max((u - 0.7).abs()));
+                    assert!(off < 1e-14, "{flux:?} on {periodic:?}: off by {off:e}");
+                }
+                let drift = (physics.conserved(&mesh, &u) - sum) / sum;
+                assert!(!all || drift.abs() < 1e-14, "{flux:?}: drift {drift:e}");
+            }
+        }
+    }
+
+    /// The Jacobian is the derivative: one Newton step of a tiny perturbation is exact to second order.
+    #[test]
+    fn newton_converges_quadratically() {
+        let (old, new) = (random([8, 9], [false, true], 3), random([8, 9], [false, true], 4));
+        let mut physics = burgers(BurgersFlux::Energy, WAVE, Some(WAVE));
+        let u = physics.initial(0.0, &old);
+        let motion = Motion { t: 0.0, dt: 2e-3, old: &old, new: &new };
+        let (end, work) = physics.step(motion, &u).unwrap();
+        // a wrong entry would take ten times as many
+        assert!((1..=4).contains(&work.newton_iterations), "{work:?}");
+        assert!(end.values().iter().all(|u| (0.0..3.0).contains(u)));
+    }
+}

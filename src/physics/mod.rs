@@ -7,11 +7,13 @@ mod formula_law;
 mod formula_pde;
 mod prescribed;
 mod shallow_water;
+mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
 pub use formula_pde::{FormulaPde, MAX_UNKNOWNS};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
+pub use uniform::UniformBurgers;
 
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake};

@@ -2,6 +2,7 @@
 
 mod coupling;
 mod observer;
+mod pace;
 mod report;
 mod schedule;
 
@@ -17,6 +18,7 @@ use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
 use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, Whole};
 use crate::physics::Physics;
 use crate::work::Work;
+use pace::Pace;
 use std::time::Instant;
 
 /// Everything that changes from step to step.
@@ -126,7 +128,7 @@ impl Simulation {
     /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds.
     pub fn adapted(&self, mut mesh: Mesh<2>) -> Result<(Mesh<2>, bool)> {
         let equation = Mmpde { relaxation: Relaxation::Steps(STEPS_OF_THE_START), ..self.equation };
-        let mut whole = Whole::default();
+        let mut whole = Whole::to(0.1 * AT_REST);
         for _ in 0..MAX_STEPS_OF_THE_START {
             let state = self.start(mesh)?;
             let moved = whole.step(&equation, &state.mesh, &state.rho, 1.0).and_then(|moved| {
@@ -171,12 +173,18 @@ impl Simulation {
             let report = self.report(state, mass_at_start, record.interface);
             record.reports.push(report);
         }
-        while let Some(dt) = self.schedule.step_from(state.step) {
+        let mut pace = match self.schedule.is_automatic() {
+            true => Some(Pace::new(self, state)?),
+            false => None,
+        };
+        while let Some((t, dt)) = self.next(state, pace.as_ref()) {
             let step = state.step + 1;
-            let t = self.schedule.time(step);
             let next = coupling::advance(self, state, t, dt, &mut record.seconds)
                 .map_err(|failure| Error::Failed { failure, moment: Some(Moment { t, step }) })?;
-            *state = next.state;
+            let before = std::mem::replace(state, next.state);
+            if let Some(pace) = &mut pace {
+                timed(&mut record.seconds.monitor, || pace.learn(&before, state));
+            }
             record.work.add(next.work);
             record.interface = next.interface;
             self.warn_of_noise(state, record);
@@ -187,6 +195,14 @@ impl Simulation {
             self.show(Event::Stepped, state, record, observers, dt, started)?;
         }
         self.show(Event::Finished, state, record, observers, 0.0, started)
+    }
+
+    /// The time after the next step, and its length.
+    fn next(&self, state: &State, pace: Option<&Pace>) -> Option<(f64, f64)> {
+        match pace {
+            None => Some((self.schedule.time(state.step + 1), self.schedule.step_from(state.step)?)),
+            Some(pace) => self.schedule.after(state.t, pace.step()).map(|t| (t, t - state.t)),
+        }
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.
@@ -228,6 +244,7 @@ impl Simulation {
             unknowns: &self.physics.unknowns(),
             dt,
             steps: self.schedule.steps(),
+            share: (state.t - self.schedule.start()) / (self.schedule.end() - self.schedule.start()),
             quality: quality(&state.mesh, &state.rho),
             error: self.error(state),
             work: record.work,

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 /// ```
 /// use driftmesh::simulation::Schedule;
 /// let schedule = Schedule::new(0.0, 1.0, 0.3, vec![0.5])?;
-/// assert_eq!(schedule.steps(), 4); // 2 × 0.25 and 2 × 0.25
+/// assert_eq!(schedule.steps(), Some(4)); // 2 × 0.25 and 2 × 0.25
 /// assert_eq!(schedule.time(2), 0.5);
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
@@ -17,6 +17,8 @@ use crate::error::{Error, Result};
 pub struct Schedule {
     start: f64,
     reports: Vec<f64>,
+    /// True where the solution decides how long steps are.
+    automatic: bool,
     /// End of each interval, and the number of steps done there.
     intervals: Vec<(f64, usize)>,
 }
@@ -24,6 +26,16 @@ pub struct Schedule {
 const MAX_STEPS: f64 = 1e9;
 
 impl Schedule {
+    /// From `start` to `end` with steps that the solution chooses, meeting all of `report`.
+    ///
+    /// # Errors
+    /// As [`Schedule::new`].
+    pub fn automatic(start: f64, end: f64, report: Vec<f64>) -> Result<Self> {
+        // one interval between two reports is one step to be divided
+        let step = (end - start).abs().max(f64::MIN_POSITIVE);
+        Ok(Self { automatic: true, ..Self::new(start, end, step, report)? })
+    }
+
     /// From `start` to `end` with steps no longer than `step`, meeting all of `report`.
     ///
     /// # Errors
@@ -68,7 +80,7 @@ impl Schedule {
                 from = to;
             }
         }
-        Ok(Self { start, reports, intervals })
+        Ok(Self { start, reports, automatic: false, intervals })
     }
 
     /// Time of the initial state.
@@ -76,9 +88,27 @@ impl Schedule {
         self.start
     }
 
-    /// Number of steps.
-    pub fn steps(&self) -> usize {
-        self.intervals.last().map_or(0, |i| i.1)
+    /// Time of the last state.
+    pub fn end(&self) -> f64 {
+        self.intervals.last().map_or(self.start, |i| i.0)
+    }
+
+    /// Number of steps; none where the solution decides.
+    pub fn steps(&self) -> Option<usize> {
+        (!self.automatic).then(|| self.intervals.last().map_or(0, |i| i.1))
+    }
+
+    /// True where the solution decides how long steps are.
+    pub fn is_automatic(&self) -> bool {
+        self.automatic
+    }
+
+    /// The time after a step from `t` of about `dt`, at most a third longer: the next report or the end is met exactly,
+    /// in equal steps. None at the end.
+    pub fn after(&self, t: f64, dt: f64) -> Option<f64> {
+        let next = self.intervals.iter().map(|i| i.0).find(|&end| end > t)?;
+        let count = ((next - t) / dt - 1.0 / 3.0).ceil().max(1.0);
+        Some(if count == 1.0 { next } else { t + (next - t) / count })
     }
 
     /// Time after `step` steps.
@@ -125,14 +155,14 @@ mod tests {
             let end = start + span;
             let report: Vec<f64> = at.iter().map(|s| (start + s * span).clamp(start, end)).collect();
             let schedule = Schedule::new(start, end, step, report.clone()).unwrap();
-            let times: Vec<f64> = (0..=schedule.steps()).map(|n| schedule.time(n)).collect();
+            let times: Vec<f64> = (0..=schedule.steps().unwrap()).map(|n| schedule.time(n)).collect();
             prop_assert_eq!(times[0], start);
-            prop_assert_eq!(times[schedule.steps()], end);
-            for n in 0..schedule.steps() {
+            prop_assert_eq!(times[schedule.steps().unwrap()], end);
+            for n in 0..schedule.steps().unwrap() {
                 prop_assert!(times[n + 1] > times[n] || span < 1e-9);
                 prop_assert!(schedule.step_from(n).unwrap() <= step * (1.0 + 1e-8));
             }
-            prop_assert!(schedule.step_from(schedule.steps()).is_none());
+            prop_assert!(schedule.step_from(schedule.steps().unwrap()).is_none());
             prop_assert!(report.iter().all(|t| times.contains(t)));
         }
     }
@@ -141,7 +171,7 @@ mod tests {
     #[test]
     fn a_step_that_divides_the_span_is_kept() {
         let schedule = Schedule::new(0.25, 1.25, 1e-3, vec![0.75, 1.0, 1.25]).unwrap();
-        assert_eq!(schedule.steps(), 1000);
+        assert_eq!(schedule.steps(), Some(1000));
         assert_eq!(schedule.time(500), 0.75);
         assert!((schedule.step_from(3).unwrap() - 1e-3).abs() < 1e-18);
     }

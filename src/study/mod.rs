@@ -4,6 +4,6 @@ mod moving_mesh;
 mod run;
 mod source;
 
-pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, StudyKind, Time};
+pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
 pub use run::{Finished, compute, run};
 pub use source::Source;

@@ -3,8 +3,8 @@ use crate::density::{Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING};
-use crate::physics::{PdeKind, formula};
-use crate::setting::pair;
+use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
+use crate::setting::{Auto, pair};
 use crate::simulation::{Coupling, FramesAt, Schedule, Simulation, State};
 use serde::{Deserialize, Serialize};
 
@@ -101,11 +101,26 @@ pub struct Time {
     pub start: f64,
     /// Time of the last state.
     pub end: f64,
-    /// Longest step; steps are shortened evenly such that reports and end are met exactly.
-    pub step: f64,
+    /// Longest step, or as the solution allows; steps are shortened evenly such that reports and end are met exactly.
+    #[serde(default)]
+    pub step: Auto<f64>,
     /// Times at which `summary.json` reports; the end where none are given.
     #[serde(default)]
     pub report: Vec<f64>,
+    /// How the equation is stepped; its own implicit scheme where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stepper: Option<Stepper>,
+    /// Order in space of `stepper`, 2 or 4; 2 where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<usize>,
+}
+
+/// A stepper other than the equation's own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stepper {
+    /// Explicit, for Burgers' equation on a uniform mesh that stays; substeps of `time.step` are as long as is stable.
+    Rk4,
 }
 
 /// `[mesh]`.
@@ -198,6 +213,7 @@ impl MovingMesh {
         }
         self.pde.check().map_err(|error| error.within("pde"))?;
         self.check_axes()?;
+        self.check_stepper()?;
         self.check_size()?;
         let lattice = *self.uniform_mesh()?.lattice();
         self.mesh.generator.check(&lattice).map_err(|error| error.within("generator").within("mesh"))?;
@@ -225,9 +241,16 @@ impl MovingMesh {
         if self.time.report.is_empty() {
             self.time.report = vec![self.time.end];
         }
-        let steps = self.schedule()?.steps();
-        let frames = self.output.frames.get_or_insert(FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)));
-        frames.check([self.time.start, self.time.end]).map_err(|error| error.within("output"))
+        let Time { start, end, .. } = self.time;
+        let frames_by_default = match self.schedule()?.steps() {
+            Some(steps) => FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)),
+            None => {
+                let part = |n: usize| start + (end - start) * n as f64 / FRAMES_BY_DEFAULT as f64;
+                FramesAt::Times((1..FRAMES_BY_DEFAULT).map(part).collect())
+            }
+        };
+        let frames = self.output.frames.get_or_insert(frames_by_default);
+        frames.check([start, end]).map_err(|error| error.within("output"))
     }
 
     /// Refuses axes that the equation is not made for.
@@ -257,6 +280,41 @@ impl MovingMesh {
             return Ok(());
         }
         Err(Error::invalid("domain.periodic", format!("{periodic:?}"), rule))
+    }
+
+    /// Refuses a stepper that the rest of the study does not go with, and fills in its order.
+    fn check_stepper(&mut self) -> Result<()> {
+        if let (None, Some(order)) = (self.time.stepper, self.time.order) {
+            return Err(Error::invalid(
+                "time.order",
+                order,
+                "only stepper = \"rk4\" has one; add it, or leave this out",
+            ));
+        }
+        if self.time.stepper.is_some() {
+            self.time.order.get_or_insert(2);
+            self.physics()?;
+        }
+        Ok(())
+    }
+
+    /// The equation with its stepper.
+    fn physics(&self) -> Result<Box<dyn Physics>> {
+        let physics = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?;
+        if self.time.stepper.is_none() {
+            return Ok(physics);
+        }
+        match (&self.pde, &self.mesh.generator) {
+            (PdeKind::Burgers(burgers), GeneratorKind::Fixed(_)) => {
+                let uniform = UniformBurgers::new(burgers.clone(), self.time.order.unwrap_or(2));
+                Ok(Box::new(uniform.map_err(|error| error.within("time"))?))
+            }
+            _ => {
+                let rule = "steps pde.kind = \"burgers\" on a mesh that stays; set mesh.generator to \
+                            { kind = \"fixed\" }, or leave time.stepper out";
+                Err(Error::invalid("time.stepper", "\"rk4\"", rule))
+            }
+        }
     }
 
     /// What is allowed but probably not meant: formulas that are not periodic on periodic axes, or that contradict each
@@ -350,8 +408,12 @@ impl MovingMesh {
     }
 
     fn schedule(&self) -> Result<Schedule> {
-        let Time { start, end, step, report } = &self.time;
-        Schedule::new(*start, *end, *step, report.clone()).map_err(|error| error.within("time"))
+        let Time { start, end, step, report, .. } = &self.time;
+        match *step {
+            Auto::Value(step) => Schedule::new(*start, *end, step, report.clone()),
+            Auto::Auto => Schedule::automatic(*start, *end, report.clone()),
+        }
+        .map_err(|error| error.within("time"))
     }
 
     fn monitor(&self) -> MonitorKind {
@@ -400,7 +462,7 @@ impl MovingMesh {
     /// # Errors
     /// [`Error::Invalid`] with the dotted key of a setting out of range.
     pub fn simulation(&self) -> Result<Simulation> {
-        let physics = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?;
+        let physics = self.physics()?;
         let monitor = self.monitor().into_monitor(&physics.unknowns()).map_err(|error| error.within("monitor"))?;
         Ok(Simulation {
             physics,

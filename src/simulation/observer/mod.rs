@@ -33,7 +33,9 @@ pub struct Snapshot<'a> {
     /// Length of the step that led here; 0 at the start.
     pub dt: f64,
     /// Number of steps of the whole run.
-    pub steps: usize,
+    pub steps: Option<usize>,
+    /// Share of the simulated time that is done, 0 … 1.
+    pub share: f64,
     /// Quality of the mesh.
     pub quality: Quality,
     /// Error where an exact solution is known.

@@ -1,0 +1,415 @@
+//! The opponent of a moving mesh: an explicit solver on a uniform one, as fast as it sensibly gets.
+
+mod stencil;
+
+use super::{Burgers, Convection, Motion, Physics, check_finite, nodal};
+use crate::error::{Error, Failure, Result};
+use crate::geometry::{Field, Mesh};
+use crate::numerics::larger;
+use crate::parallel;
+use crate::work::Work;
+use stencil::Stencil;
+
+/// Burgers' equation on a uniform mesh that stays, by central differences and classical Runge–Kutta steps
+///
+/// ```text
+/// u_t = −(u²/2)_x − (u²/2)_y + ν (u_xx + u_yy)
+/// ```
+///
+/// Differences are conservative and central, of order 2 or 4 (`order`). A step Δt is divided into equal substeps of
+/// fourth order, 95 % as long as the linearised equation with the largest |u| allows, or a little shorter. Every stage
+/// takes the values of the sides at its own time. Order 4 looks one node past the sides, where it too takes the exact
+/// front: more than a solver can know in general, and in favour of this one.
+///
+/// A substep goes through memory once: the four stages follow each other row by row, within cache. `u` has one value a
+/// node, in lattice order.
+///
+/// # Errors
+/// A step returns [`Failure::NotUniform`] where the mesh moves or is not uniform, [`Failure::NotPeriodic`] where
+/// a bounded axis has initial values but no side values, [`Failure::NonFinite`] where u blows up,
+/// [`Failure::ManySubsteps`] where stability asks for more than 1e8.
+///
+/// # Example
+/// ```
+/// use driftmesh::geometry::{Lattice, Mesh};
+/// use driftmesh::physics::{Burgers, Convection, Motion, Physics, UniformBurgers};
+/// let mesh = Mesh::uniform(Lattice::bounded([40, 40])?, [0.0; 2], [1.0; 2])?;
+/// let mut burgers = UniformBurgers::new(Burgers::new(0.05, Convection::Conservative)?, 4)?;
+/// let u = burgers.initial(0.25, &mesh);
+/// let (u, work) = burgers.step(Motion { t: 0.25, dt: 0.5, old: &mesh, new: &mesh }, &u)?;
+/// // Δt = .95 · .75 · 2.785 h²/8ν = 3.1e-3
+/// assert_eq!(work.substeps, 162);
+/// let exact = burgers.exact(0.75, &mesh).unwrap();
+/// assert!(u.values().iter().zip(exact.values()).all(|(u, e)| (u - e).abs() < 2e-5));
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+///
+/// # Source
+/// Differences and Runge–Kutta steps are classical; stages that run through memory together are the wavefronts of
+/// Wellein et al., *Efficient temporal blocking for stencil computations by multicore-aware wavefront parallelization*
+/// (2009).
+#[derive(Debug, Clone)]
+pub struct UniformBurgers {
+    burgers: Burgers,
+    order: usize,
+}
+
+/// Substeps as a share of the longest stable ones: u varies in space, the bound is that of constant u.
+const SAFETY: f64 = 0.95;
+/// Substeps between looks at the largest |u|, which side values can raise.
+const ROUND: usize = 64;
+/// Substeps of a step beyond which nobody waits: minutes on the smallest of meshes.
+const MOST: f64 = 1e8;
+/// Rows a band for each ghost row. A band computes 3 rows of the first stage, 2 of the second and 1 of the third twice
+/// at either end for each ghost row: 3 % of all.
+const BAND: usize = 96;
+
+impl UniformBurgers {
+    /// The equation, with its sides and initial values, for differences of `order` 2 or 4.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the order is another, where it is 4 and side values are a formula, which nobody can ask
+    /// beyond the sides, or where the convection is advective.
+    pub fn new(burgers: Burgers, order: usize) -> Result<Self> {
+        if order != 2 && order != 4 {
+            return Err(Error::invalid("order", order, "must be 2 or 4"));
+        }
+        if order == 4 && burgers.boundary.is_some() {
+            let rule =
+                "looks past the sides, where pde.boundary means nothing; set it to 2, or make both axes periodic";
+            return Err(Error::invalid("order", order, rule));
+        }
+        if burgers.convection != Convection::Conservative {
+            let rule = "has conservative convection only; set pde.convection to \"conservative\"";
+            return Err(Error::invalid("stepper", "\"rk4\"", rule));
+        }
+        Ok(Self { burgers: burgers.compiled()?, order })
+    }
+
+    fn advance<const G: usize>(&self, motion: Motion<'_>, start: &[f64]) -> Result<(Field, Work), Failure> {
+        let Motion { t, dt, new: mesh, .. } = motion;
+        let grid = Grid::<G>::new(&self.burgers, mesh)?;
+        let mut u = grid.gather(t, start);
+        let mut next = u.clone();
+        let mut scratch = grid.scratch();
+        let mut solution = start.to_vec();
+        let mut work = Work::default();
+        let mut now = t;
+        loop {
+            let largest = u.iter().fold(0.0, |m, u| larger(m, *u));
+            if !largest.is_finite() {
+                break;
+            }
+            let left = ((t + dt - now) / (SAFETY * grid.stencil.stable_step(largest))).ceil().max(1.0);
+            // not a number is too many, too
+            if left.partial_cmp(&MOST).is_none_or(|o| o.is_gt()) {
+                return Err(Failure::ManySubsteps { substeps: left, speed: largest });
+            }
+            let substep = (t + dt - now) / left;
+            let round = left.min(ROUND as f64);
+            for n in 0..round as usize {
+                grid.substep(now + n as f64 * substep, substep, &u, &mut next, &mut scratch);
+                std::mem::swap(&mut u, &mut next);
+            }
+            work.substeps += round as usize;
+            if round == left {
+                break;
+            }
+            now += round * substep;
+        }
+        grid.scatter(t + dt, &u, &mut solution);
+        check_finite(["u"], mesh, solution.as_chunks().0)?;
+        Ok((Field::scalar(solution), work))
+    }
+}
+
+impl Physics for UniformBurgers {
+    fn unknowns(&self) -> Vec<String> {
+        self.burgers.unknowns()
+    }
+
+    fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field {
+        self.burgers.initial(t, mesh)
+    }
+
+    fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
+        let start = nodal::<1>(motion, u)?.as_flattened();
+        check_finite(["u"], motion.new, nodal::<1>(motion, u)?)?;
+        [motion.old, motion.new].into_iter().try_for_each(check_uniform)?;
+        match self.order {
+            2 => self.advance::<1>(motion, start),
+            _ => self.advance::<2>(motion, start),
+        }
+    }
+
+    fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
+        self.burgers.exact(t, mesh)
+    }
+}
+
+/// Refuses a mesh that is not the uniform one of its box, up to round-off.
+fn check_uniform(mesh: &Mesh<2>) -> Result<(), Failure> {
+    let (lattice, lower, extent) = (mesh.lattice(), mesh.lower(), mesh.extent());
+    let cells = lattice.cells();
+    for (k, &x) in mesh.x().iter().enumerate() {
+        let node = lattice.node(k);
+        for d in 0..2 {
+            let off = x[d] - lower[d] - extent[d] * node[d] as f64 / cells[d] as f64;
+            let tolerance = 1e-9 * extent[d] / cells[d] as f64 + 4.0 * f64::EPSILON * x[d].abs();
+            // a NaN is off, too
+            if off.abs().partial_cmp(&tolerance).is_none_or(|o| o.is_gt()) {
+                return Err(Failure::NotUniform { off, axis: d, node, x });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The unknowns of a uniform mesh, with G ghosts around them
+///
+/// Unknowns are the nodes inside bounded axes and all nodes of periodic ones. A stored row is padded by G columns at
+/// either end: nodes on and past the side, or periodic images. Rows past the ends are computed where they are needed.
+struct Grid<'a, const G: usize> {
+    burgers: &'a Burgers,
+    stencil: Stencil<G>,
+    /// Unknowns along each axis.
+    size: [usize; 2],
+    periodic: [bool; 2],
+    /// Nodes of the lattice along the second axis.
+    stride: usize,
+    /// Node of the first unknown.
+    first: [usize; 2],
+    lower: [f64; 2],
+    spacing: [f64; 2],
+    /// Length of a padded row.
+    width: usize,
+    /// Rows a band.
+    band: usize,
+}
+
+impl<'a, const G: usize> Grid<'a, G> {
+    /// Rows of a stage kept at a time: the last stage reads the first one 3G rows behind its newest row.
+    const KEPT: usize = 4 * G;
+
+    fn new(burgers: &'a Burgers, mesh: &Mesh<2>) -> Result<Self, Failure> {
+        let (lattice, extent) = (mesh.lattice(), mesh.extent());
+        let (cells, periodic) = (lattice.cells(), lattice.periodic());
+        if let (Some(axis), None) = (periodic.iter().position(|p| !p), burgers.side_value(0.0, mesh.lower())) {
+            return Err(Failure::NotPeriodic { what: "initial values without side values", axis });
+        }
+        let spacing = [0, 1].map(|d| extent[d] / cells[d] as f64);
+        let size = [0, 1].map(|d| if periodic[d] { cells[d] } else { cells[d] - 1 });
+        let bands = size[0].div_ceil(BAND * G);
+        Ok(Self {
+            burgers,
+            stencil: Stencil::new(burgers.viscosity, spacing),
+            size,
+            periodic,
+            stride: lattice.nodes()[1],
+            first: periodic.map(|p| usize::from(!p)),
+            lower: mesh.lower(),
+            spacing,
+            width: size[1] + 2 * G,
+            band: size[0].div_ceil(bands),
+        })
+    }
+
+    /// Rows stored, some at the end unused so that every band has as many.
+    fn rows(&self) -> usize {
+        self.size[0].div_ceil(self.band) * self.band
+    }
+
+    fn scratch(&self) -> Vec<f64> {
+        vec![0.0; self.rows() / self.band * 3 * Self::KEPT * self.width]
+    }
+
+    fn gather(&self, t: f64, nodes: &[f64]) -> Vec<f64> {
+        let mut rows = vec![0.0; self.rows() * self.width];
+        for (i, row) in rows.chunks_exact_mut(self.width).take(self.size[0]).enumerate() {
+            let from = (i + self.first[0]) * self.stride + self.first[1];
+            row[G..][..self.size[1]].copy_from_slice(&nodes[from..][..self.size[1]]);
+            self.fill_ends(t, i as isize, row);
+        }
+        rows
+    }
+
+    fn scatter(&self, t: f64, rows: &[f64], nodes: &mut [f64]) {
+        let [m, n] = self.size;
+        for (i, row) in rows.chunks_exact(self.width).take(m).enumerate() {
+            let to = (i + self.first[0]) * self.stride;
+            nodes[to + self.first[1]..][..n].copy_from_slice(&row[G..][..n]);
+            if !self.periodic[1] {
+                [nodes[to], nodes[to + n + 1]] = [-1, n as isize].map(|j| self.given(t, [i as isize, j]));
+            }
+        }
+        if !self.periodic[0] {
+            for (row, i) in [(0, -1), (m + 1, m as isize)] {
+                let columns = (0..self.stride).map(|j| j as isize - self.first[1] as isize);
+                let to = &mut nodes[row * self.stride..][..self.stride];
+                to.iter_mut().zip(columns).for_each(|(to, j)| *to = self.given(t, [i, j]));
+            }
+        }
+    }
+
+    /// u on or past a side, at a place counted from the first unknown.
+    fn given(&self, t: f64, at: [isize; 2]) -> f64 {
+        let x = [0, 1].map(|d| self.lower[d] + (at[d] + self.first[d] as isize) as f64 * self.spacing[d]);
+        // never asked where it is not known
+        self.burgers.side_value(t, x).unwrap_or(f64::NAN)
+    }
+
+    /// The ghosts of row i, from its unknowns where the axis is periodic.
+    fn fill_ends(&self, t: f64, i: isize, row: &mut [f64]) {
+        let n = self.size[1];
+        for k in 0..G {
+            [row[k], row[G + n + k]] = match self.periodic[1] {
+                true => [row[n + k], row[G + k]],
+                false => [k as isize - G as isize, (n + k) as isize].map(|j| self.given(t, [i, j])),
+            };
+        }
+    }
+
+    /// A whole row past an end.
+    fn fill_row(&self, t: f64, i: isize, row: &mut [f64]) {
+        row.iter_mut().enumerate().for_each(|(k, u)| *u = self.given(t, [i, k as isize - G as isize]));
+    }
+
+    /// One substep of classical RK4 from `u` at t to `next`.
+    fn substep(&self, t: f64, dt: f64, u: &[f64], next: &mut [f64], scratch: &mut [f64]) {
+        let (w, m) = (self.width, self.size[0] as isize);
+        // rows past the ends at t, 0 … G − 1 before and G … 2G − 1 after
+        let mut outside = vec![0.0; if self.periodic[0] { 0 } else { 2 * G * w }];
+        for (k, row) in outside.chunks_exact_mut(w).enumerate() {
+            self.fill_row(t, if k < G { k as isize - G as isize } else { m + (k - G) as isize }, row);
+        }
+        let by = [0.5 * dt, 0.5 * dt, dt, dt / 6.0].map(|s| self.stencil.scaled(s));
+        let stages = Stages { grid: self, t, dt, u, outside: &outside, by };
+        parallel::for_each_row_pair(next, self.band * w, scratch, 3 * Self::KEPT * w, |band, next, scratch| {
+            let first = band * self.band;
+            pulp::Arch::new().dispatch(Band { stages: &stages, first, next, scratch });
+        });
+    }
+
+    /// A band of rows through all stages
+    ///
+    /// ```text
+    /// u₁ = u + Δt/2 R(u)   u₂ = u + Δt/2 R(u₁)   u₃ = u + Δt R(u₂)   next = (−u + u₁ + 2u₂ + u₃)/3 + Δt/6 R(u₃)
+    /// ```
+    ///
+    /// Each stage follows G rows behind the one before, so that what it reads is still in cache.
+    #[inline(always)]
+    fn advance_band(&self, stages: &Stages<'_, G>, first: usize, next: &mut [f64], scratch: &mut [f64]) {
+        let (w, n, g) = (self.width, self.size[1], G as isize);
+        let (low, high) = (first as isize, (first + self.band).min(self.size[0]) as isize);
+        let (u1, rest) = scratch.split_at_mut(Self::KEPT * w);
+        let (u2, u3) = rest.split_at_mut(Self::KEPT * w);
+        let slot = |i: isize| i.rem_euclid(4 * g) as usize * w;
+        let &Stages { t, dt, .. } = stages;
+        let base = |i: isize| self.base(stages, i);
+        let outside = |i: isize| !self.periodic[0] && !(0..self.size[0] as isize).contains(&i);
+        let reached = |i: isize| self.periodic[0] || (-g..self.size[0] as isize + g).contains(&i);
+        for newest in low - 3 * g..high + 3 * g {
+            let i = newest;
+            if reached(i) {
+                let to = slot(i);
+                if outside(i) {
+                    self.fill_row(t + 0.5 * dt, i, &mut u1[to..][..w]);
+                } else {
+                    let u = &base(i)[G..][..n];
+                    stages.by[0].apply(|k| base(i + k), &mut u1[to + G..][..n], |j, r| u[j] + r);
+                    self.fill_ends(t + 0.5 * dt, i, &mut u1[to..][..w]);
+                }
+            }
+            let i = newest - g;
+            if i >= low - 2 * g && reached(i) {
+                let to = slot(i);
+                let from = &u1[to..][..w];
+                if outside(i) {
+                    u2[to..][..w].copy_from_slice(from);
+                } else {
+                    let u = &base(i)[G..][..n];
+                    stages.by[1].apply(|k| &u1[slot(i + k)..][..w], &mut u2[to + G..][..n], |j, r| u[j] + r);
+                    if self.periodic[1] {
+                        self.fill_ends(t, i, &mut u2[to..][..w]);
+                    } else {
+                        // the same time as the stage before
+                        u2[to..][..G].copy_from_slice(&from[..G]);
+                        u2[to + G + n..][..G].copy_from_slice(&from[G + n..]);
+                    }
+                }
+            }
+            let i = newest - 2 * g;
+            if i >= low - g && reached(i) {
+                let to = slot(i);
+                if outside(i) {
+                    self.fill_row(t + dt, i, &mut u3[to..][..w]);
+                } else {
+                    let u = &base(i)[G..][..n];
+                    stages.by[2].apply(|k| &u2[slot(i + k)..][..w], &mut u3[to + G..][..n], |j, r| u[j] + r);
+                    self.fill_ends(t + dt, i, &mut u3[to..][..w]);
+                }
+            }
+            let i = newest - 3 * g;
+            if i >= low {
+                let to = &mut next[(i - low) as usize * w..][..w];
+                let u = &base(i)[G..][..n];
+                let [u1, u2, u3_ends] = [&*u1, &*u2, &*u3].map(|stage| &stage[slot(i)..][..w]);
+                let [u1, u2] = [u1, u2].map(|row| &row[G..][..n]);
+                stages.by[3].apply(
+                    |k| &u3[slot(i + k)..][..w],
+                    &mut to[G..][..n],
+                    |j, r| u2[j] + ((u1[j] - u[j]) + (u3_ends[G + j] - u2[j])) * (1.0 / 3.0) + r,
+                );
+                if self.periodic[1] {
+                    self.fill_ends(t, i, to);
+                } else {
+                    to[..G].copy_from_slice(&u3_ends[..G]);
+                    to[G + n..].copy_from_slice(&u3_ends[G + n..]);
+                }
+            }
+        }
+    }
+
+    /// Row i at the start of the substep.
+    #[inline(always)]
+    fn base<'s>(&self, stages: &Stages<'s, G>, i: isize) -> &'s [f64] {
+        let (w, m) = (self.width, self.size[0]);
+        if self.periodic[0] {
+            return &stages.u[i.rem_euclid(m as isize) as usize * w..][..w];
+        }
+        match usize::try_from(i) {
+            Ok(i) if i < m => &stages.u[i * w..][..w],
+            Ok(i) => &stages.outside[(G + i - m) * w..][..w],
+            Err(_) => &stages.outside[(i + G as isize) as usize * w..][..w],
+        }
+    }
+}
+
+/// What all bands of a substep share.
+struct Stages<'s, const G: usize> {
+    grid: &'s Grid<'s, G>,
+    t: f64,
+    dt: f64,
+    u: &'s [f64],
+    outside: &'s [f64],
+    /// R times the length of each stage.
+    by: [Stencil<G>; 4],
+}
+
+/// A band as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has. Products
+/// and sums are not fused, so that the bits are the same with any.
+struct Band<'s, const G: usize> {
+    stages: &'s Stages<'s, G>,
+    first: usize,
+    next: &'s mut [f64],
+    scratch: &'s mut [f64],
+}
+
+impl<const G: usize> pulp::WithSimd for Band<'_, G> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.stages.grid.advance_band(self.stages, self.first, self.next, self.scratch);
+    }
+}
