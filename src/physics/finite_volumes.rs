@@ -347,6 +347,7 @@ impl Half<'_> {
             add(&mut row[0], sign, mine);
             add(&mut row[other], sign, theirs);
         }
+        #[allow(clippy::needless_range_loop)] // c is an equation and an unknown
         for c in 0..B {
             row[0][c][c] += 1.0;
             // ends b of the four faces, and ends a, as points of the stencil
