@@ -24,6 +24,7 @@ slow: test
 bench: $(VENV)/ready
 	$(CARGO) bench -p driftmesh --bench case_b
 	$(CARGO) bench -p driftmesh --bench formula
+	$(CARGO) bench -p driftmesh --bench formula_pde
 	$(VENV)/bin/python benches/mesh_solve.py
 
 # The library's documentation, in target/doc.

@@ -36,6 +36,20 @@ pub enum Failure {
         /// Where the node is.
         x: [f64; 2],
     },
+    /// A formula of the study has no finite value, or what it makes of an unknown has none.
+    #[error("{what} is {value} at node ({}, {}), x = {}, y = {}{}", node[0], node[1], short(x[0]), short(x[1]), given_as(.given))]
+    Formula {
+        /// The formula's dotted key, in the reader's words.
+        what: String,
+        /// The value found: NaN or ±∞.
+        value: f64,
+        /// Indices of the node along ξ and η.
+        node: [usize; 2],
+        /// Where the node is.
+        x: [f64; 2],
+        /// The unknowns there, where the formula takes them.
+        given: Vec<(String, f64)>,
+    },
     /// A quantity that must be positive is not.
     #[error("{what} is {value:.3e}, not positive, at node ({}, {}), x = {}, y = {}", node[0], node[1], short(x[0]), short(x[1]))]
     NotPositive {
@@ -180,6 +194,7 @@ impl Failure {
         match self {
             Self::Folded { .. } => "mesh-folded",
             Self::NonFinite { .. } => "non-finite",
+            Self::Formula { .. } => "formula",
             Self::NotPositive { .. } => "not-positive",
             Self::NotPeriodic { .. } => "not-periodic",
             Self::NotUniform { .. } => "not-uniform",
@@ -204,6 +219,10 @@ impl Failure {
             }
             Self::NonFinite { .. } => {
                 "mend the formula that gives it, if one does; else lower time.step, refine grid.cells or raise monitor.smoothing"
+            }
+            Self::Formula { given, .. } if given.is_empty() => "mend the formula",
+            Self::Formula { .. } => {
+                "mend the formula, for instance by max(…, 0) under a root; where it is right, lower time.step or raise monitor.smoothing"
             }
             Self::NotPositive { .. } => {
                 "mend the formula that gives it, if one does; else lower time.step or refine grid.cells"
@@ -328,6 +347,12 @@ fn noisy(noise: Option<f64>) -> String {
             100.0 * noise
         )
     })
+}
+
+/// Values of unknowns, as the end of a message.
+fn given_as(values: &[(String, f64)]) -> String {
+    let values: Vec<String> = values.iter().map(|(name, value)| format!("{name} = {}", short(*value))).collect();
+    if values.is_empty() { String::new() } else { format!(", where {}", values.join(", ")) }
 }
 
 /// A coordinate in a few characters, whatever its size.

@@ -34,6 +34,15 @@ pub(crate) fn for_each_row_pair<A: Send, B: Send>(
     }
 }
 
+/// Calls `f(first place, piece)` for pieces of an array of any length.
+pub(crate) fn for_each_piece<T: Send>(array: &mut [T], f: impl Fn(usize, &mut [T]) + Sync) {
+    if array.len() < WORTHWHILE {
+        array.chunks_mut(PIECE).enumerate().for_each(|(p, piece)| f(p * PIECE, piece));
+    } else {
+        array.par_chunks_mut(PIECE).enumerate().for_each(|(p, piece)| f(p * PIECE, piece));
+    }
+}
+
 /// `f` of every item, in order; for work that is worth handing out item by item.
 pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     items.par_iter().map(f).collect()

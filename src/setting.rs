@@ -1,6 +1,7 @@
 //! How a study writes a setting.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -58,4 +59,53 @@ pub(crate) fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer:
     let entries = Vec::<T>::deserialize(deserializer)?;
     <[T; 2]>::try_from(entries)
         .map_err(|entries| de::Error::custom(format!("expected an array of length 2, found {}", entries.len())))
+}
+
+/// A formula: text, or a number in its place.
+struct Text(String);
+
+impl<'de> Deserialize<'de> for Text {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl de::Visitor<'_> for Visitor {
+            type Value = Text;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a formula as a string")
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<Text, E> {
+                Ok(Text(text.into()))
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Text, E> {
+                Ok(Text(value.to_string()))
+            }
+
+            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Text, E> {
+                Ok(Text(value.to_string()))
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Text, E> {
+                Ok(Text(format!("{value:?}")))
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+/// Formulas by name.
+pub(crate) fn texts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, String>, D::Error> {
+    let entries = BTreeMap::<String, Text>::deserialize(deserializer)?;
+    Ok(entries.into_iter().map(|(name, Text(text))| (name, text)).collect())
+}
+
+/// Pairs of formulas by name.
+pub(crate) fn text_pairs<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<BTreeMap<String, [String; 2]>, D::Error> {
+    #[derive(Deserialize)]
+    struct Pair(#[serde(deserialize_with = "pair")] [Text; 2]);
+    let entries = BTreeMap::<String, Pair>::deserialize(deserializer)?;
+    Ok(entries.into_iter().map(|(name, Pair(texts))| (name, texts.map(|Text(text)| text))).collect())
 }

@@ -4,7 +4,7 @@ use driftmesh::density::{Arclength, Given, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
-use driftmesh::physics::{Burgers, Convection, Motion, Physics, Prescribed, ShallowWater, UniformBurgers};
+use driftmesh::physics::{Burgers, Convection, FormulaPde, Motion, Physics, Prescribed, ShallowWater, UniformBurgers};
 use driftmesh::simulation::{RunDirectory, Schedule};
 use driftmesh::study::{MovingMesh, Source};
 use driftmesh::{Error, Failure};
@@ -48,6 +48,18 @@ fn non_finite() {
     let motion = Motion { t: 0.0, dt: 1e-3, old: &mesh(), new: &mesh() };
     let error = burgers.step(motion, &Field::scalar(u)).unwrap_err();
     assert_says(error, &["u is NaN at node (1, 1), x = 0.1250, y = 0.1250"], Some("time.step"), true);
+}
+
+/// A formula says what it was given.
+#[test]
+fn formula() {
+    let pde = "unknowns = [\"u\"]\nsource = { u = \"sqrt(u - x)\" }\ninitial = { u = 0.1 }";
+    let mut pde = toml::from_str::<FormulaPde>(pde).unwrap().into_physics().unwrap();
+    let (u, motion) = (pde.initial(0.0, &mesh()), Motion { t: 0.0, dt: 1e-3, old: &mesh(), new: &mesh() });
+    let error = pde.step(motion, &u).unwrap_err();
+    assert_eq!(error.name(), "formula");
+    let message = "`pde.source.u` is NaN at node (1, 0), x = 0.1250, y = 0.0000, where u = 0.1000";
+    assert_says(error, &[message], Some("mend the formula"), true);
 }
 
 #[test]

@@ -30,6 +30,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Arclength {
+    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
+    /// said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
     /// How α is chosen.
     pub strength: Strength,
     /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
@@ -50,7 +54,7 @@ pub enum Strength {
 
 impl Default for Arclength {
     fn default() -> Self {
-        Self { strength: Strength::Relative(30.0), smoothing: 2, gradient: Gradient::Central }
+        Self { of: None, strength: Strength::Relative(30.0), smoothing: 2, gradient: Gradient::Central }
     }
 }
 

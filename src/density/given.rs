@@ -4,12 +4,16 @@ use crate::geometry::Mesh;
 use crate::numerics::difference::Gradient;
 use serde::{Deserialize, Serialize};
 
-/// The first unknown is the density itself: a prescribed ρ, or a depth of water
+/// The first unknown, or what is followed in its place, is the density itself: a prescribed ρ, or a depth of water
 ///
 /// It must be positive everywhere; `smoothing` passes of the filter [`smooth`] follow.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Given {
+    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
+    /// said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
     /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
     pub smoothing: usize,
     /// How the mesh equation differences ρ.

@@ -3,6 +3,7 @@
 //! Every density is positive and finite, and only its ratios matter: ρ and cρ give the same mesh.
 
 mod arclength;
+mod following;
 mod given;
 mod root_gradient;
 mod smoothing;
@@ -13,9 +14,10 @@ pub use root_gradient::RootGradient;
 pub use smoothing::smooth;
 
 use crate::error::{Failure, Result};
-use crate::geometry::Mesh;
+use crate::geometry::{Field, Mesh};
 use crate::kind::kinds;
 use crate::numerics::difference::Gradient;
+use following::Following;
 
 /// More passes than this leave nothing of ρ on any lattice that fits a machine.
 const MAX_SMOOTHING: usize = 1000;
@@ -28,6 +30,14 @@ pub trait Monitor: Send {
     /// # Errors
     /// [`Failure::NonFinite`] names the first node where ρ is not a finite number.
     fn density(&self, mesh: &Mesh<2>, u: &[f64], gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure>;
+
+    /// The u of [`density`](Self::density), from all unknowns: the first one where nothing else is said.
+    ///
+    /// # Errors
+    /// [`Failure::Formula`] names the first node where it is not a finite number.
+    fn followed(&self, _t: f64, _mesh: &Mesh<2>, unknowns: &Field) -> Result<Vec<f64>, Failure> {
+        Ok(unknowns.component(0).collect())
+    }
 }
 
 kinds! {
@@ -35,7 +45,7 @@ kinds! {
     MonitorKind {
         "auto" = RootGradient: "rho = 1 + 4 sqrt(|grad u|) over its mean, smoothed; nothing to set",
         "arclength" = Arclength: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
-        "given" = Given: "rho = the first unknown itself, smoothed",
+        "given" = Given: "rho = the unknown itself, smoothed",
     }
 }
 
@@ -67,12 +77,29 @@ impl MonitorKind {
         }
     }
 
-    /// The monitor, ready to use.
-    pub fn into_monitor(self) -> Box<dyn Monitor> {
+    /// The unknown, or the formula of them, that the mesh follows, where it is not the first.
+    pub fn of(&self) -> Option<&str> {
         match self {
+            Self::RootGradient(root) => root.of.as_deref(),
+            Self::Arclength(arclength) => arclength.of.as_deref(),
+            Self::Given(given) => given.of.as_deref(),
+        }
+    }
+
+    /// The monitor for an equation of these unknowns, ready to use.
+    ///
+    /// # Errors
+    /// [`Error::Formula`](crate::Error::Formula) where `of` is no formula of the unknowns, x, y and t.
+    pub fn into_monitor(self, unknowns: &[String]) -> Result<Box<dyn Monitor>> {
+        let of = self.of().filter(|of| Some(*of) != unknowns.first().map(String::as_str)).map(String::from);
+        let monitor: Box<dyn Monitor> = match self {
             Self::RootGradient(root) => Box::new(root),
             Self::Arclength(arclength) => Box::new(arclength),
             Self::Given(given) => Box::new(given),
-        }
+        };
+        Ok(match of {
+            Some(of) => Box::new(Following::new(monitor, &of, unknowns)?),
+            None => monitor,
+        })
     }
 }

@@ -13,9 +13,14 @@ use serde::{Deserialize, Serialize};
 /// with ∇u in each mesh cell, then round(8 (N/41²)) passes of the (1 2 1)⊗(1 2 1)/16 filter over cells, at least one, N
 /// the number of nodes. A layer of any width then gets the same share of the nodes, about half of them: the mean of the
 /// root falls with the width as fast as its largest value grows. Where u is constant, ρ = 1.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RootGradient {}
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RootGradient {
+    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
+    /// said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+}
 
 /// Share of the layer in the density.
 const BETA: f64 = 4.0;
@@ -92,7 +97,7 @@ mod tests {
         let mesh = Mesh::uniform(Lattice::bounded([4000, 4]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         let share = |width: f64| {
             let u: Vec<f64> = mesh.x().iter().map(|x| ((x[0] - 0.5) / width).tanh()).collect();
-            let rho = RootGradient {}.density(&mesh, &u, None).unwrap();
+            let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
             let inside = |x: &[f64; 2]| (x[0] - 0.5).abs() < 4.0 * width;
             let layer: f64 = mesh.x().iter().zip(&rho).filter(|(x, _)| inside(x)).map(|(_, rho)| rho).sum();
             layer / rho.iter().sum::<f64>()
@@ -107,7 +112,7 @@ mod tests {
         let mesh = Mesh::uniform(Lattice::new([7, 5], [true, false]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         for noise in [0.0, 1e-15] {
             let u: Vec<f64> = (0..mesh.x().len()).map(|k| 3.0 + noise * (k % 3) as f64).collect();
-            assert_eq!(RootGradient {}.density(&mesh, &u, None).unwrap(), vec![1.0; mesh.x().len()]);
+            assert_eq!(RootGradient::default().density(&mesh, &u, None).unwrap(), vec![1.0; mesh.x().len()]);
         }
     }
 
@@ -119,7 +124,7 @@ mod tests {
         let mesh = mesh.moved(bent.collect()).unwrap();
         for unit in [1.0, 1e-6] {
             let u: Vec<f64> = mesh.x().iter().map(|[x, y]| unit * (3.0 * x - 2.0 * y)).collect();
-            let rho = RootGradient {}.density(&mesh, &u, None).unwrap();
+            let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
             assert!(rho.iter().all(|rho| (rho - 5.0).abs() < 1e-9), "{rho:?}");
         }
     }

@@ -25,6 +25,19 @@ impl Field {
         Self { components: K, values: values.into_flattened() }
     }
 
+    /// A field from the values of each unknown at all nodes.
+    ///
+    /// # Example
+    /// ```
+    /// let field = driftmesh::geometry::Field::joined(&[vec![1.0, 3.0], vec![2.0, 4.0]]);
+    /// assert_eq!(field.values(), [1.0, 2.0, 3.0, 4.0]);
+    /// ```
+    pub fn joined(unknowns: &[Vec<f64>]) -> Self {
+        let nodes = unknowns.iter().map(Vec::len).min().unwrap_or(0);
+        let values = (0..nodes).flat_map(|k| unknowns.iter().map(move |values| values[k])).collect();
+        Self { components: unknowns.len().max(1), values }
+    }
+
     /// Unknowns a node.
     pub fn components(&self) -> usize {
         self.components

@@ -14,11 +14,18 @@ use crate::work::Work;
 pub(super) trait Law<const B: usize>: Sync {
     /// What faces need to know of a node.
     type Node: Copy + Send + Sync;
+    /// Newton stops where all residuals are below this share of the size of their unknown, once a step is solved at all:
+    /// far below what a step leaves out.
+    const TOLERANCE: f64 = 1e-6;
 
     /// Names of the unknowns, for messages.
     fn names(&self) -> [&'static str; B];
     /// One for each place of padded vectors.
     fn nodes(&self, t: f64, x: &[[f64; 2]], u: &[[f64; B]]) -> Vec<Self::Node>;
+    /// Refuses padded nodes that are not finite, with the place.
+    fn check(&self, _mesh: &Mesh<2>, _u: &[[f64; B]], _nodes: &[Self::Node]) -> Result<(), Failure> {
+        Ok(())
+    }
     /// F·N through a face with normal N.
     fn convection(&self, below: &Self::Node, above: &Self::Node, normal: [f64; 2]) -> Crossing<B>;
     /// D at a face.
@@ -65,8 +72,6 @@ impl<const B: usize> Default for FiniteVolumes<B> {
     }
 }
 
-/// Newton stops where all residuals are below this share of the size of the solution: far below what a step leaves out.
-const TOLERANCE: f64 = 1e-6;
 const MAX_NEWTON: usize = 20;
 
 /// One face in one half of a step: g/2, its derivatives, and the weight of u_b − u_a in it.
@@ -95,9 +100,9 @@ struct Half<'a> {
 
 impl<const B: usize> FiniteVolumes<B> {
     /// The solution on the new mesh, one value a node.
-    pub fn step(
+    pub fn step<L: Law<B>>(
         &mut self,
-        law: &impl Law<B>,
+        law: &L,
         motion: Motion<'_>,
         start: &[[f64; B]],
     ) -> Result<(Vec<[f64; B]>, Work), Failure> {
@@ -120,6 +125,7 @@ impl<const B: usize> FiniteVolumes<B> {
         {
             let half = Half { dt, t, cells: &old_cells, x: &x_old, swept: &swept };
             let nodes = law.nodes(t, half.x, &u);
+            law.check(old, &u, &nodes)?;
             let faces = half.faces(law, &nodes, &u);
             parallel::for_each_row(&mut known, n, |p, known| {
                 for (known, (i, k)) in known.iter_mut().zip(places(p)) {
@@ -143,15 +149,21 @@ impl<const B: usize> FiniteVolumes<B> {
         }
         repeat_sides(&patch, &mut u);
 
-        let size = u.as_flattened().iter().fold(0.0, |m, u| larger(m, *u)).max(f64::MIN_POSITIVE);
+        // unknowns may differ in size by far, and one that is 0 has the size of its first change
+        let largest_of = |values: &[[f64; B]]| -> [f64; B] {
+            std::array::from_fn(|c| values.iter().fold(0.0, |m, value| larger(m, value[c])))
+        };
+        let mut sizes = largest_of(&u);
+        let mut size = sizes.into_iter().fold(f64::MIN_POSITIVE, larger);
         let half = Half { dt, t: t + dt, cells: &cells, x: &x_new, swept: &swept };
         let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
         // where much passes a cell in a step, round-off alone leaves more than the tolerance
-        let mut wanted = TOLERANCE * size;
+        let (mut round_off, tolerance) = (16.0 * f64::EPSILON, L::TOLERANCE);
         let stalled = loop {
             let nodes = law.nodes(half.t, half.x, &u);
+            law.check(new, &u, &nodes)?;
             let faces = half.faces(law, &nodes, &u);
             parallel::for_each_row(&mut residual, n, |p, residual| {
                 for (residual, (i, k)) in residual.iter_mut().zip(places(p)) {
@@ -165,13 +177,22 @@ impl<const B: usize> FiniteVolumes<B> {
                     *residual = if given.is_some() { 0.0 } else { *residual };
                 }
             }
-            let largest = residual.as_flattened().iter().fold(0.0, |m, r| larger(m, *r));
-            if largest <= wanted {
+            let largest = largest_of(&residual);
+            let iterations = work.newton_iterations;
+            if iterations == 0 {
+                size = largest.into_iter().fold(size, larger);
+                sizes = std::array::from_fn(|c| larger(sizes[c], largest[c]).max(f64::EPSILON * size));
+            }
+            // small changes add up over many steps: none is left out
+            let share = if iterations == 0 { 0.0 } else { tolerance };
+            let wanted: [f64; B] = std::array::from_fn(|c| (share * sizes[c]).max(round_off * size));
+            if (0..B).all(|c| largest[c] <= wanted[c]) {
                 break None;
             }
-            let iterations = work.newton_iterations;
-            if iterations == MAX_NEWTON || !largest.is_finite() {
-                break Some(Failure::NewtonStalled { residual: largest, tolerance: wanted, iterations });
+            if iterations == MAX_NEWTON || !largest.iter().all(|r| r.is_finite()) {
+                let over = |c: &usize| largest[*c] / wanted[*c];
+                let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
+                break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
             }
             parallel::for_each_row(&mut matrix.rows, n, |p, rows| {
                 for (row, (i, k)) in rows.iter_mut().zip(places(p)) {
@@ -190,11 +211,15 @@ impl<const B: usize> FiniteVolumes<B> {
                 }
             }
             let stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
-            wanted = size * TOLERANCE.max(16.0 * f64::EPSILON * stiffest);
+            round_off = 16.0 * f64::EPSILON * stiffest;
             let mut correction = vec![[0.0; B]; patch.padded_len()];
             // Newton squares the residual: solving for much less than that is wasted
-            let tolerance = (0.01 * largest * (largest / size).min(1.0)).max(0.1 * wanted);
-            work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, [tolerance; B])?;
+            let share = (0..B).fold(0.0, |m, c| larger(m, largest[c] / sizes[c])).min(1.0);
+            let enough = std::array::from_fn(|c| {
+                let newton = (0.01 * largest[c] * share).max(0.1 * tolerance * sizes[c]);
+                newton.min(1e-3 * largest[c]).max(0.1 * round_off * size)
+            });
+            work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, enough)?;
             work.linear_solves += 1;
             work.newton_iterations += 1;
             for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
@@ -206,20 +231,24 @@ impl<const B: usize> FiniteVolumes<B> {
         for (i, k) in patch.places().enumerate() {
             values[i] = u[k];
         }
-        if lattice.periodic() == [true, true] {
-            settle(&cells, &residual, &mut values);
-        }
+        // nothing passes the sides where nothing is given there
+        settle(&cells, &residual, &mut values, |c| sides.iter().all(|side| side.given[c].is_none()));
         check_finite(law.names(), new, &values)?;
         self.newest = Some((new.clone(), cells));
         stalled.map_or(Ok((values, work)), Err)
     }
 }
 
-/// Adds what the residuals leave of each sum to all values alike: sums are then conserved to round-off, however well the
+/// Adds what the residuals leave of each sum that is closed to all values alike: sums are then conserved to round-off, however well the
 /// step was solved.
-fn settle<const B: usize>(cells: &DualCells, residual: &[[f64; B]], values: &mut [[f64; B]]) {
+fn settle<const B: usize>(
+    cells: &DualCells,
+    residual: &[[f64; B]],
+    values: &mut [[f64; B]],
+    closed: impl Fn(usize) -> bool,
+) {
     let area = crate::numerics::sum(cells.areas().iter().copied());
-    for c in 0..B {
+    for c in (0..B).filter(|&c| closed(c)) {
         let left = crate::numerics::sum(cells.areas().iter().zip(residual).map(|(area, r)| area * r[c])) / area;
         values.iter_mut().for_each(|value| value[c] += left);
     }
@@ -318,6 +347,7 @@ impl Half<'_> {
             add(&mut row[0], sign, mine);
             add(&mut row[other], sign, theirs);
         }
+        #[allow(clippy::needless_range_loop)] // c is an equation and an unknown
         for c in 0..B {
             row[0][c][c] += 1.0;
             // ends b of the four faces, and ends a, as points of the stencil

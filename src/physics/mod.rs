@@ -3,11 +3,14 @@
 mod burgers;
 mod curvilinear;
 mod finite_volumes;
+mod formula_law;
+mod formula_pde;
 mod prescribed;
 mod shallow_water;
 mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
+pub use formula_pde::{FormulaPde, MAX_UNKNOWNS};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
 pub use uniform::UniformBurgers;
@@ -56,9 +59,22 @@ pub trait Physics: Send {
         sum(node_areas(mesh).iter().zip(u.component(0)).map(|(area, u)| area * u))
     }
 
-    /// The exact solution where it is known.
+    /// The exact solution where it is known, of the unknowns that [`known`](Self::known) names.
     fn exact(&self, _t: f64, _mesh: &Mesh<2>) -> Option<Field> {
         None
+    }
+
+    /// The unknowns of which [`exact`](Self::exact) has values; all of them where nothing else is said.
+    fn known(&self) -> Vec<usize> {
+        (0..self.unknowns().len()).collect()
+    }
+
+    /// Refuses a start from which the equation has no values.
+    ///
+    /// # Errors
+    /// A [`Failure`] that names the place.
+    fn check(&self, _t: f64, _mesh: &Mesh<2>, _u: &Field) -> Result<(), Failure> {
+        Ok(())
     }
 }
 
@@ -67,6 +83,7 @@ kinds! {
     PdeKind {
         "burgers" = Burgers: "u_t + u u_x + u u_y = nu (u_xx + u_yy), an oblique front with exact solution",
         "shallow-water" = ShallowWater: "h_t + div(h u) = 0, (h u)_t + div(h u u) + grad(g h^2/2) = 0, a pile of water that collapses",
+        "formula" = FormulaPde: "u_t + div(F) = div(D grad u) + S, up to four unknowns with F, D and S as formulas",
         "prescribed" = Prescribed: "no equation: the solution or the mesh density is a formula of x, y and t",
     }
 }
@@ -80,6 +97,7 @@ impl PdeKind {
         match self {
             Self::Burgers(burgers) => burgers.check(),
             Self::ShallowWater(water) => water.check(),
+            Self::FormulaPde(pde) => pde.check(),
             Self::Prescribed(prescribed) => prescribed.check(),
         }
     }
@@ -92,18 +110,31 @@ impl PdeKind {
         Ok(match self {
             Self::Burgers(burgers) => Box::new(burgers.compiled()?),
             Self::ShallowWater(water) => Box::new(water),
+            Self::FormulaPde(pde) => pde.into_physics()?,
             Self::Prescribed(prescribed) => Box::new(prescribed.field()?),
         })
     }
 
     /// The formulas of x, y and t that are meant on the whole domain, by their keys.
-    pub fn formulas(&self) -> Vec<(&'static str, &str)> {
+    pub fn formulas(&self) -> Vec<(String, &str)> {
         let all = match self {
             Self::Burgers(burgers) => vec![("initial", &burgers.initial), ("boundary", &burgers.boundary)],
             Self::ShallowWater(_) => vec![],
+            Self::FormulaPde(pde) => return pde.formulas(),
             Self::Prescribed(prescribed) => vec![("u", &prescribed.u), ("rho", &prescribed.rho)],
         };
-        all.into_iter().filter_map(|(key, text)| Some((key, text.as_deref()?))).collect()
+        all.into_iter().filter_map(|(key, text)| Some((key.into(), text.as_deref()?))).collect()
+    }
+
+    /// What is given at the start and what on the sides, where both are formulas of x, y and t, with their keys.
+    pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+        match self {
+            Self::Burgers(Burgers { initial: Some(initial), boundary: Some(boundary), .. }) => {
+                vec![[("initial".into(), initial), ("boundary".into(), boundary)]]
+            }
+            Self::FormulaPde(pde) => pde.starts_and_sides(),
+            _ => vec![],
+        }
     }
 }
 

@@ -98,7 +98,8 @@ pub(super) fn advance(
     Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho }, work, interface })
 }
 
-/// ρ from the solution: what the monitor makes of the first unknown, and of its gradient where that is known exactly.
+/// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that
+/// is known exactly.
 pub(super) fn density(
     physics: &dyn Physics,
     monitor: &dyn Monitor,
@@ -106,7 +107,7 @@ pub(super) fn density(
     mesh: &Mesh<2>,
     u: &Field,
 ) -> Result<Vec<f64>, Failure> {
-    let values: Vec<f64> = u.component(0).collect();
+    let values = monitor.followed(t, mesh, u)?;
     let gradient = physics.gradient(t, mesh);
     monitor.density(mesh, &values, gradient.as_deref())
 }

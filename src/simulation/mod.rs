@@ -109,6 +109,7 @@ impl Simulation {
         let at_start = |failure| self.at_start(failure);
         check_unfolded(&mesh).map_err(at_start)?;
         let u = self.physics.initial(t, &mesh);
+        self.physics.check(t, &mesh, &u).map_err(at_start)?;
         if let Some(place) = u.values().iter().position(|v| !v.is_finite()) {
             let (value, k) = (u.values()[place], place / u.components());
             let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
@@ -259,13 +260,13 @@ impl Simulation {
     fn error(&self, state: &State) -> Option<ErrorNorms> {
         let exact = self.physics.exact(state.t, &state.mesh)?;
         let areas = node_areas(&state.mesh);
-        let components = state.u.components();
         let (mut linf, mut square, mut area) = (0.0_f64, 0.0, 0.0);
-        for (k, (u, e)) in state.u.values().iter().zip(exact.values()).enumerate() {
-            let share = areas[k / components];
-            linf = linf.max((u - e).abs());
-            square += (u - e) * (u - e) * share;
-            area += share;
+        for (e, c) in self.physics.known().into_iter().enumerate() {
+            for ((u, e), share) in state.u.component(c).zip(exact.component(e)).zip(&areas) {
+                linf = linf.max((u - e).abs());
+                square += (u - e) * (u - e) * share;
+                area += share;
+            }
         }
         Some(ErrorNorms { linf, l2: (square / area).sqrt() })
     }

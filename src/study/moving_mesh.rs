@@ -3,7 +3,7 @@ use crate::density::{Arclength, Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING};
-use crate::physics::{Burgers, PdeKind, Physics, UniformBurgers, formula};
+use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
 use crate::simulation::{Coupling, FramesAt, Schedule, Simulation, State};
 use serde::{Deserialize, Serialize};
@@ -229,6 +229,8 @@ impl MovingMesh {
             false => MonitorKind::default(),
         });
         monitor.check().map_err(|error| error.within("monitor"))?;
+        let unknowns = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?.unknowns();
+        monitor.clone().into_monitor(&unknowns).map_err(|error| error.within("monitor"))?;
         if prescribed_density && !matches!(monitor, MonitorKind::Given(_)) {
             let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
             return Err(Error::invalid("monitor.kind", format!("\"{}\"", monitor.name()), rule));
@@ -274,6 +276,7 @@ impl MovingMesh {
             PdeKind::ShallowWater(_) => {
                 (periodic.contains(&false), "pde.kind = \"shallow-water\" needs periodic axes; set it to [true, true]")
             }
+            PdeKind::FormulaPde(pde) => return pde.check_sides(periodic).map_err(|error| error.within("pde")),
             PdeKind::Prescribed(_) => (false, ""),
         };
         if !wrong {
@@ -328,7 +331,7 @@ impl MovingMesh {
         let samples =
             |d: usize| (0..=SAMPLES).map(move |k| lower[d] + (upper[d] - lower[d]) * k as f64 / SAMPLES as f64);
         for (key, text) in self.pde.formulas() {
-            let f = formula(key, text).map_err(|error| error.within("pde"))?;
+            let f = formula(&key, text).map_err(|error| error.within("pde"))?;
             for d in (0..2).filter(|&d| periodic[d]) {
                 let mut jump = 0.0_f64;
                 let mut size = 0.0_f64;
@@ -358,8 +361,8 @@ impl MovingMesh {
                 "`mesh.relaxation` is {steps} steps: below {STEPS_WORTH_A_WARNING} the mesh overshoots its density from step to step"
             ));
         }
-        if let PdeKind::Burgers(Burgers { initial: Some(initial), boundary: Some(boundary), .. }) = &self.pde {
-            let [initial, boundary] = [formula("initial", initial)?, formula("boundary", boundary)?];
+        for [(at_start, initial), (on_sides, boundary)] in self.pde.starts_and_sides() {
+            let [initial, boundary] = [formula(&at_start, initial)?, formula(&on_sides, boundary)?];
             let mut worst = (0.0_f64, [0.0; 2]);
             let mut size = 0.0_f64;
             for d in (0..2).filter(|&d| !periodic[d]) {
@@ -375,7 +378,7 @@ impl MovingMesh {
             if worst.0 > NOT_ROUNDING * size {
                 let (gap, [x, y]) = worst;
                 warnings.push(format!(
-                    "`pde.boundary` is not `pde.initial` at the start: on the sides they differ by up to {gap:.1e}, at x = {x}, y = {y}"
+                    "`pde.{on_sides}` is not `pde.{at_start}` at the start: on the sides they differ by up to {gap:.1e}, at x = {x}, y = {y}"
                 ));
             }
         }
@@ -462,9 +465,11 @@ impl MovingMesh {
     /// # Errors
     /// [`Error::Invalid`] with the dotted key of a setting out of range.
     pub fn simulation(&self) -> Result<Simulation> {
+        let physics = self.physics()?;
+        let monitor = self.monitor().into_monitor(&physics.unknowns()).map_err(|error| error.within("monitor"))?;
         Ok(Simulation {
-            physics: self.physics()?,
-            monitor: self.monitor().into_monitor(),
+            physics,
+            monitor,
             generator: self.mesh.generator.clone().into_generator(),
             equation: self.equation(),
             coupling: self.mesh.coupling,

@@ -151,7 +151,13 @@ impl Source {
         let mut place = None;
         let mut table = &root;
         for part in key.split('.') {
+            // an entry of an array: name[2]
+            let (part, entry) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
+                Some((part, number)) => (part, number.parse().ok()),
+                None => (part, None::<usize>),
+            };
             let Some((name, value)) = table.get_key_value(part) else { break };
+            let value = value.get_ref().as_array().zip(entry).and_then(|(array, n)| array.get(n)).unwrap_or(value);
             place = Some(if value.get_ref().is_table() { name.span() } else { value.span() });
             match value.get_ref().as_table() {
                 Some(inner) => table = inner,

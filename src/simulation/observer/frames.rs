@@ -82,7 +82,9 @@ impl Frames {
                 (unknown.as_str(), lattice.closed(&values).into_owned())
             })
             .collect();
-        fields.push(("rho", lattice.closed(&state.rho).into_owned()));
+        // an unknown may have that name
+        let density = if unknowns.iter().any(|unknown| unknown == "rho") { "mesh density" } else { "rho" };
+        fields.push((density, lattice.closed(&state.rho).into_owned()));
         let document = vtu::document(lattice.cells(), &state.mesh.closed(), &fields);
         write_file(&self.directory.join(&name), document.as_bytes())?;
         self.written.push((state.t, name));

@@ -1,0 +1,308 @@
+//! An equation of one's own as a conservation law.
+
+use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law};
+use super::formula_pde::Formulas;
+use super::prescribed::evaluate;
+use super::{Motion, Physics, nodal};
+use crate::error::{Failure, Result};
+use crate::formula::{Formula, Program};
+use crate::geometry::{DualCells, Field, Mesh};
+use crate::numerics::sum;
+use crate::parallel;
+use crate::work::Work;
+
+/// B unknowns; P = 2 + B values that the formulas take at a node; K = 4 B (B + 1) that they give there.
+pub(super) struct FormulaLaw<const B: usize, const P: usize, const K: usize> {
+    names: [String; B],
+    nodal: Program<P, K>,
+    initial: Program<2, B>,
+    boundary: [Option<Formula>; B],
+    /// The unknowns that have one.
+    exact: Vec<(usize, Program<2, 1>)>,
+    has_source: bool,
+    volumes: FiniteVolumes<B>,
+}
+
+/// Quantities of an equation in the order of [`Formulas::nodal`].
+const FLUX: [usize; 2] = [0, 1];
+const DIFFUSIVITY: usize = 2;
+const SOURCE: usize = 3;
+
+impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
+    pub fn new(formulas: Formulas) -> Self {
+        let Formulas { names, nodal, initial, boundary, exact } = formulas;
+        let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
+        Self {
+            names: std::array::from_fn(|c| names[c].clone()),
+            has_source: (0..B).any(|c| nodal[SOURCE * B + c].text() != "0"),
+            nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
+            initial: Program::new(std::array::from_fn(|c| &initial[c])),
+            boundary: std::array::from_fn(|c| boundary[c].clone()),
+            exact: exact.collect(),
+            volumes: FiniteVolumes::default(),
+        }
+    }
+
+    /// A quantity of equation c at a node.
+    #[inline(always)]
+    fn value(node: &[f64; K], quantity: usize, c: usize) -> f64 {
+        node[quantity * B + c]
+    }
+
+    /// Its derivative by unknown e.
+    #[inline(always)]
+    fn slope(node: &[f64; K], quantity: usize, c: usize, e: usize) -> f64 {
+        node[(4 * (1 + e) + quantity) * B + c]
+    }
+
+    /// What place k of all nodal values holds, in the reader's words.
+    fn what(&self, k: usize) -> String {
+        let (row, quantity, name) = (k / (4 * B), k / B % 4, &self.names[k % B]);
+        let key = match quantity {
+            DIFFUSIVITY => format!("`pde.diffusivity.{name}`"),
+            SOURCE => format!("`pde.source.{name}`"),
+            axis => format!("`pde.flux.{name}[{axis}]`"),
+        };
+        if row == 0 { key } else { format!("the derivative of {key} by {}", self.names[row - 1]) }
+    }
+
+    fn failure(&self, what: String, value: f64, mesh: &Mesh<2>, k: usize, u: Option<&[f64; B]>) -> Failure {
+        let given = u.map_or(Vec::new(), |u| self.names.iter().cloned().zip(*u).collect());
+        Failure::Formula { what, value, node: mesh.lattice().node(k), x: mesh.x()[k], given }
+    }
+
+    fn check_exact(&self, t: f64, mesh: &Mesh<2>) -> Result<(), Failure> {
+        for (c, exact) in &self.exact {
+            let values = evaluate(exact, t, mesh);
+            if let Some(k) = values.iter().position(|[u]| !u.is_finite()) {
+                return Err(self.failure(format!("`pde.exact.{}`", self.names[*c]), values[k][0], mesh, k, None));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses boundary values that are not finite.
+    fn check_sides(&self, t: f64, mesh: &Mesh<2>) -> Result<(), Failure> {
+        for k in mesh.lattice().sides() {
+            for (c, value) in self.side(t, mesh.x()[k]).into_iter().enumerate() {
+                if let Some(value) = value.filter(|value| !value.is_finite()) {
+                    return Err(self.failure(format!("`pde.boundary.{}`", self.names[c]), value, mesh, k, None));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<const B: usize, const P: usize, const K: usize> Law<B> for FormulaLaw<B, P, K> {
+    type Node = [f64; K];
+    /// What is left may grow: ahead of a front into an unstable state, say.
+    const TOLERANCE: f64 = 1e-9;
+
+    fn names(&self) -> [&'static str; B] {
+        std::array::from_fn(|c| {
+            ["the first unknown", "the second unknown", "the third unknown", "the fourth unknown"][c]
+        })
+    }
+
+    fn nodes(&self, t: f64, x: &[[f64; 2]], u: &[[f64; B]]) -> Vec<[f64; K]> {
+        let mut nodes = vec![[0.0; K]; x.len()];
+        parallel::for_each_piece(&mut nodes, |begin, nodes| {
+            let points: Vec<[f64; P]> = (x[begin..].iter().zip(&u[begin..]).take(nodes.len()))
+                .map(|(x, u)| std::array::from_fn(|v| if v < 2 { x[v] } else { u[v - 2] }))
+                .collect();
+            self.nodal.eval_each(&points, &[t], nodes);
+        });
+        nodes
+    }
+
+    fn check(&self, mesh: &Mesh<2>, u: &[[f64; B]], nodes: &[[f64; K]]) -> Result<(), Failure> {
+        let Some(place) = nodes.iter().position(|node| node.iter().any(|v| !v.is_finite())) else { return Ok(()) };
+        // the node that stands there, or whose image or side does
+        let [n, m] = mesh.lattice().nodes();
+        let along = |place: usize, n: usize, wraps: bool| {
+            if wraps { (place + n - 1) % n } else { place.clamp(1, n) - 1 }
+        };
+        let wraps = mesh.lattice().periodic();
+        let node = [along(place / (m + 2), n, wraps[0]), along(place % (m + 2), m, wraps[1])];
+        let (values, k) = (&u[place], mesh.lattice().index(node));
+        if let Some(c) = values.iter().position(|u| !u.is_finite()) {
+            return Err(self.failure(format!("the unknown {}", self.names[c]), values[c], mesh, k, None));
+        }
+        let worst = nodes[place].iter().position(|v| !v.is_finite()).unwrap_or_default();
+        Err(self.failure(self.what(worst), nodes[place][worst], mesh, k, Some(values)))
+    }
+
+    #[inline(always)]
+    fn convection(&self, below: &[f64; K], above: &[f64; K], [nx, ny]: [f64; 2]) -> Crossing<B> {
+        let through = |[along_x, along_y]: [f64; 2]| 0.5 * (along_x * nx + along_y * ny);
+        let value = |node: &[f64; K], c| through(FLUX.map(|q| Self::value(node, q, c)));
+        let slope = |node: &[f64; K], c, e| through(FLUX.map(|q| Self::slope(node, q, c, e)));
+        crossing(below, above, value, slope)
+    }
+
+    #[inline(always)]
+    fn diffusivity(&self, below: &[f64; K], above: &[f64; K]) -> Crossing<B> {
+        let value = |node: &[f64; K], c| 0.5 * Self::value(node, DIFFUSIVITY, c);
+        let slope = |node: &[f64; K], c, e| 0.5 * Self::slope(node, DIFFUSIVITY, c, e);
+        crossing(below, above, value, slope)
+    }
+
+    #[inline(always)]
+    fn source(&self, node: &[f64; K]) -> Option<([f64; B], Block<B>)> {
+        let value = std::array::from_fn(|c| Self::value(node, SOURCE, c));
+        let slope = std::array::from_fn(|c| std::array::from_fn(|e| Self::slope(node, SOURCE, c, e)));
+        self.has_source.then_some((value, slope))
+    }
+
+    fn side(&self, t: f64, [x, y]: [f64; 2]) -> [Option<f64>; B] {
+        std::array::from_fn(|c| Some(self.boundary[c].as_ref()?.eval(&[x, y, t])))
+    }
+}
+
+/// The sum of what two nodes give.
+#[inline(always)]
+fn crossing<const B: usize, N>(
+    below: &N,
+    above: &N,
+    value: impl Fn(&N, usize) -> f64,
+    slope: impl Fn(&N, usize, usize) -> f64,
+) -> Crossing<B> {
+    let by = |node: &N| std::array::from_fn(|c| std::array::from_fn(|e| slope(node, c, e)));
+    Crossing {
+        value: std::array::from_fn(|c| value(below, c) + value(above, c)),
+        by_below: by(below),
+        by_above: by(above),
+    }
+}
+
+impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P, K> {
+    fn unknowns(&self) -> Vec<String> {
+        self.names.to_vec()
+    }
+
+    fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field {
+        Field::nodal(evaluate(&self.initial, t, mesh))
+    }
+
+    fn check(&self, t: f64, mesh: &Mesh<2>, u: &Field) -> Result<(), Failure> {
+        let values = u.values().as_chunks::<B>().0;
+        if let Some(place) = u.values().iter().position(|u| !u.is_finite()) {
+            let (k, c) = (place / B, place % B);
+            return Err(self.failure(format!("`pde.initial.{}`", self.names[c]), values[k][c], mesh, k, None));
+        }
+        self.check_sides(t, mesh)?;
+        self.check_exact(t, mesh)?;
+        for (k, node) in self.nodes(t, mesh.x(), values).iter().enumerate() {
+            if let Some(worst) = node.iter().position(|v| !v.is_finite()) {
+                return Err(self.failure(self.what(worst), node[worst], mesh, k, Some(&values[k])));
+            }
+        }
+        Ok(())
+    }
+
+    fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
+        let unknown = |exact| evaluate(exact, t, mesh).into_flattened();
+        let known: Vec<Vec<f64>> = self.exact.iter().map(|(_, exact)| unknown(exact)).collect();
+        (!known.is_empty()).then(|| Field::joined(&known))
+    }
+
+    fn known(&self) -> Vec<usize> {
+        self.exact.iter().map(|(c, _)| *c).collect()
+    }
+
+    fn conserved(&self, mesh: &Mesh<2>, u: &Field) -> f64 {
+        sum(DualCells::new(mesh).areas().iter().zip(u.component(0)).map(|(area, u)| area * u))
+    }
+
+    fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
+        let start = nodal::<B>(motion, u)?;
+        let end = motion.t + motion.dt;
+        self.check_sides(end, motion.new)?;
+        let mut volumes = std::mem::take(&mut self.volumes);
+        let stepped = volumes.step(self, motion, start);
+        self.volumes = volumes;
+        let (values, work) = stepped?;
+        self.check_exact(end, motion.new)?;
+        Ok((Field::nodal(values), work))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Lattice;
+    use crate::physics::{Burgers, BurgersFlux, Convection, FormulaPde};
+
+    /// Burgers' equation solved as well as a formula is.
+    struct Tight(Burgers);
+
+    impl Law<1> for Tight {
+        type Node = f64;
+        const TOLERANCE: f64 = <FormulaLaw<1, 3, 8> as Law<1>>::TOLERANCE;
+
+        fn names(&self) -> [&'static str; 1] {
+            self.0.names()
+        }
+
+        fn nodes(&self, t: f64, x: &[[f64; 2]], u: &[[f64; 1]]) -> Vec<f64> {
+            self.0.nodes(t, x, u)
+        }
+
+        fn convection(&self, a: &f64, b: &f64, normal: [f64; 2]) -> Crossing<1> {
+            self.0.convection(a, b, normal)
+        }
+
+        fn diffusivity(&self, a: &f64, b: &f64) -> Crossing<1> {
+            Law::diffusivity(&self.0, a, b)
+        }
+
+        fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; 1] {
+            self.0.side(t, x)
+        }
+    }
+
+    /// Burgers' equation with central fluxes is the same equation as formulas, to round-off over 50 steps of a moving mesh.
+    #[test]
+    fn burgers_as_formulas_is_burgers() {
+        let viscosity = 0.01;
+        let front = format!("1/(1 + exp((x + y - t)/{}))", 2.0 * viscosity);
+        let pde: FormulaPde = toml::from_str(&format!(
+            r#"
+            unknowns = ["u"]
+            flux = {{ u = ["0.5*u^2", "0.5*u^2"] }}
+            diffusivity = {{ u = {viscosity} }}
+            initial = {{ u = "{front}" }}
+            boundary = {{ u = "{front}" }}
+            exact = {{ u = "{front}" }}
+            "#
+        ))
+        .unwrap();
+        let mut written = pde.into_physics().unwrap();
+        let mut builtin = Burgers::new(viscosity, Convection::Flux).unwrap();
+        builtin.flux = BurgersFlux::Central;
+        let (law, mut volumes) = (Tight(builtin.clone()), FiniteVolumes::default());
+        let square = Mesh::uniform(Lattice::bounded([30, 30]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+        let mesh = |t: f64| {
+            let bent = |x: f64, y: f64| x + 0.1 * (std::f64::consts::TAU * x).sin() * (5.0 * y + 3.0 * t).cos();
+            square.moved(square.x().iter().map(|&[x, y]| [bent(x, y), bent(y, x)]).collect()).unwrap()
+        };
+        let (dt, start) = (2e-3, 0.3);
+        let mut old = mesh(start);
+        let mut ours = written.initial(start, &old);
+        let mut theirs: Vec<[f64; 1]> = builtin.initial(start, &old).values().iter().map(|u| [*u]).collect();
+        for step in 0..50 {
+            let t = start + f64::from(step) * dt;
+            let new = mesh(t + dt);
+            let motion = Motion { t, dt, old: &old, new: &new };
+            ours = written.step(motion, &ours).unwrap().0;
+            theirs = volumes.step(&law, motion, &theirs).unwrap().0;
+            let off = ours.values().iter().zip(theirs.as_flattened()).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(off < 1e-13, "off by {off:.1e} after step {step}");
+            old = new;
+        }
+        let end = start + 50.0 * dt;
+        let [ours, theirs] = [written.exact(end, &old), builtin.exact(end, &old)].map(Option::unwrap);
+        assert!(ours.values().iter().zip(theirs.values()).all(|(a, b)| (a - b).abs() < 1e-13));
+    }
+}

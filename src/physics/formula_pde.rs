@@ -1,0 +1,265 @@
+use super::formula_law::FormulaLaw;
+use super::{Physics, formula, mistaken};
+use crate::error::{Error, Result};
+use crate::formula::Formula;
+use crate::setting::{text_pairs, texts};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// An equation of one's own, from one unknown to four, written as formulas
+///
+/// ```text
+/// u_t + ∇·F(u, x, y, t) = ∇·(D(u, x, y, t) ∇u) + S(u, x, y, t)
+/// ```
+///
+/// for every unknown u; F (`flux`, along x and along y), D ≥ 0 (`diffusivity`) and S (`source`) may hold all unknowns and
+/// are 0 where they are left out. `initial`, a formula of x and y (and t, the time at the start), is needed for each. On
+/// bounded sides `boundary` gives the value there, a formula of x, y and t, or says `"no-flux"`: then F·N − D ∇u·N = 0.
+/// `exact`, where it is known, gives the errors of a report: the largest and the mean square over the unknowns that have
+/// one.
+///
+/// Finite volumes on [dual cells](crate::geometry::DualCells), Crank and Nicolson in time, solved by Newton's method with
+/// the derivatives of the formulas: second order in space and time. At a face F is the mean of its two nodes, and so is
+/// D. That is central: it does not stop wiggles where the mesh does not resolve a front. Σ A u changes only by what
+/// passes the sides and what S gives, on any moving mesh; with a field of one value a node and unknown, in the order of
+/// `unknowns`.
+///
+/// # Errors
+/// A step ends with [`Failure::Formula`](crate::Failure::Formula) where a formula is not finite.
+///
+/// # Example
+/// ```
+/// use driftmesh::{geometry::{Lattice, Mesh}, physics::{FormulaPde, Motion}};
+/// // u decays and v gains what u loses
+/// let pde: FormulaPde = toml::from_str(r#"
+///     unknowns = ["u", "v"]
+///     source = { u = "-u", v = "u" }
+///     initial = { u = "1", v = "0" }
+/// "#)?;
+/// let mut physics = pde.into_physics()?;
+/// let mesh = Mesh::uniform(Lattice::new([4, 4], [true; 2])?, [0.0; 2], [1.0; 2])?;
+/// let start = physics.initial(0.0, &mesh);
+/// let (end, _) = physics.step(Motion { t: 0.0, dt: 0.2, old: &mesh, new: &mesh }, &start)?;
+/// // the trapezoid makes (1 − 0.1)/(1 + 0.1) of u
+/// assert!(end.component(0).all(|u| (u - 0.9 / 1.1).abs() < 1e-12));
+/// assert!(end.component(0).zip(end.component(1)).all(|(u, v)| (u + v - 1.0).abs() < 1e-12));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Source
+/// Hundsdorfer and Verwer, *Numerical Solution of Time-Dependent Advection-Diffusion-Reaction Equations*, Springer
+/// (2003), for the scheme on a mesh at rest.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FormulaPde {
+    /// Their names, at most [`MAX_UNKNOWNS`].
+    pub unknowns: Vec<String>,
+    /// F along x and along y.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "text_pairs")]
+    pub flux: BTreeMap<String, [String; 2]>,
+    /// D.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    pub diffusivity: BTreeMap<String, String>,
+    /// S.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    pub source: BTreeMap<String, String>,
+    /// u at the start.
+    #[serde(deserialize_with = "texts")]
+    pub initial: BTreeMap<String, String>,
+    /// u on bounded sides, or `"no-flux"`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    pub boundary: BTreeMap<String, String>,
+    /// u, where it is known.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    pub exact: BTreeMap<String, String>,
+}
+
+/// Most unknowns of a [`FormulaPde`].
+pub const MAX_UNKNOWNS: usize = 4;
+/// What stands for no formula in `boundary`.
+const NO_FLUX: &str = "no-flux";
+
+/// What a [`FormulaPde`] holds, read.
+pub(super) struct Formulas {
+    pub names: Vec<String>,
+    /// Of x, y, the unknowns and t: F along x for all unknowns, along y, D and S; then all these differentiated by the
+    /// first unknown, by the second, and so on.
+    pub nodal: Vec<Formula>,
+    /// Of x, y and t, as the others below.
+    pub initial: Vec<Formula>,
+    pub boundary: Vec<Option<Formula>>,
+    pub exact: Vec<Option<Formula>>,
+}
+
+impl FormulaPde {
+    /// Refuses what makes no equation.
+    ///
+    /// # Errors
+    /// [`Error::Formula`] where a formula is none or D is a negative number; [`Error::Invalid`] where names do not serve
+    /// as such, an initial value is missing, or a key is no unknown.
+    pub fn check(&self) -> Result<()> {
+        self.read().map(|_| ())
+    }
+
+    /// Refuses sides without values and values without sides.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless every unknown has its `boundary` where an axis is bounded, and none has where none is.
+    pub fn check_sides(&self, periodic: [bool; 2]) -> Result<()> {
+        let missing = self.unknowns.iter().find(|name| !self.boundary.contains_key(*name));
+        match (periodic, missing, self.boundary.keys().next()) {
+            ([true, true], _, Some(name)) => {
+                let rule = "both axes are periodic and have no sides; leave it out";
+                Err(Error::invalid("boundary", format!("given for `{name}`"), rule))
+            }
+            ([true, true], _, None) | (_, None, _) => Ok(()),
+            (_, Some(name), _) => {
+                let rule = format!(
+                    "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to [true, true]"
+                );
+                Err(Error::invalid("boundary", format!("not given for `{name}`"), rule))
+            }
+        }
+    }
+
+    /// The equation, ready to step.
+    ///
+    /// # Errors
+    /// As [`FormulaPde::check`].
+    pub fn into_physics(self) -> Result<Box<dyn Physics>> {
+        let formulas = self.read()?;
+        Ok(match formulas.names.len() {
+            1 => Box::new(FormulaLaw::<1, 3, 8>::new(formulas)),
+            2 => Box::new(FormulaLaw::<2, 4, 24>::new(formulas)),
+            3 => Box::new(FormulaLaw::<3, 5, 48>::new(formulas)),
+            _ => Box::new(FormulaLaw::<4, 6, 80>::new(formulas)),
+        })
+    }
+
+    /// The formulas of x, y and t with their keys.
+    pub fn formulas(&self) -> Vec<(String, &str)> {
+        let tables = [("initial", &self.initial), ("boundary", &self.boundary), ("exact", &self.exact)];
+        let all = tables
+            .into_iter()
+            .flat_map(|(key, table)| table.iter().map(move |(name, text)| (format!("{key}.{name}"), text.as_str())));
+        all.filter(|(_, text)| *text != NO_FLUX).collect()
+    }
+
+    /// What is given of an unknown at the start and on the sides, with the keys.
+    pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+        let both = self.unknowns.iter().filter_map(|name| {
+            let (initial, boundary) = (self.initial.get(name)?, self.boundary.get(name)?);
+            Some([(format!("initial.{name}"), initial.as_str()), (format!("boundary.{name}"), boundary.as_str())])
+        });
+        both.filter(|[_, (_, side)]| *side != NO_FLUX).collect()
+    }
+
+    fn read(&self) -> Result<Formulas> {
+        self.check_names()?;
+        let names = &self.unknowns;
+        let variables: Vec<&str> =
+            ["x", "y"].into_iter().chain(names.iter().map(String::as_str)).chain(["t"]).collect();
+        let nodal = |key: String, text: &str| {
+            Formula::parse(text, &variables).map(|f| (key.clone(), f)).map_err(|mistake| mistaken(&key, text, mistake))
+        };
+        let mut values = Vec::new();
+        for axis in 0..2 {
+            for name in names {
+                let text = self.flux.get(name).map_or("0", |pair| &pair[axis]);
+                values.push(nodal(format!("flux.{name}[{axis}]"), text)?);
+            }
+        }
+        for (table, texts) in [("diffusivity", &self.diffusivity), ("source", &self.source)] {
+            for name in names {
+                values.push(nodal(format!("{table}.{name}"), texts.get(name).map_or("0", String::as_str))?);
+            }
+        }
+        for (key, f) in values.iter().filter(|(key, _)| key.starts_with("diffusivity")) {
+            let value = f.eval(&[]);
+            if value < 0.0 {
+                let message = format!("the diffusivity is {value}, and no solution lasts where it is negative");
+                let (text, at) = (f.text().to_string(), 0..f.text().len());
+                return Err(Error::Formula { key: key.clone(), text, at, message, help: None });
+            }
+        }
+        let mut all: Vec<Formula> = values.iter().map(|(_, f)| f.clone()).collect();
+        for unknown in 0..names.len() {
+            for (key, f) in &values {
+                all.push(f.derivative(2 + unknown).map_err(|mistake| mistaken(key, f.text(), mistake))?);
+            }
+        }
+        let read = |table: &str, texts: &BTreeMap<String, String>| -> Result<Vec<Option<Formula>>> {
+            let read = |name| match texts.get(name).map(String::as_str) {
+                None => Ok(None),
+                Some(NO_FLUX) if table == "boundary" => Ok(None),
+                Some(text) => formula(&format!("{table}.{name}"), text).map(Some),
+            };
+            names.iter().map(read).collect()
+        };
+        Ok(Formulas {
+            names: names.clone(),
+            nodal: all,
+            initial: read("initial", &self.initial)?.into_iter().flatten().collect(),
+            boundary: read("boundary", &self.boundary).map_err(meant_no_flux)?,
+            exact: read("exact", &self.exact)?,
+        })
+    }
+
+    /// Unknowns that can be named in formulas, tables of these unknowns only, and an initial value for each.
+    fn check_names(&self) -> Result<()> {
+        let names = &self.unknowns;
+        if !(1..=MAX_UNKNOWNS).contains(&names.len()) {
+            let rule = format!("must be 1 to {MAX_UNKNOWNS} names");
+            return Err(Error::invalid("unknowns", format!("{names:?}"), rule));
+        }
+        for (k, name) in names.iter().enumerate() {
+            let refused = |why: String| Err(Error::invalid(format!("unknowns[{k}]"), format!("{name:?}"), why));
+            if ["x", "y", "t"].contains(&name.as_str()) {
+                return refused("x, y and t are place and time in every formula; take another name".into());
+            }
+            if name == "kind" {
+                return refused("`kind` is a key of its own in every table; take another name".into());
+            }
+            let known: Vec<&str> = names[..=k].iter().map(String::as_str).collect();
+            if let Err(mistake) = Formula::parse("0", &known) {
+                return refused(format!("{}; take another name", mistake.message));
+            }
+        }
+        let tables = [
+            ("flux", self.flux.keys().collect::<Vec<_>>()),
+            ("diffusivity", self.diffusivity.keys().collect()),
+            ("source", self.source.keys().collect()),
+            ("initial", self.initial.keys().collect()),
+            ("boundary", self.boundary.keys().collect()),
+            ("exact", self.exact.keys().collect()),
+        ];
+        for (table, keys) in tables {
+            if let Some(key) = keys.into_iter().find(|key| !names.contains(key)) {
+                let rule = format!("`{key}` is not among pde.unknowns = {names:?}; add it there, or leave this out");
+                return Err(Error::invalid(format!("{table}.{key}"), "given", rule));
+            }
+        }
+        match names.iter().find(|name| !self.initial.contains_key(*name)) {
+            None => Ok(()),
+            Some(name) => {
+                let rule = format!("every unknown needs one; add {name} = \"…\"");
+                Err(Error::invalid("initial", format!("not given for `{name}`"), rule))
+            }
+        }
+    }
+}
+
+/// Adds the remedy where a formula for the sides is `"no-flux"` in another spelling.
+fn meant_no_flux(error: Error) -> Error {
+    match error {
+        Error::Formula { key, text, at, message, .. } if letters(&text) == letters(NO_FLUX) => {
+            let help = Some(format!("write \"{NO_FLUX}\""));
+            Error::Formula { key, text, at, message, help }
+        }
+        other => other,
+    }
+}
+
+fn letters(text: &str) -> String {
+    text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
+}
