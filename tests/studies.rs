@@ -122,6 +122,15 @@ fn case_b_by_residual_walks() {
     assert_eq!(one.reports[2].interface.unwrap().standard_error, None);
 }
 
+/// Nothing set by hand: the first error is that of two independent implementations, also past t = 1 the mesh holds.
+#[test]
+fn a_thin_front_without_a_number() {
+    let (summary, _) = rerun("burgers-thin");
+    assert_row("burgers-thin", "l_inf", linf(&summary), [4.90e-3, 1.103e-2, 2.33e-2], [0.05; 3]);
+    assert!((950..1050).contains(&summary.work.steps), "{} steps", summary.work.steps);
+    assert!(summary.warnings.is_empty(), "{:?}", summary.warnings);
+}
+
 #[test]
 fn case_b_by_schwarz() {
     let name = "burgers-b-schwarz";
