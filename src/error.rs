@@ -233,7 +233,7 @@ impl Failure {
             Self::VanishingStep { .. } => {
                 "raise mesh.relaxation if the mesh is restless, refine grid.cells, or give time.step as a number"
             }
-            Self::NewtonStalled { .. } => "lower time.step or raise monitor.smoothing",
+            Self::NewtonStalled { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
             Self::LinearStalled { .. } => {
                 "lower time.step or raise mesh.relaxation; set monitor.gradient to \"safe\" where the density is very steep"
             }

@@ -10,7 +10,7 @@ pub struct Reproduce {
     /// What to rerun; everything where nothing is named.
     #[arg(value_name = "ITEM", value_parser = clap::builder::PossibleValuesParser::new(ITEMS.iter().map(|item| item.name)))]
     items: Vec<String>,
-    /// Fewer rows and samples: everything in about a minute.
+    /// Fewer rows and samples: everything in a minute or two.
     #[arg(long)]
     quick: bool,
     /// Threads to use; all cores where nothing is said.

@@ -22,7 +22,7 @@ pub struct Item {
 /// How an item is rerun.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Options {
-    /// Fewer rows and samples: all items together in about a minute.
+    /// Fewer rows and samples: all items together in a minute or two.
     pub quick: bool,
 }
 
