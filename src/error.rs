@@ -231,7 +231,7 @@ impl Failure {
             Self::NotUniform { .. } => "set mesh.generator to { kind = \"fixed\" }, or leave time.stepper out",
             Self::ManySubsteps { .. } => "leave time.stepper out, or lower grid.cells or pde.viscosity",
             Self::VanishingStep { .. } => {
-                "raise mesh.relaxation if the mesh is restless, refine grid.cells, or give time.step as a number"
+                "refine grid.cells where layers form that the mesh does not resolve (pde.flux = \"energy\" keeps Burgers' equation stable meanwhile), smooth a jump in pde.boundary, raise mesh.relaxation if the mesh is restless, or give time.step as a number"
             }
             Self::NewtonStalled { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
             Self::LinearStalled { .. } => {

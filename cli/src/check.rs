@@ -15,7 +15,7 @@ impl Check {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
         let study = self.study.read()?;
         study.warnings()?.iter().for_each(|warning| warn(warning));
-        if let Err(error) = study.start(&study.simulation()?, &mut Vec::new()) {
+        if let Err(error) = study.start(&study.simulation()?, &mut driftmesh::simulation::Record::default()) {
             return Ok(complain(&error, study.remedy(&error).or_else(|| error.help()), None));
         }
         say(study.to_toml().trim_end());

@@ -1,7 +1,7 @@
 use crate::terminal::{say, use_threads};
 use clap::Args;
 use driftmesh::Error;
-use driftmesh::reproduce::{ITEMS, Options};
+use driftmesh::reproduce::{ITEMS, Options, Rerun};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -16,25 +16,33 @@ pub struct Reproduce {
     /// Threads to use; all cores where nothing is said.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Directory for the tables, one Markdown file an item.
+    /// Directory for the tables, one Markdown file an item, and for plots as SVG and PNG.
     #[arg(long, value_name = "DIR", default_value = "out/reproduce")]
     out: PathBuf,
 }
 
 impl Reproduce {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
-        let unwritable =
-            |path: &PathBuf, error: std::io::Error| Error::Unwritable { path: path.clone(), reason: error.to_string() };
         use_threads(self.threads)?;
-        std::fs::create_dir_all(&self.out).map_err(|error| unwritable(&self.out, error))?;
+        std::fs::create_dir_all(&self.out)
+            .map_err(|error| Error::Unwritable { path: self.out.clone(), reason: error.to_string() })?;
         for item in ITEMS.iter().filter(|item| self.items.is_empty() || self.items.iter().any(|name| name == item.name))
         {
-            let tables = item.run(Options { quick: self.quick })?;
+            let Rerun { tables, figures } = item.run(Options { quick: self.quick })?;
             let text = tables.iter().map(|table| table.to_string()).collect::<Vec<_>>().join("\n");
             say(&text);
-            let path = self.out.join(format!("{}.md", item.name));
-            std::fs::write(&path, &text).map_err(|error| unwritable(&path, error))?;
+            self.write(&format!("{}.md", item.name), text.as_bytes())?;
+            for (name, figure) in figures {
+                let picture = figure.draw();
+                self.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
+                self.write(&format!("{name}.png"), &picture.png)?;
+            }
         }
         Ok(ExitCode::SUCCESS)
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) -> driftmesh::Result<()> {
+        let path = self.out.join(name);
+        std::fs::write(&path, bytes).map_err(|error| Error::Unwritable { path, reason: error.to_string() })
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// ```
 /// use driftmesh::meshing::Relaxation;
 /// assert_eq!(Relaxation::Time(0.5).over(1e-3), 0.5);
-/// assert_eq!(Relaxation::Steps(25.0).over(1e-3), 0.025);
+/// assert_eq!(Relaxation::steps(25.0).over(1e-3), 0.025);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number, or a table such as { steps = 25 }")]
@@ -15,33 +15,37 @@ pub enum Relaxation {
     /// In units of time.
     Time(f64),
     /// In units of the time step.
-    #[serde(with = "steps")]
-    Steps(f64),
+    Steps(Steps),
+}
+
+/// `{ steps = 40, prediction = 0.2 }`: τ is so many time steps, and the mesh is predicted before it relaxes.
+///
+/// A mesh that only relaxes lags behind a moving density by as much as the density moves in τ. With a prediction every
+/// node has a velocity v that learns from what relaxation corrects
+///
+/// ```text
+/// x* = xⁿ + Δt v,   xⁿ⁺¹ = the mesh equation's step from x*, with the density of xⁿ,   v ← v + γ (xⁿ⁺¹ − x*)/Δt
+/// ```
+///
+/// and the lag behind a density that moves evenly vanishes: an observer, with gain γ.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Steps {
+    /// τ over Δt.
+    pub steps: f64,
+    /// γ, from 0 (no prediction) to 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prediction: f64,
+}
+
+fn is_zero(gain: &f64) -> bool {
+    *gain == 0.0
 }
 
 /// Fewer steps than this and the mesh, whose density stands still during a step, overshoots from one to the next.
 pub const STEPS_WORTH_A_WARNING: f64 = 15.0;
 /// With fewer steps than this it folds on any thin layer.
 const FEWEST_STEPS: f64 = 2.0;
-
-/// `{ steps = 25 }`.
-mod steps {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    #[derive(Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Table {
-        steps: f64,
-    }
-
-    pub fn serialize<S: Serializer>(steps: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-        Table { steps: *steps }.serialize(serializer)
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-        Table::deserialize(deserializer).map(|table| table.steps)
-    }
-}
 
 impl From<f64> for Relaxation {
     fn from(tau: f64) -> Self {
@@ -50,11 +54,24 @@ impl From<f64> for Relaxation {
 }
 
 impl Relaxation {
+    /// So many time steps, without prediction.
+    pub fn steps(steps: f64) -> Self {
+        Self::Steps(Steps { steps, prediction: 0.0 })
+    }
+
+    /// γ of the prediction; 0 where there is none.
+    pub fn prediction(self) -> f64 {
+        match self {
+            Self::Time(_) => 0.0,
+            Self::Steps(Steps { prediction, .. }) => prediction,
+        }
+    }
+
     /// τ where the time step is `dt`.
     pub fn over(self, dt: f64) -> f64 {
         match self {
             Self::Time(tau) => tau,
-            Self::Steps(steps) => steps * dt,
+            Self::Steps(Steps { steps, .. }) => steps * dt,
         }
     }
 
@@ -71,8 +88,11 @@ impl Relaxation {
         match self {
             Self::Time(tau) if tau.is_finite() && tau > 0.0 => Ok(()),
             Self::Time(tau) => Err(Error::invalid("relaxation", tau, "must be a finite number above 0")),
-            Self::Steps(steps) if steps.is_finite() && steps >= FEWEST_STEPS => Ok(()),
-            Self::Steps(steps) => {
+            Self::Steps(Steps { prediction, .. }) if !(0.0..=1.0).contains(&prediction) => {
+                Err(Error::invalid("relaxation.prediction", prediction, "must be between 0, for none, and 1"))
+            }
+            Self::Steps(Steps { steps, .. }) if steps.is_finite() && steps >= FEWEST_STEPS => Ok(()),
+            Self::Steps(Steps { steps, .. }) => {
                 let rule = format!(
                     "must be at least {FEWEST_STEPS} steps, and {STEPS_WORTH_A_WARNING} or more for a mesh that does not overshoot"
                 );

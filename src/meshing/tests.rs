@@ -35,7 +35,7 @@ fn advance_with(
 
 /// Both forms of the mesh equation.
 fn forms() -> [Mmpde; 2] {
-    let conservative = Mmpde { relaxation: Relaxation::Steps(25.0), form: Form::Conservative };
+    let conservative = Mmpde { relaxation: Relaxation::steps(25.0), form: Form::Conservative };
     [Mmpde::default(), conservative]
 }
 

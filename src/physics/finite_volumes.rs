@@ -73,6 +73,8 @@ impl<const B: usize> Default for FiniteVolumes<B> {
 }
 
 const MAX_NEWTON: usize = 20;
+/// Newton has failed where residuals are so many times those at its start.
+const DIVERGED: f64 = 10.0;
 
 /// One face in one half of a step: g/2, its derivatives, and the weight of u_b − u_a in it.
 #[derive(Debug, Clone, Copy)]
@@ -161,6 +163,7 @@ impl<const B: usize> FiniteVolumes<B> {
         let mut work = Work::default();
         // where much passes a cell in a step, round-off alone leaves more than the tolerance
         let (mut round_off, tolerance) = (16.0 * f64::EPSILON, L::TOLERANCE);
+        let mut at_first = f64::INFINITY;
         let stalled = loop {
             let nodes = law.nodes(half.t, half.x, &u);
             law.check(new, &u, &nodes)?;
@@ -183,13 +186,15 @@ impl<const B: usize> FiniteVolumes<B> {
                 size = largest.into_iter().fold(size, larger);
                 sizes = std::array::from_fn(|c| larger(sizes[c], largest[c]).max(f64::EPSILON * size));
             }
+            let overall = (0..B).fold(0.0, |m, c| larger(m, largest[c] / sizes[c]));
+            at_first = if iterations == 0 { overall } else { at_first };
             // small changes add up over many steps: none is left out
             let share = if iterations == 0 { 0.0 } else { tolerance };
             let wanted: [f64; B] = std::array::from_fn(|c| (share * sizes[c]).max(round_off * size));
             if (0..B).all(|c| largest[c] <= wanted[c]) {
                 break None;
             }
-            if iterations == MAX_NEWTON || !largest.iter().all(|r| r.is_finite()) {
+            if iterations == MAX_NEWTON || overall > DIVERGED * at_first || !largest.iter().all(|r| r.is_finite()) {
                 let over = |c: &usize| largest[*c] / wanted[*c];
                 let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
                 break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
@@ -214,7 +219,7 @@ impl<const B: usize> FiniteVolumes<B> {
             round_off = 16.0 * f64::EPSILON * stiffest;
             let mut correction = vec![[0.0; B]; patch.padded_len()];
             // Newton squares the residual: solving for much less than that is wasted
-            let share = (0..B).fold(0.0, |m, c| larger(m, largest[c] / sizes[c])).min(1.0);
+            let share = overall.min(1.0);
             let enough = std::array::from_fn(|c| {
                 let newton = (0.01 * largest[c] * share).max(0.1 * tolerance * sizes[c]);
                 newton.min(1e-3 * largest[c]).max(0.1 * round_off * size)

@@ -1,10 +1,12 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
+mod figure;
 mod interface_study;
 mod payoff;
 mod table;
 mod tables;
 
+pub use figure::{Curve, Figure};
 pub use interface_study::{InterfaceStep, Measured};
 pub use table::Table;
 
@@ -16,7 +18,22 @@ pub struct Item {
     pub name: &'static str,
     /// What it is, in a line.
     pub line: &'static str,
-    run: fn(Options) -> Result<Vec<Table>>,
+    run: fn(Options) -> Result<Rerun>,
+}
+
+/// What an item comes out as.
+#[derive(Debug, Clone, Default)]
+pub struct Rerun {
+    /// Its tables.
+    pub tables: Vec<Table>,
+    /// Its plots, each with the name of its files.
+    pub figures: Vec<(String, Figure)>,
+}
+
+impl From<Vec<Table>> for Rerun {
+    fn from(tables: Vec<Table>) -> Self {
+        Self { tables, figures: Vec::new() }
+    }
 }
 
 /// How an item is rerun.
@@ -28,15 +45,31 @@ pub struct Options {
 
 /// Everything that can be rerun.
 pub const ITEMS: &[Item] = &[
-    Item { name: "table-1", line: "Burgers' front on 2×2, 3×3 and 4×4 subdomains", run: tables::table_1 },
-    Item { name: "table-2", line: "time of a mesh step against the number of subdomains", run: tables::table_2 },
-    Item { name: "table-3", line: "Burgers' equation on a periodic domain", run: tables::table_3 },
-    Item { name: "table-4", line: "shallow water on a periodic domain", run: tables::table_4 },
-    Item { name: "rings", line: "five prescribed rings", run: tables::rings },
+    Item {
+        name: "table-1",
+        line: "Burgers' front on 2×2, 3×3 and 4×4 subdomains",
+        run: |options| tables::table_1(options).map(Rerun::from),
+    },
+    Item {
+        name: "table-2",
+        line: "time of a mesh step against the number of subdomains",
+        run: |options| tables::table_2(options).map(Rerun::from),
+    },
+    Item {
+        name: "table-3",
+        line: "Burgers' equation on a periodic domain",
+        run: |options| tables::table_3(options).map(Rerun::from),
+    },
+    Item {
+        name: "table-4",
+        line: "shallow water on a periodic domain",
+        run: |options| tables::table_4(options).map(Rerun::from),
+    },
+    Item { name: "rings", line: "five prescribed rings", run: |options| tables::rings(options).map(Rerun::from) },
     Item {
         name: "interface-study",
         line: "error against work of all estimators of interface values, in one mesh step",
-        run: interface_study::run,
+        run: |options| interface_study::run(options).map(Rerun::from),
     },
     Item {
         name: "payoff",
@@ -50,7 +83,7 @@ impl Item {
     ///
     /// # Errors
     /// Whatever ends one of its runs where that is not itself the result.
-    pub fn run(&self, options: Options) -> Result<Vec<Table>> {
+    pub fn run(&self, options: Options) -> Result<Rerun> {
         (self.run)(options)
     }
 }

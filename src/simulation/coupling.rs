@@ -1,3 +1,4 @@
+use super::prediction::{Predicted, blend};
 use super::{NOISE_WORTH_A_WARNING, Seconds, Simulation, State, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
@@ -52,26 +53,30 @@ pub(super) struct Advanced {
     pub interface: Option<Interface>,
 }
 
-/// One step to time `t`: mesh, then physics, as often as the coupling says.
+/// One step to time `t`: mesh, then physics, as often as the coupling says. `scale` is the step that τ is measured in.
 pub(super) fn advance(
     simulation: &mut Simulation,
     state: &State,
     t: f64,
     dt: f64,
+    scale: f64,
     seconds: &mut Seconds,
 ) -> Result<Advanced, Failure> {
     let Simulation { physics, monitor, generator, equation, coupling, .. } = simulation;
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
-    let equation = Mmpde { relaxation: equation.relaxation.at(dt), ..*equation };
+    // where steps are short against τ the velocity learns no faster in time
+    let gain = equation.relaxation.prediction() * dt / scale;
+    let equation = Mmpde { relaxation: equation.relaxation.at(scale), ..*equation };
+    let predicted = timed(&mut seconds.mesh, || Predicted::after(state, gain, dt))?;
     let mut latest = None;
     for _ in 0..coupling.iterations {
         let mut spent = 0.0;
         let mesh = timed(&mut seconds.mesh, || {
-            let mut mesh = state.mesh.clone();
+            let mut mesh = predicted.mesh.clone();
             for sub in 0..coupling.mesh_steps {
-                let carried = if sub == 0 { None } else { Some(interpolate(&state.mesh, &rho, &mesh)) };
+                let carried = if sub == 0 { None } else { Some(interpolate(&predicted.mesh, &rho, &mesh)) };
                 let rho = carried.as_ref().unwrap_or(&rho);
                 let moved = generator.step(&equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
                 let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
@@ -92,10 +97,14 @@ pub(super) fn advance(
         let (u, cost) = timed(&mut seconds.pde, || physics.step(motion, &state.u))?;
         work += cost;
         rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
+        if gain > 0.0 {
+            blend(&state.rho, &mut rho);
+        }
         latest = Some((mesh, u));
     }
     let (mesh, u) = latest.expect("a coupling has at least one iteration");
-    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho }, work, interface })
+    let velocity = predicted.corrected(&mesh, gain, dt);
+    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, velocity }, work, interface })
 }
 
 /// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that

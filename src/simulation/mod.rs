@@ -3,12 +3,14 @@
 mod coupling;
 mod observer;
 mod pace;
+mod prediction;
 mod report;
 mod schedule;
 
 pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
 pub use report::{Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Summary, WorkTotal};
+pub(crate) use report::{FONT, png};
 pub use report::{Picture, draw, final_arrays};
 pub use schedule::Schedule;
 
@@ -19,6 +21,7 @@ use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, Whole};
 use crate::physics::Physics;
 use crate::work::Work;
 use pace::Pace;
+use prediction::blend;
 use std::time::Instant;
 
 /// Everything that changes from step to step.
@@ -34,6 +37,8 @@ pub struct State {
     pub u: Field,
     /// The density that follows from both: what moves the mesh next.
     pub rho: Vec<f64>,
+    /// Velocity with which the mesh is predicted to go on, one a node.
+    pub velocity: Vec<[f64; 2]>,
 }
 
 /// What a run did so far.
@@ -91,11 +96,11 @@ pub struct Simulation {
 
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
 pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
-/// τ of the mesh at the start, in its steps: longer than in a run, since nothing else slows the mesh down.
-const STEPS_OF_THE_START: f64 = 50.0;
+/// τ of the mesh at the start, in its steps.
+const STEPS_OF_THE_START: f64 = 30.0;
 const MAX_STEPS_OF_THE_START: usize = 500;
 /// Motion in one step, as a share of the shortest edge, below which the mesh at the start rests.
-const AT_REST: f64 = 4e-4;
+const AT_REST: f64 = 4e-3;
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
@@ -116,7 +121,8 @@ impl Simulation {
             return Err(at_start(Failure::NonFinite { what: "the initial solution", value, node, x }));
         }
         let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
-        Ok(State { t, step: 0, mesh, u, rho })
+        let velocity = vec![[0.0; 2]; rho.len()];
+        Ok(State { t, step: 0, mesh, u, rho, velocity })
     }
 
     /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
@@ -127,23 +133,29 @@ impl Simulation {
     /// # Errors
     /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds.
     pub fn adapted(&self, mut mesh: Mesh<2>) -> Result<(Mesh<2>, bool)> {
-        let equation = Mmpde { relaxation: Relaxation::Steps(STEPS_OF_THE_START), ..self.equation };
+        let equation = Mmpde { relaxation: Relaxation::steps(STEPS_OF_THE_START), ..self.equation };
+        let given = mesh.clone();
         let mut whole = Whole::to(0.1 * AT_REST);
+        let mut before: Option<Vec<f64>> = None;
         for _ in 0..MAX_STEPS_OF_THE_START {
-            let state = self.start(mesh)?;
-            let moved = whole.step(&equation, &state.mesh, &state.rho, 1.0).and_then(|moved| {
-                check_unfolded(&moved.mesh)?;
-                Ok(moved.mesh)
-            });
-            let moved = moved.map_err(|failure| self.at_start(failure))?;
+            let mut state = self.start(mesh)?;
+            if let Some(before) = &before {
+                blend(before, &mut state.rho);
+            }
+            let moved =
+                whole.step(&equation, &state.mesh, &state.rho, 1.0).map_err(|failure| self.at_start(failure))?.mesh;
+            if check_unfolded(&moved).is_err() {
+                break;
+            }
             let motion = state.mesh.x().iter().zip(moved.x()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
             let at_rest = motion.fold(0.0, f64::max) <= AT_REST * moved.shortest_edge();
             mesh = moved;
+            before = Some(state.rho);
             if at_rest {
                 return Ok((mesh, true));
             }
         }
-        Ok((mesh, false))
+        Ok((given, false))
     }
 
     fn at_start(&self, failure: Failure) -> Error {
@@ -157,12 +169,7 @@ impl Simulation {
     /// # Errors
     /// [`Error::Failed`] with the time and step of a numerical failure, or what an observer returned.
     pub fn run(&mut self, state: &mut State, record: &mut Record, observers: &mut [&mut dyn Observer]) -> Result<()> {
-        let (wall, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
-        let before = record.seconds;
-        let outcome = self.run_steps(state, record, observers);
-        record.seconds.wall = before.wall + wall.elapsed().as_secs_f64();
-        record.seconds.cpu = before.cpu + cpu.elapsed().as_secs_f64();
-        outcome
+        record.timed(|record| self.run_steps(state, record, observers))
     }
 
     fn run_steps(&mut self, state: &mut State, record: &mut Record, observers: &mut [&mut dyn Observer]) -> Result<()> {
@@ -174,18 +181,31 @@ impl Simulation {
             record.reports.push(report);
         }
         let mut pace = match self.schedule.is_automatic() {
-            true => Some(Pace::new(self, state)?),
+            true => {
+                let began = Instant::now();
+                let pace = Pace::new(self, state)?;
+                record.seconds.pde += began.elapsed().as_secs_f64();
+                Some(pace)
+            }
             false => None,
         };
         while let Some((t, dt)) = self.next(state, pace.as_ref()) {
             let step = state.step + 1;
-            let next = coupling::advance(self, state, t, dt, &mut record.seconds)
-                .map_err(|failure| Error::Failed { failure, moment: Some(Moment { t, step }) })?;
-            let before = std::mem::replace(state, next.state);
-            if let Some(pace) = &mut pace {
-                timed(&mut record.seconds.monitor, || pace.learn(&before, state))
-                    .map_err(|failure| Error::Failed { failure, moment: Some(Moment { t, step }) })?;
-            }
+            let next =
+                coupling::advance(self, state, t, dt, pace.as_ref().map_or(dt, Pace::scale), &mut record.seconds);
+            let judged = match &mut pace {
+                Some(pace) => pace.judge(state, next),
+                None => next.map(Some),
+            };
+            let next = match judged {
+                Ok(Some(next)) => next,
+                Ok(None) => {
+                    record.work.rejected_steps += 1;
+                    continue;
+                }
+                Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
+            };
+            *state = next.state;
             record.work.add(next.work);
             record.interface = next.interface;
             self.warn_of_noise(state, record);
@@ -285,8 +305,20 @@ impl Simulation {
     }
 }
 
+impl Record {
+    /// Adds the time that a computation takes.
+    pub(crate) fn timed<T>(&mut self, compute: impl FnOnce(&mut Self) -> T) -> T {
+        let (wall, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+        let before = self.seconds;
+        let result = compute(self);
+        self.seconds.wall = before.wall + wall.elapsed().as_secs_f64();
+        self.seconds.cpu = before.cpu + cpu.elapsed().as_secs_f64();
+        result
+    }
+}
+
 /// Time and result of a computation.
-fn timed<T>(seconds: &mut f64, compute: impl FnOnce() -> T) -> T {
+pub(crate) fn timed<T>(seconds: &mut f64, compute: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let result = compute();
     *seconds += start.elapsed().as_secs_f64();

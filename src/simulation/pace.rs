@@ -1,30 +1,33 @@
+use super::coupling::Advanced;
 use super::{Simulation, State};
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{DualCells, Mesh, padded};
+use crate::geometry::{DualCells, Field, Lattice, padded};
 use crate::numerics::larger;
 use crate::physics::Motion;
 
-/// Steps as long as the solution allows: seen from a fixed place, the unknown that the mesh follows changes by about an
-/// eighth of its range in each
+/// Steps as long as the solution and the mesh allow: at no moving node does the first unknown change by much more than
+/// three hundredths of its range
 ///
-/// Such a step carries a front over half of its width, whatever its width and speed are. The next step is chosen from the
-/// change in the last one and never refused; a trial on the resting mesh chooses the first.
+/// Where the mesh goes along with a front, little changes at its nodes, and a step may carry the front over many times its
+/// width. The next step is chosen from the change in the last one; a step in which much more changes, or that fails, is
+/// refused and tried again with a shorter one. A trial on the resting mesh chooses the first.
 #[derive(Debug, Clone)]
 pub(super) struct Pace {
     dt: f64,
     longest: f64,
+    scale: f64,
 }
 
 /// Change in a step, as a share of the range.
-const CHANGE: f64 = 0.125;
+const CHANGE: f64 = 0.03;
+/// A step with so many times that change is refused.
+const TOO_MUCH: f64 = 2.0;
 /// A step is at most so much longer and shorter than the one before.
 const GROWTH: [f64; 2] = [0.5, 1.2];
-/// A share of the longest step below which the run would take ten million steps or more.
+/// A share of the longest step below which the run would take millions of steps.
 const SHORTEST: f64 = 1e-5;
-/// Steps at the start of a run that are all learned from.
-const WATCHED: usize = 20;
 /// Steps in a run in which nothing changes.
-const FEWEST: f64 = 100.0;
+const FEWEST: f64 = 20.0;
 /// The first trial, as a share of the longest step, and how many there may be, each a hundredth of the one before.
 const TRIAL: f64 = 1e-2;
 const TRIALS: usize = 3;
@@ -39,10 +42,11 @@ impl Pace {
             let motion = Motion { t: state.t, dt: trial, old: &state.mesh, new: &state.mesh };
             match simulation.physics.step(motion, &state.u) {
                 Ok((u, _)) => {
-                    let share = change(&state.mesh, &state.mesh, &first(&state.u), &first(&u));
+                    let share = change_at_nodes(state.mesh.lattice(), &state.u, &u);
                     // a trial in which too much happens says little
                     if share <= CHANGE || number == TRIALS {
-                        return Ok(Self { dt: (trial * CHANGE / share).min(longest), longest });
+                        let dt = (trial * CHANGE / share).min(longest);
+                        return Ok(Self { dt, longest, scale: dt });
                     }
                 }
                 Err(failure) if number == TRIALS => {
@@ -60,44 +64,79 @@ impl Pace {
         self.dt
     }
 
-    /// Learns from a step; from every fourth only, once the run is under way.
+    /// The step that τ is measured in: the next one, or the time in which the solution changes as much at a fixed place.
+    /// A mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep faster.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// Learns from a step; none is returned where it is refused.
     ///
     /// # Errors
-    /// [`Failure::VanishingStep`].
-    pub fn learn(&mut self, before: &State, after: &State) -> Result<(), Failure> {
-        if after.step > WATCHED && !after.step.is_multiple_of(4) {
-            return Ok(());
-        }
-        let share = change(&before.mesh, &after.mesh, &first(&before.u), &first(&after.u));
+    /// What a step failed with, or [`Failure::VanishingStep`], where the next would be too short.
+    pub fn judge(&mut self, before: &State, step: Result<Advanced, Failure>) -> Result<Option<Advanced>, Failure> {
+        let step = match step {
+            Ok(step) => step,
+            Err(failure) => {
+                self.dt *= GROWTH[0];
+                return if self.dt < SHORTEST * self.longest { Err(failure) } else { Ok(None) };
+            }
+        };
+        let after = &step.state;
+        let (dt, share) = (after.t - before.t, change_at_nodes(after.mesh.lattice(), &before.u, &after.u));
         // a step that was cut short to meet a report says what a whole one would have done
-        let whole = share * self.dt / (after.t - before.t);
+        let whole = share * self.dt / dt;
         let factor = if whole.is_finite() { (CHANGE / whole).clamp(GROWTH[0], GROWTH[1]) } else { GROWTH[0] };
         self.dt = (self.dt * factor).min(self.longest);
-        if self.dt < SHORTEST * self.longest { Err(Failure::VanishingStep { dt: self.dt }) } else { Ok(()) }
+        if self.dt < SHORTEST * self.longest {
+            return Err(Failure::VanishingStep { dt: self.dt });
+        }
+        if share > TOO_MUCH * CHANGE {
+            return Ok(None);
+        }
+        let mut scale = self.dt;
+        if scale < self.scale {
+            let in_place = dt * CHANGE / change_in_place(before, after);
+            scale = scale.max(in_place.min(self.scale));
+        }
+        self.scale = scale;
+        Ok(Some(step))
     }
 }
 
-fn first(u: &crate::geometry::Field) -> Vec<[f64; 1]> {
-    u.component(0).map(|u| [u]).collect()
+/// The largest change of the first unknown at a node inside, over its range; 0 for constants. On sides, where values are
+/// given, nothing has to be solved for.
+fn change_at_nodes(lattice: &Lattice<2>, before: &Field, after: &Field) -> f64 {
+    let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
+    let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; 2]);
+    over_range(inside.fold(0.0, |m, (_, change)| larger(m, change)), after)
 }
 
-/// The largest change of u at a fixed place on the way from one mesh to another, over the range of u; 0 for constants.
-fn change(old: &Mesh<2>, new: &Mesh<2>, before: &[[f64; 1]], after: &[[f64; 1]]) -> f64 {
-    let (from, to) = (DualCells::new(old), DualCells::new(new));
+/// The largest change of the first unknown at a fixed place, past which the nodes move, over its range.
+fn change_in_place(before: &State, after: &State) -> f64 {
+    let (from, to) = (DualCells::new(&before.mesh), DualCells::new(&after.mesh));
     let swept = from.swept(&to);
     let strides = to.patch().padded_strides();
-    let [before, after] = [before, after].map(|u| padded(new.lattice(), u, [[0.0]; 2]));
-    let middle = |k: usize, n: usize| 0.25 * ((before[k][0] + before[n][0]) + (after[k][0] + after[n][0]));
-    let (mut largest, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
-    for (i, k) in to.patch().places().enumerate() {
+    let [old, new] = [&before.u, &after.u].map(|u| {
+        let first: Vec<[f64; 1]> = u.component(0).map(|u| [u]).collect();
+        padded(after.mesh.lattice(), &first, [[0.0]; 2])
+    });
+    let middle = |k: usize, n: usize| 0.25 * ((old[k][0] + old[n][0]) + (new[k][0] + new[n][0]));
+    let changes = to.patch().places().enumerate().map(|(i, k)| {
         // what the moving mesh alone would have made of the old values
-        let mut carried = from.areas()[i] * before[k][0];
+        let mut carried = from.areas()[i] * old[k][0];
         for (d, s) in strides.into_iter().enumerate() {
             carried += swept[k][d] * middle(k, k + s) - swept[k - s][d] * middle(k - s, k);
         }
-        largest = larger(largest, after[k][0] - carried / to.areas()[i]);
-        (low, high) = (low.min(after[k][0]), high.max(after[k][0]));
-    }
+        new[k][0] - carried / to.areas()[i]
+    });
+    over_range(changes.fold(0.0, larger), &after.u)
+}
+
+/// A change as a share of the range of the first unknown.
+fn over_range(change: f64, u: &Field) -> f64 {
+    let extremes = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = u.component(0).fold(extremes, |(low, high), u| (low.min(u), high.max(u)));
     // differences below this are of rounding
-    if high - low > 1e-12 * low.abs().max(high.abs()) { largest / (high - low) } else { 0.0 }
+    if high - low > 1e-12 * low.abs().max(high.abs()) { change / (high - low) } else { 0.0 }
 }

@@ -2,10 +2,10 @@ use super::Source;
 use crate::density::{Arclength, Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
-use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING};
+use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
-use crate::simulation::{Coupling, FramesAt, Schedule, Simulation, State};
+use crate::simulation::{Coupling, FramesAt, Record, Schedule, Simulation, State, timed};
 use serde::{Deserialize, Serialize};
 
 /// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
@@ -143,7 +143,7 @@ pub struct MeshTable {
 impl Default for MeshTable {
     fn default() -> Self {
         Self {
-            relaxation: Relaxation::Steps(25.0),
+            relaxation: Relaxation::Steps(Steps { steps: 40.0, prediction: 0.2 }),
             form: MeshForm::Conservative,
             start: None,
             generator: GeneratorKind::default(),
@@ -354,7 +354,7 @@ impl MovingMesh {
                 }
             }
         }
-        if let Relaxation::Steps(steps) = self.mesh.relaxation
+        if let Relaxation::Steps(Steps { steps, .. }) = self.mesh.relaxation
             && steps < STEPS_WORTH_A_WARNING
         {
             warnings.push(format!(
@@ -431,24 +431,27 @@ impl MovingMesh {
         Mmpde { relaxation: self.mesh.relaxation, form }
     }
 
-    /// The state that the run starts from; warns where the mesh does not come to rest.
+    /// The state that the run starts from; `record` gets the time that it took, and a warning where the mesh does not come
+    /// to rest.
     ///
     /// # Errors
     /// [`Error::Failed`] where there is none.
-    pub fn start(&self, simulation: &Simulation, warnings: &mut Vec<String>) -> Result<State> {
-        let mut mesh = self.uniform_mesh()?;
-        if self.mesh.start == Some(StartMesh::Adapted) {
-            let (adapted, at_rest) = simulation.adapted(mesh)?;
-            mesh = adapted;
-            if !at_rest {
-                warnings.push(
-                    "`mesh.start`: the mesh does not come to rest on the initial solution, which may be too thin for \
-                     grid.cells or not continuous"
-                        .into(),
-                );
+    pub fn start(&self, simulation: &Simulation, record: &mut Record) -> Result<State> {
+        record.timed(|record| {
+            let mut mesh = self.uniform_mesh()?;
+            if self.mesh.start == Some(StartMesh::Adapted) {
+                let (adapted, at_rest) = timed(&mut record.seconds.mesh, || simulation.adapted(mesh))?;
+                mesh = adapted;
+                if !at_rest {
+                    record.warnings.push(
+                        "`mesh.start`: the mesh does not come to rest on the initial solution, which may be too thin for \
+                         grid.cells or not continuous; it starts with equal cells"
+                            .into(),
+                    );
+                }
             }
-        }
-        simulation.start(mesh)
+            simulation.start(mesh)
+        })
     }
 
     /// Equal cells.

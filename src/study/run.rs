@@ -50,7 +50,7 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     directory.write("study.toml", study.to_toml().as_bytes())?;
     directory.write_summary(&summary)?;
     let mut record = Record { warnings: study.warnings()?, ..Record::default() };
-    let outcome = study.start(&simulation, &mut record.warnings).and_then(|mut state| {
+    let outcome = study.start(&simulation, &mut record).and_then(|mut state| {
         let mut history = History::create(&directory.path().join("history.csv"))?;
         let mut frames = Frames::create(directory.path(), study.frames())?;
         let mut meshes = Meshes::of(&study);
@@ -92,7 +92,7 @@ pub fn compute(study: &MovingMesh) -> Result<(Record, Option<Error>)> {
     study.resolve()?;
     let mut simulation = study.simulation()?;
     let mut record = Record::default();
-    let mut state = study.start(&simulation, &mut record.warnings)?;
+    let mut state = study.start(&simulation, &mut record)?;
     let mut meshes = Meshes::of(&study);
     let failure = simulation.run(&mut state, &mut record, &mut [&mut meshes]).err();
     let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record).err(), Some);
@@ -125,7 +125,7 @@ impl Observer for Meshes {
 fn compare_with_reference(study: &MovingMesh, meshes: &Meshes, record: &mut Record) -> Result<()> {
     let Some(reference) = study.reference() else { return Ok(()) };
     let mut simulation = reference.simulation()?;
-    let mut state = reference.start(&simulation, &mut Vec::new())?;
+    let mut state = reference.start(&simulation, &mut Record::default())?;
     let mut theirs = Meshes::of(study);
     simulation.run(&mut state, &mut Record::default(), &mut [&mut theirs])?;
     for report in &mut record.reports {

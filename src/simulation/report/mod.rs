@@ -8,5 +8,6 @@ mod summary;
 pub use arrays::final_arrays;
 pub use directory::RunDirectory;
 pub(super) use directory::write_file;
+pub(crate) use picture::{FONT, png};
 pub use picture::{Picture, draw};
 pub use summary::{Conserved, ErrorNorms, Failed, Parallel, Report, Seconds, Summary, WorkTotal};

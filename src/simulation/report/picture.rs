@@ -11,7 +11,8 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
-const FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
+/// The font of all drawings.
+pub(crate) const FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
 /// Longer edge of the box in the drawing.
 const LONGER: f64 = 640.0;
 const SHORTER_AT_LEAST: f64 = 160.0;
@@ -209,7 +210,8 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-fn png(svg: &str) -> Vec<u8> {
+/// A drawing as pixels, twice its size.
+pub(crate) fn png(svg: &str) -> Vec<u8> {
     let mut fonts = usvg::fontdb::Database::new();
     fonts.load_font_data(FONT.to_vec());
     let options = usvg::Options { fontdb: Arc::new(fonts), font_family: "DejaVu Sans".into(), ..Default::default() };
