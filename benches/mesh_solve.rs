@@ -16,7 +16,7 @@ const TOLERANCE: [f64; 2] = [1e-12; 2];
 
 /// Case B on n × n cells, carried to t = 0.3 so that the mesh is developed.
 fn developed(n: usize) -> State {
-    let mut source = Source::new("burgers", include_str!("../studies/burgers.toml"));
+    let mut source = Source::new("burgers", include_str!("../studies/burgers-b-stochastic.toml"));
     for assignment in [&format!("grid.cells=[{n},{n}]"), "time.end=0.3", "time.report=[0.3]"] {
         source.set(assignment).unwrap();
     }

@@ -242,7 +242,7 @@ fn invalid() {
 
 #[test]
 fn study() {
-    let mut source = Source::new("my.toml", include_str!("../studies/burgers.toml"));
+    let mut source = Source::new("my.toml", include_str!("../studies/burgers-b-stochastic.toml"));
     source.set("pde.viscosty=1").unwrap();
     let error = MovingMesh::from_source(&source).unwrap_err();
     assert_says(

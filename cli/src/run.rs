@@ -2,7 +2,7 @@ use crate::{StudyArgs, progress::Progress, terminal};
 use clap::Args;
 use driftmesh::meshing::Interface;
 use driftmesh::simulation::{Observer, RunDirectory, Summary};
-use driftmesh::study;
+use driftmesh::study::{self, UniformEquivalent};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -42,6 +42,18 @@ impl Run {
         finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
         if !self.quiet {
             terminal::say(table(&finished.summary));
+            if let Some(report) = finished.summary.reports.first()
+                && let Some(UniformEquivalent { nodes: [n, m], thicker, t }) = study.uniform_equivalent(report)?
+            {
+                let scaled = if thicker > 1.0 {
+                    format!(", scaled from a front {thicker} times as thick")
+                } else {
+                    String::new()
+                };
+                terminal::say(format_args!(
+                    "uniform  about {n} × {m} nodes have the same l_inf at t = {t} (order 2{scaled})"
+                ));
+            }
             terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
             terminal::say(format_args!("run      {}", out.display()));
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-const STUDY: &str = include_str!("../../studies/burgers.toml");
+const STUDY: &str = include_str!("../../studies/burgers-b-stochastic.toml");
 
 struct Sandbox {
     directory: tempfile::TempDir,

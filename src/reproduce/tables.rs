@@ -7,7 +7,7 @@ use crate::simulation::{Record, State};
 use crate::study::{MovingMesh, Source, compute};
 use std::time::Instant;
 
-const BURGERS: &str = include_str!("../../studies/burgers.toml");
+const BURGERS: &str = include_str!("../../studies/burgers-b-stochastic.toml");
 const PERIODIC: &str = include_str!("../../studies/burgers-periodic.toml");
 const DAM_BREAK: &str = include_str!("../../studies/dam-break.toml");
 const RINGS: &str = include_str!("../../studies/rings.toml");
