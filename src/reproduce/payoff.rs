@@ -37,6 +37,9 @@ struct Task {
 
 /// Grids grow by this factor in the search.
 const FINER: f64 = 1.025;
+/// It begins so much further back where its first grid is good enough, and gives up after so many grids.
+const BACK: f64 = 1.1;
+const MOST: usize = 40;
 const VISCOSITIES: [f64; 4] = [5e-3, 2e-3, 1e-3, 2e-4];
 /// Uniform grids are timed down to this viscosity: beyond, a run would take minutes and say nothing new.
 const TIMED: f64 = 5e-4;
@@ -78,19 +81,23 @@ impl Method {
     }
 
     /// Cells with which the search begins, somewhat too few.
-    fn first(self, viscosity: f64) -> usize {
+    fn first(self, task: Task) -> usize {
         let cells = match self {
-            Self::Moving => 12.0 * (5e-3 / viscosity).powf(0.4),
-            Self::Uniform { order: 2 } => 0.8 / viscosity,
-            Self::Uniform { .. } => 0.34 / viscosity,
+            Self::Moving => 12.0 * (5e-3 / task.viscosity).powf(0.4),
+            Self::Uniform { order: 2 } => 0.08 / (task.viscosity * task.target.sqrt()),
+            Self::Uniform { .. } => 0.107 / (task.viscosity * task.target.powf(0.25)),
         };
         cells as usize
     }
 
     /// The coarsest grid of the search that meets the target, the fastest of several runs.
     fn search(self, task: Task) -> Result<Option<Outcome>> {
-        let mut cells = self.first(task.viscosity);
-        for _ in 0..16 {
+        let mut cells = self.first(task);
+        let enough = |run: &Option<(Run, f64)>| run.as_ref().is_some_and(|(run, _)| run.l_inf <= task.target);
+        while cells > 4 && enough(&self.run(task, cells)?) {
+            cells = (cells as f64 / BACK) as usize;
+        }
+        for _ in 0..MOST {
             if let Some((run, mut seconds)) = self.run(task, cells)?.filter(|(run, _)| run.l_inf <= task.target) {
                 for _ in 1..if seconds > LONG { 2 } else { RUNS } {
                     seconds = self.run(task, cells)?.map_or(seconds, |(_, again)| seconds.min(again));
