@@ -176,6 +176,34 @@ pub enum Failure {
         /// Cells along each axis.
         cells: [usize; 2],
     },
+    /// The density of a line is not finite and positive, or its derivative not finite.
+    #[error("{what} is {value:e} at x = {x}, t = {t}; M must be finite and above 0, and dM/dx finite")]
+    LineDensity {
+        /// `M` or `dM/dx`.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+        /// Where.
+        x: f64,
+        /// When.
+        t: f64,
+    },
+    /// An iteration between subdomains of a line did not converge.
+    #[error(
+        "not converged: the {measure} is {last:.2e} after {iterations} iterations, {tolerance:.0e} asked for{advice}"
+    )]
+    NotConverged {
+        /// What is measured.
+        measure: &'static str,
+        /// Its last value.
+        last: f64,
+        /// Iterations done.
+        iterations: usize,
+        /// What was asked for.
+        tolerance: f64,
+        /// What is known about this case.
+        advice: String,
+    },
     /// An array does not fit the lattice it is given with.
     #[error("{what} has {found} values, but the lattice has {expected} nodes")]
     WrongLength {
@@ -207,6 +235,8 @@ impl Failure {
             Self::NoisyInterface { .. } => "noisy-interface",
             Self::SchwarzStalled { .. } => "schwarz-stalled",
             Self::Subdomains { .. } => "subdomains",
+            Self::LineDensity { .. } => "line-density",
+            Self::NotConverged { .. } => "not-converged",
             Self::WrongLength { .. } => "wrong-length",
         }
     }
@@ -250,6 +280,12 @@ impl Failure {
                 "raise mesh.generator.iterations or mesh.generator.overlap, or lower time.step"
             }
             Self::Subdomains { .. } => "give every axis between one subdomain and one a cell",
+            Self::LineDensity { .. } => {
+                "mend density.value or density.of: iterates of Robin conditions may leave the domain"
+            }
+            Self::NotConverged { .. } => {
+                "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"galerkin\""
+            }
             Self::WrongLength { .. } => "give one value a node, in lattice order",
         }
     }

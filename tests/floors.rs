@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 8] = [
     &["formula", "kind", "parallel", "random", "setting", "work"],
     &["geometry"],
     &["numerics"],
-    &["density", "meshing", "physics"],
+    &["density", "equidistribution", "meshing", "physics"],
     &["simulation"],
     &["study"],
     &["reproduce"],

@@ -1,0 +1,275 @@
+use super::LineDensity;
+use crate::error::Failure;
+use serde::{Deserialize, Serialize};
+
+/// How M is averaged over a cell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FaceDensity {
+    /// The mean of both ends.
+    #[default]
+    Trapezoid,
+    /// M in the middle.
+    Midpoint,
+    /// ∫M over the cell: the discrete problem then has the nodes of the continuous one.
+    Exact,
+}
+
+/// M̄ of a cell with its derivatives by the left and the right node.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    mean: f64,
+    by: [f64; 2],
+}
+
+/// A law at an end: g + φ(x) is the flux there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Law {
+    /// φ = slope · x.
+    Robin { slope: f64 },
+    /// φ = ∫ M from x to `to`, over `length`: the flux of the rest of the domain, which begins at x. With panels the
+    /// integral is that of the trapezoidal rule.
+    Rest { to: f64, length: f64, panels: Option<usize> },
+}
+
+/// What is known at an end of a piece of the line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum End {
+    /// The node.
+    Value(f64),
+    /// The flux, F = g + φ(x).
+    Flux { g: f64, law: Law },
+}
+
+/// The backward Euler step of x_t = (1/τ) (M x_ξ)_ξ.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step<'a> {
+    /// Nodes of this piece before.
+    pub old: &'a [f64],
+    /// τ/Δt.
+    pub ratio: f64,
+}
+
+/// (M x_ξ)_ξ = 0 on nodes ξ_i a distance `h` apart, as F_{i+½} = F_{i−½} with F_{i+½} = M̄ (x_{i+1} − x_i)/h.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chain<'a> {
+    pub density: &'a LineDensity,
+    pub face: FaceDensity,
+    pub t: f64,
+    pub h: f64,
+    /// Where the line begins and ends in x.
+    pub ends: [f64; 2],
+}
+
+const MAX_NEWTON: usize = 200;
+const HALVINGS: usize = 40;
+
+impl Law {
+    /// φ and φ′.
+    fn at(self, chain: &Chain<'_>, x: f64) -> Result<[f64; 2], Failure> {
+        let (density, t) = (chain.density, chain.t);
+        match self {
+            Self::Robin { slope } => Ok([slope * x, slope]),
+            Self::Rest { to, length, panels: None } => {
+                Ok([density.integral(t, x, to)? / length, -density.at(t, x)?[0] / length])
+            }
+            Self::Rest { to, length, panels: Some(n) } => {
+                let step = (to - x) / n as f64;
+                let places: Vec<f64> = (0..=n).map(|k| x + k as f64 * step).collect();
+                let (mut sum, mut slope) = (0.0, 0.0);
+                for (k, [m, m_x]) in density.at_each(t, &places)?.into_iter().enumerate() {
+                    let weight = if k == 0 || k == n { 0.5 } else { 1.0 };
+                    sum += weight * m;
+                    slope += weight * m_x * (1.0 - k as f64 / n as f64);
+                }
+                Ok([step * sum / length, (step * slope - sum / n as f64) / length])
+            }
+        }
+    }
+}
+
+impl Chain<'_> {
+    fn faces(&self, x: &[f64]) -> Result<Vec<Face>, Failure> {
+        let cells = x.windows(2);
+        match self.face {
+            FaceDensity::Trapezoid => {
+                let m = self.density.at_each(self.t, x)?;
+                let face =
+                    |m: &[[f64; 2]]| Face { mean: 0.5 * (m[0][0] + m[1][0]), by: [0.5 * m[0][1], 0.5 * m[1][1]] };
+                Ok(m.windows(2).map(face).collect())
+            }
+            FaceDensity::Midpoint => {
+                let middles: Vec<f64> = cells.map(|x| 0.5 * (x[0] + x[1])).collect();
+                let m = self.density.at_each(self.t, &middles)?;
+                Ok(m.into_iter().map(|[m, slope]| Face { mean: m, by: [0.5 * slope; 2] }).collect())
+            }
+            FaceDensity::Exact => {
+                let m = self.density.at_each(self.t, x)?;
+                cells
+                    .zip(m.windows(2))
+                    .map(|(x, m)| {
+                        let width = x[1] - x[0];
+                        if width == 0.0 {
+                            return Ok(Face { mean: m[0][0], by: [0.5 * m[0][1], 0.5 * m[1][1]] });
+                        }
+                        let mean = self.density.integral(self.t, x[0], x[1])? / width;
+                        Ok(Face { mean, by: [(mean - m[0][0]) / width, (m[1][0] - mean) / width] })
+                    })
+                    .collect()
+            }
+        }
+    }
+
+    /// The fluxes between the nodes.
+    pub fn fluxes(&self, x: &[f64]) -> Result<Vec<f64>, Failure> {
+        Ok(self.faces(x)?.iter().zip(x.windows(2)).map(|(face, x)| face.mean * (x[1] - x[0]) / self.h).collect())
+    }
+
+    /// The flux of one cell.
+    pub fn flux(&self, left: f64, right: f64) -> Result<f64, Failure> {
+        Ok(self.fluxes(&[left, right])?[0])
+    }
+
+    /// φ of a law, at a place.
+    pub fn law(&self, law: Law, x: f64) -> Result<f64, Failure> {
+        Ok(law.at(self, x)?[0])
+    }
+
+    /// Residuals at all nodes, 0 where the node is given, and their derivatives: below, own, above.
+    pub fn linearised(
+        &self,
+        x: &[f64],
+        ends: [End; 2],
+        step: Option<Step<'_>>,
+    ) -> Result<(Vec<f64>, Vec<[f64; 3]>), Failure> {
+        let faces = self.faces(x)?;
+        let n = faces.len();
+        let mut residual = vec![0.0; n + 1];
+        let mut rows = vec![[0.0, 1.0, 0.0]; n + 1];
+        // flux of a cell and its derivatives by the nodes at its ends
+        let flux = |i: usize| {
+            let (face, width) = (faces[i], x[i + 1] - x[i]);
+            [face.mean * width, face.by[0] * width - face.mean, face.by[1] * width + face.mean].map(|v| v / self.h)
+        };
+        let mut below = flux(0);
+        for i in 1..n {
+            let above = flux(i);
+            residual[i] = above[0] - below[0];
+            rows[i] = [-below[1], above[1] - below[2], above[2]];
+            if let Some(Step { old, ratio }) = step {
+                residual[i] -= ratio * self.h * (x[i] - old[i]);
+                rows[i][1] -= ratio * self.h;
+            }
+            below = above;
+        }
+        for (end, i) in ends.into_iter().zip([0, n]) {
+            if let End::Flux { g, law } = end {
+                let ([f, by_left, by_right], [phi, slope]) = (flux(i.min(n - 1)), law.at(self, x[i])?);
+                residual[i] = f - g - phi;
+                rows[i] = if i == 0 { [0.0, by_left - slope, by_right] } else { [by_left, by_right - slope, 0.0] };
+            }
+        }
+        Ok((residual, rows))
+    }
+
+    /// The nodes of a piece, from a guess: Newton's method, damped so that nodes keep their order. Returns the number of
+    /// linear solves.
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`], [`Failure::NewtonStalled`].
+    pub fn solve(&self, guess: &[f64], ends: [End; 2], step: Option<Step<'_>>) -> Result<(Vec<f64>, usize), Failure> {
+        let mut x = stretched(guess, ends);
+        let size = x.iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
+        let (mut residual, mut rows) = self.linearised(&x, ends, step)?;
+        let mut last = f64::INFINITY;
+        for solves in 1..=MAX_NEWTON {
+            let change = thomas(&rows, &residual);
+            let largest = change.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
+            let before = norm(&residual);
+            let mut share = 1.0;
+            let mut found = None;
+            for _ in 0..HALVINGS {
+                let tried: Vec<f64> = x.iter().zip(&change).map(|(x, c)| x - share * c).collect();
+                let ordered = tried.windows(2).all(|x| x[1] > x[0]);
+                // where no whole step is left to take, residuals are rounding
+                if ordered {
+                    let (r, m) = self.linearised(&tried, ends, step)?;
+                    if norm(&r) < before || largest <= 1e-9 * size {
+                        found = Some((tried, r, m));
+                        break;
+                    }
+                }
+                share *= 0.5;
+            }
+            let Some((tried, r, m)) = found else {
+                return Err(Failure::NewtonStalled { residual: before, tolerance: 0.0, iterations: solves });
+            };
+            (x, residual, rows) = (tried, r, m);
+            // quadratic until rounding: then steps no longer shrink
+            if share == 1.0
+                && largest <= 1e-9 * size
+                && (largest >= 0.25 * last || largest <= 4.0 * f64::EPSILON * size)
+            {
+                return Ok((x, solves));
+            }
+            last = largest;
+        }
+        Err(Failure::NewtonStalled { residual: norm(&residual), tolerance: 0.0, iterations: MAX_NEWTON })
+    }
+
+    /// One linear solve with the face densities of given nodes frozen.
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`].
+    pub fn frozen(&self, at: &[f64], ends: [f64; 2], step: Option<Step<'_>>) -> Result<Vec<f64>, Failure> {
+        let faces = self.faces(at)?;
+        let n = faces.len();
+        let mut right = vec![0.0; n + 1];
+        let mut rows = vec![[0.0, 1.0, 0.0]; n + 1];
+        (right[0], right[n]) = (ends[0], ends[1]);
+        for i in 1..n {
+            let (a, b) = (faces[i - 1].mean / self.h, faces[i].mean / self.h);
+            rows[i] = [-a, a + b, -b];
+            if let Some(Step { old, ratio }) = step {
+                rows[i][1] += ratio * self.h;
+                right[i] = ratio * self.h * old[i];
+            }
+        }
+        Ok(thomas(&rows, &right))
+    }
+}
+
+/// A guess with new end values: the whole piece stretched, so that nodes keep their order.
+fn stretched(guess: &[f64], ends: [End; 2]) -> Vec<f64> {
+    let (first, last) = (guess[0], guess[guess.len() - 1]);
+    let [left, right] = [(ends[0], first), (ends[1], last)].map(|(end, own)| match end {
+        End::Value(x) => x,
+        End::Flux { .. } => own,
+    });
+    let mut x: Vec<f64> = guess.iter().map(|x| left + (x - first) / (last - first) * (right - left)).collect();
+    let n = x.len() - 1;
+    (x[0], x[n]) = (left, right);
+    x
+}
+
+fn norm(residual: &[f64]) -> f64 {
+    residual.iter().fold(0.0, |m, r| if r.is_nan() { f64::INFINITY } else { m.max(r.abs()) })
+}
+
+/// Tridiagonal elimination.
+pub(super) fn thomas(rows: &[[f64; 3]], right: &[f64]) -> Vec<f64> {
+    let n = rows.len();
+    let mut above = vec![0.0; n];
+    let mut x = vec![0.0; n];
+    let (mut c, mut d) = (0.0, 0.0);
+    for i in 0..n {
+        let [lower, own, upper] = rows[i];
+        let pivot = 1.0 / (own - lower * c);
+        (c, d) = (upper * pivot, (right[i] - lower * d) * pivot);
+        (above[i], x[i]) = (c, d);
+    }
+    for i in (0..n - 1).rev() {
+        x[i] -= above[i] * x[i + 1];
+    }
+    x
+}

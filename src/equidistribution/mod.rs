@@ -1,0 +1,269 @@
+//! Equidistribution in one dimension, and every Schwarz method for it.
+//!
+//! The mesh x(ξ) on \[0, 1\] solves (M(x) x_ξ)_ξ = 0 with its ends fixed, or in time x_t = (1/τ) (M x_ξ)_ξ. Pieces of it
+//! are solved by themselves and told of each other's ends until they agree.
+//!
+//! # Source
+//! M. J. Gander and R. D. Haynes, *Domain decomposition approaches for mesh generation via the equidistribution principle*
+//! (2012). Its theorem 3.4, that linearised Schwarz always converges, does not hold: for M = 300 (x − ½)² + 1 and pieces
+//! that overlap in (.48, .52) the iteration oscillates for ever.
+
+mod chain;
+mod coarse;
+mod density;
+mod predict;
+mod schwarz;
+
+#[cfg(test)]
+mod tests;
+
+pub use chain::FaceDensity;
+pub use density::LineDensity;
+pub use predict::Prediction;
+pub use schwarz::{Coarse, Method, Robin, Sweep};
+
+use crate::error::Failure;
+use chain::{Chain, End, Step};
+use schwarz::{Iteration, Pieces};
+use serde::Serialize;
+
+/// The equidistribution of a density over a line of equal ξ-cells.
+///
+/// # Example
+/// ```
+/// use driftmesh::equidistribution::{Line, LineDensity};
+/// let line = Line::new(LineDensity::formula("x^2 + 1")?, 20);
+/// let mesh = line.solve(0.0, &line.uniform(), None)?.0;
+/// // the continuous mesh has x(½) = .59607164; the discrete one is of second order
+/// assert!((mesh[10] - 0.59607164).abs() < 2e-4);
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Line {
+    /// M.
+    pub density: LineDensity,
+    /// Its mean over a cell.
+    pub face: FaceDensity,
+    /// Cells in ξ.
+    pub cells: usize,
+    /// The ends of the line in x.
+    pub ends: [f64; 2],
+}
+
+/// A mesh before, and τ/Δt of the step from it.
+pub type Before<'a> = Option<(&'a [f64], f64)>;
+
+/// When an iteration ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stop {
+    /// After so many iterations at the latest.
+    pub iterations: usize,
+    /// As soon as the measure is at most this.
+    pub tolerance: Option<f64>,
+    /// What is measured.
+    pub measure: Measure,
+}
+
+/// What tells that an iteration has converged.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Measure {
+    /// The distance to the discrete single-domain mesh.
+    #[default]
+    Error,
+    /// The change in an iteration.
+    Increment,
+}
+
+/// One iterate; the first is the start.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Iterate {
+    /// The largest distance of a node of any piece from the discrete single-domain mesh.
+    pub error: f64,
+    /// The largest change since the iterate before; 0 at the start.
+    pub increment: f64,
+    /// 2 max |u_i − u_{i−1}| over the pieces, where M is the arc length of u.
+    pub largest_jump: Option<f64>,
+    /// The largest error of the piecewise linear interpolant of u on the glued mesh.
+    pub interpolation_error: Option<f64>,
+    /// Linear solves so far.
+    pub linear_solves: usize,
+}
+
+/// How an iteration went.
+#[derive(Debug, Clone)]
+pub struct History {
+    /// The start and every iterate.
+    pub iterates: Vec<Iterate>,
+    /// The glued mesh of the last.
+    pub mesh: Vec<f64>,
+    /// The discrete single-domain mesh.
+    pub reference: Vec<f64>,
+    /// Contraction in two iterations: the geometric mean of the last ten above rounding, or of the last half of fewer.
+    pub observed: Option<f64>,
+    /// What theory says of it.
+    pub prediction: Prediction,
+    /// Whether the tolerance was met, if there was one.
+    pub converged: bool,
+}
+
+/// Iterates with errors below this are rounding.
+const ROUNDING: f64 = 1e-11;
+/// Contractions that count for the observed rate.
+const LAST: usize = 10;
+/// Places in a cell at which an interpolant is compared.
+const SAMPLES: usize = 64;
+
+impl Line {
+    /// M on \[0, 1\], averaged by trapezoids.
+    pub fn new(density: LineDensity, cells: usize) -> Self {
+        Self { density, face: FaceDensity::default(), cells, ends: [0.0, 1.0] }
+    }
+
+    fn chain(&self, t: f64) -> Chain<'_> {
+        Chain { density: &self.density, face: self.face, t, h: 1.0 / self.cells as f64, ends: self.ends }
+    }
+
+    /// Equal cells.
+    pub fn uniform(&self) -> Vec<f64> {
+        self.mapped(|xi| xi)
+    }
+
+    /// The nodes that a function of ξ from 0 to 1 puts between the ends.
+    pub fn mapped(&self, f: impl Fn(f64) -> f64) -> Vec<f64> {
+        let [a, b] = self.ends;
+        let mut x: Vec<f64> = (0..=self.cells).map(|i| a + (b - a) * f(i as f64 / self.cells as f64)).collect();
+        (x[0], x[self.cells]) = (a, b);
+        x
+    }
+
+    /// The discrete mesh of the whole line, and the linear solves that it took.
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`], [`Failure::NewtonStalled`].
+    pub fn solve(&self, t: f64, guess: &[f64], before: Before<'_>) -> Result<(Vec<f64>, usize), Failure> {
+        let step = before.map(|(old, ratio)| Step { old, ratio });
+        self.chain(t).solve(guess, self.ends.map(End::Value), step)
+    }
+
+    /// The continuous mesh at some ξ: ∫ M up to x(ξ) is ξ times that over the line.
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`].
+    pub fn exact(&self, t: f64, xi: &[f64]) -> Result<Vec<f64>, Failure> {
+        let [a, b] = self.ends;
+        let whole = self.density.integral(t, a, b)?;
+        xi.iter()
+            .map(|xi| {
+                let (mut low, mut high, mut x) = (a, b, a + (b - a) * xi);
+                for _ in 0..200 {
+                    let off = self.density.integral(t, a, x)? - xi * whole;
+                    if off > 0.0 {
+                        high = x
+                    } else {
+                        low = x
+                    }
+                    let newton = x - off / self.density.at(t, x)?[0];
+                    let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+                    if (next - x).abs() <= 2.0 * f64::EPSILON * (b - a) {
+                        return Ok(next);
+                    }
+                    x = next;
+                }
+                Ok(x)
+            })
+            .collect()
+    }
+
+    /// Iterates between pieces, from a start, at time t.
+    ///
+    /// `ranges` holds the first and last node of each piece, from left to right: neighbours overlap for the classical
+    /// method, and meet in a node for the others. No convergence is no error: see [`History::converged`].
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`], [`Failure::NewtonStalled`].
+    pub fn iterate(
+        &self,
+        t: f64,
+        ranges: &[[usize; 2]],
+        method: Method,
+        start: &[f64],
+        before: Before<'_>,
+        stop: Stop,
+    ) -> Result<History, Failure> {
+        let reference = self.solve(t, start, before)?.0;
+        let iteration = Iteration { chain: self.chain(t), ranges, method, old: before, cells: self.cells };
+        let exact = iteration.cut(&reference);
+        let mut pieces = iteration.cut(start);
+        let mut iterates = vec![self.measured(t, &iteration, &pieces, &exact, 0.0, 0)?];
+        let met = |iterate: &Iterate, n: usize| {
+            let value = match stop.measure {
+                Measure::Error => iterate.error,
+                Measure::Increment => iterate.increment,
+            };
+            stop.tolerance.is_some_and(|tolerance| value <= tolerance && (n > 0 || stop.measure == Measure::Error))
+        };
+        let mut converged = met(&iterates[0], 0);
+        let mut solves = 0;
+        while !converged && iterates.len() <= stop.iterations {
+            let (next, cost) = iteration.next(&pieces)?;
+            solves += cost;
+            let increment = distance(&next, &pieces);
+            pieces = next;
+            let iterate = self.measured(t, &iteration, &pieces, &exact, increment, solves)?;
+            iterates.push(iterate);
+            converged = met(&iterate, iterates.len() - 1);
+        }
+        let observed = observed(&iterates);
+        let prediction = Prediction::of(self, t, ranges, method, &reference, before.map(|b| b.1))?;
+        let converged = converged || stop.tolerance.is_none();
+        Ok(History { mesh: iteration.glue(&pieces), iterates, reference, observed, prediction, converged })
+    }
+
+    fn measured(
+        &self,
+        t: f64,
+        iteration: &Iteration<'_>,
+        pieces: &Pieces,
+        exact: &Pieces,
+        increment: f64,
+        linear_solves: usize,
+    ) -> Result<Iterate, Failure> {
+        let error = distance(pieces, exact);
+        let Some(u) = self.density.followed() else {
+            return Ok(Iterate { error, increment, largest_jump: None, interpolation_error: None, linear_solves });
+        };
+        let u = |x: f64| u.eval(&[x, t]);
+        let jump = |x: &[f64]| 2.0 * (u(x[1]) - u(x[0])).abs();
+        let largest_jump = pieces.iter().flat_map(|piece| piece.windows(2).map(jump)).fold(0.0, f64::max);
+        let mesh = iteration.glue(pieces);
+        let mut interpolation_error = 0.0_f64;
+        for x in mesh.windows(2) {
+            let ends = [u(x[0]), u(x[1])];
+            for k in 1..SAMPLES {
+                let s = k as f64 / SAMPLES as f64;
+                let linear = ends[0] + s * (ends[1] - ends[0]);
+                interpolation_error = interpolation_error.max((u(x[0] + s * (x[1] - x[0])) - linear).abs());
+            }
+        }
+        let (largest_jump, interpolation_error) = (Some(largest_jump), Some(interpolation_error));
+        Ok(Iterate { error, increment, largest_jump, interpolation_error, linear_solves })
+    }
+}
+
+fn distance(a: &Pieces, b: &Pieces) -> f64 {
+    let nodes = a.iter().flatten().zip(b.iter().flatten());
+    nodes.fold(0.0, |m, (a, b)| if (a - b).is_nan() { f64::INFINITY } else { m.max((a - b).abs()) })
+}
+
+/// The geometric mean of E_{n+2}/E_n over the last n with E_{n+2} above rounding.
+fn observed(iterates: &[Iterate]) -> Option<f64> {
+    let above: Vec<f64> = iterates.iter().map(|i| i.error).take_while(|error| *error > ROUNDING).collect();
+    // the first half of a fast iteration is not yet asymptotic
+    let pairs = above.len().saturating_sub(2);
+    let pairs = LAST.min(pairs.div_ceil(2));
+    if pairs == 0 {
+        return None;
+    }
+    let logs = (above.len() - 2 - pairs..above.len() - 2).map(|n| (above[n + 2] / above[n]).ln());
+    Some((logs.sum::<f64>() / pairs as f64).exp())
+}

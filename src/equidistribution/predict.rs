@@ -1,0 +1,143 @@
+use super::{Line, Method, Robin, Sweep};
+use crate::error::Failure;
+use serde::Serialize;
+
+/// What theory says of the contraction in two iterations
+///
+/// | method | predicted | bound |
+/// |---|---|---|
+/// | classical, I pieces | ρ(A)², A the matrix that maps errors of ∫M at the ends of pieces to the next (6.4); (α/β)(1−β)/(1−α) for two (theorem 3.2) | theorem 6.5, for equal pieces |
+/// | alternating, two pieces | its square: it contracts so much in each iteration | |
+/// | optimal | 0 after I iterations (theorem 4.1) | |
+/// | optimised, two pieces | \|p − m/α\|\|p − m/(1−α)\| / ((p + m/α)(p + m/(1−α))), m = M(x(α)) | (5.7) |
+/// | in time, two pieces | | theorem 7.2 |
+///
+/// Nothing is known of the linearised method: theorem 3.4 does not hold.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Prediction {
+    /// The asymptotic contraction.
+    pub predicted: Option<f64>,
+    /// An upper bound.
+    pub bound: Option<f64>,
+}
+
+/// Places at which the extremes of M are looked for.
+const PLACES: usize = 2000;
+
+impl Prediction {
+    pub(super) fn of(
+        line: &Line,
+        t: f64,
+        ranges: &[[usize; 2]],
+        method: Method,
+        mesh: &[f64],
+        ratio: Option<f64>,
+    ) -> Result<Self, Failure> {
+        let count = ranges.len();
+        let xi = |node: usize| node as f64 / line.cells as f64;
+        let extremes = || {
+            let [a, b] = line.ends;
+            let places: Vec<f64> = (0..=PLACES).map(|k| a + (b - a) * k as f64 / PLACES as f64).collect();
+            let m = line.density.at_each(t, &places)?;
+            Ok::<_, Failure>(m.iter().fold([f64::INFINITY, 0.0], |[low, high], m| [low.min(m[0]), high.max(m[0])]))
+        };
+        Ok(match (method, ratio) {
+            (Method::Classical { linearized: true, .. }, _) => Self::default(),
+            (Method::Classical { coarse: super::Coarse::Galerkin, .. }, _) => Self::default(),
+            (Method::Classical { .. }, Some(ratio)) if count == 2 => {
+                let (alpha, beta) = (xi(ranges[1][0]), xi(ranges[0][1]));
+                let root = (ratio / extremes()?[1]).sqrt();
+                let sinh = |s: f64| (root * s).sinh();
+                let bound = sinh(alpha) * sinh(1.0 - beta) / (sinh(beta) * sinh(1.0 - alpha));
+                Self { predicted: None, bound: Some(bound) }
+            }
+            (_, Some(_)) => Self::default(),
+            (Method::Classical { sweep, .. }, None) => {
+                let radius = interface_radius(&ranges.iter().map(|r| r.map(xi)).collect::<Vec<_>>());
+                let predicted = match sweep {
+                    Sweep::Parallel => Some(radius * radius),
+                    Sweep::Alternating if count == 2 => Some(radius.powi(4)),
+                    Sweep::Alternating => None,
+                };
+                let widths: Vec<usize> = ranges.iter().map(|[first, last]| last - first).collect();
+                let overlaps: Vec<usize> = ranges.windows(2).map(|r| r[0][1] - r[1][0]).collect();
+                let equal = widths.iter().all(|w| *w == widths[0]) && overlaps.iter().all(|o| *o == overlaps[0]);
+                let bound = (equal && sweep == Sweep::Parallel && count > 1).then(|| {
+                    let r = overlaps[0] as f64 / widths[0] as f64;
+                    let sine = (std::f64::consts::PI / (2.0 * (count as f64 + 1.0))).sin();
+                    1.0 - 4.0 * r * (1.0 - r) * sine * sine
+                });
+                Self { predicted, bound }
+            }
+            (Method::Optimal { .. }, None) => Self { predicted: Some(0.0), bound: Some(0.0) },
+            (Method::Optimized { robin }, None) if count == 2 => {
+                let cut = ranges[0][1];
+                let alpha = xi(cut);
+                let m = line.density.at(t, mesh[cut])?[0];
+                let rate = |left: f64, right: f64| {
+                    let factor = |p: f64, m: f64| (p - m).abs() / (p + m);
+                    factor(left, m / (1.0 - alpha)) * factor(right, m / alpha)
+                };
+                match robin {
+                    Robin::Value(p) => {
+                        // each piece answers the law of its own end: M/α on the left, M/(1 − α) on the right
+                        let predicted = (p - m / alpha).abs() * (p - m / (1.0 - alpha)).abs()
+                            / ((p + m / alpha) * (p + m / (1.0 - alpha)));
+                        let [low, high] = extremes()?;
+                        let factor = |width: f64| {
+                            let (square, product) = (p * p + (high / width).powi(2), 2.0 * p * low / width);
+                            ((square - product) / (square + product)).sqrt()
+                        };
+                        Self { predicted: Some(predicted), bound: Some(factor(alpha) * factor(1.0 - alpha)) }
+                    }
+                    Robin::Auto => Self { predicted: Some(rate(m / alpha, m / alpha)), bound: None },
+                    Robin::Lagged => Self { predicted: Some(rate(m / (1.0 - alpha), m / alpha)), bound: None },
+                }
+            }
+            (Method::Optimized { .. }, None) => Self::default(),
+        })
+    }
+}
+
+/// ρ(A): errors of ∫M are linear between the ends of a piece, so that the one at a node inside it is their mean by distance.
+fn interface_radius(pieces: &[[f64; 2]]) -> f64 {
+    let count = pieces.len();
+    if count < 2 {
+        return 0.0;
+    }
+    // errors at the left and right end of each piece; those of the whole line are 0
+    let next = |errors: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        let at = |s: usize, xi: f64| {
+            let [a, b] = pieces[s];
+            let along = (xi - a) / (b - a);
+            (1.0 - along) * errors[s][0] + along * errors[s][1]
+        };
+        (0..count)
+            .map(|s| {
+                let left = if s == 0 { 0.0 } else { at(s - 1, pieces[s][0]) };
+                let right = if s + 1 == count { 0.0 } else { at(s + 1, pieces[s][1]) };
+                [left, right]
+            })
+            .collect()
+    };
+    let mut errors = vec![[1.0; 2]; count];
+    (errors[0][0], errors[count - 1][1]) = (0.0, 0.0);
+    let norm = |e: &[[f64; 2]]| e.iter().flatten().map(|e| e * e).sum::<f64>().sqrt();
+    let mut rate = 0.0;
+    // A² keeps the two classes of ends apart that exchange places under A
+    for _ in 0..20_000 {
+        let after = next(&next(&errors));
+        let size = norm(&after);
+        let new = size / norm(&errors);
+        if size == 0.0 {
+            return 0.0;
+        }
+        errors = after.iter().map(|e| e.map(|e| e / size)).collect();
+        if (new - rate).abs() <= 1e-14 {
+            rate = new;
+            break;
+        }
+        rate = new;
+    }
+    rate.sqrt()
+}
