@@ -51,6 +51,7 @@ pub mod geometry;
 pub mod numerics;
 
 pub mod density;
+pub mod laplacian;
 pub mod meshing;
 pub mod physics;
 

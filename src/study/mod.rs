@@ -1,9 +1,17 @@
 //! From a study file to a run: text → checked parts → simulation → run directory.
 
+mod mapped;
+mod memory;
 mod moving_mesh;
+mod poisson;
 mod run;
 mod source;
 
 pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
+pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
+pub use poisson::{
+    Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonSeconds, PoissonStudy, PoissonSummary, Sides, Solved,
+    StencilReport,
+};
 pub use run::{Finished, compute, run};
 pub use source::Source;
