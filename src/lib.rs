@@ -55,6 +55,8 @@ pub mod laplacian;
 pub mod meshing;
 pub mod physics;
 
+pub mod stefan;
+
 pub mod simulation;
 
 pub mod study;

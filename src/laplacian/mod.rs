@@ -93,7 +93,7 @@ impl Laplacian {
 }
 
 /// Condition numbers above this are told: exactness of degree 2 then falls behind 1e-11.
-pub const NEAR_DEGENERATE: f64 = 1e4;
+pub const NEAR_DEGENERATE: f64 = 3e3;
 
 /// The weights of all nodes of a mesh that are not on a bounded side
 ///

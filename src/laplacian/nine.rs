@@ -84,10 +84,14 @@ fn each(
         let (mut a, condition) = weights(&Neighbourhood { e, h });
         let unit = unit * unit;
         let mut sum = Lanes::ZERO;
-        for a in &mut a {
+        let mut terms = Lanes::ZERO;
+        for (a, e) in a.iter_mut().zip(&e) {
+            terms += a.abs() * e[0].abs().max(e[1].abs());
             *a = *a * unit;
             sum += *a;
         }
+        // the size of what must cancel in Σ a_j d_j
+        let condition = condition.max(terms);
         for l in 0..LANES.min(count - first) {
             let row = &mut rows[first + l];
             row[0] = -sum.0[l];
@@ -133,7 +137,24 @@ fn optimised(near: &Neighbourhood) -> Weights {
     for j in 0..8 {
         a[j] = a[j] * shares[j];
     }
+    // shares differ by orders of magnitude in flat cells: once more for what round-off left
+    let correction = qr.shortest(&missing(near, &a));
+    for j in 0..8 {
+        a[j] += correction[j] * shares[j];
+    }
     (a, qr.condition())
+}
+
+/// What the weights leave of the Laplacians of the five quadratics.
+#[inline(always)]
+fn missing(near: &Neighbourhood, a: &[Lanes; 8]) -> [Lanes; 5] {
+    let mut c = laplacians();
+    for j in 0..8 {
+        for (c, p) in c.iter_mut().zip(quadratics(near.e[j])) {
+            *c -= a[j] * p;
+        }
+    }
+    c
 }
 
 /// Exact for all quadratics; the other three freedoms make the harmonic cubics to quintics vanish as well as they can,
@@ -170,6 +191,10 @@ fn harmonic(near: &Neighbourhood) -> Weights {
         a[5 + i] = z[i];
     }
     qr.multiply(&mut a);
+    let correction = qr.shortest(&missing(near, &a));
+    for j in 0..8 {
+        a[j] += correction[j];
+    }
     (a, qr.condition().max(freedoms.condition()))
 }
 

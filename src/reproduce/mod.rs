@@ -1,11 +1,13 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
 mod interface_study;
+mod laplacian;
 mod payoff;
 mod table;
 mod tables;
 
 pub use interface_study::{InterfaceStep, Measured};
+pub use laplacian::slides_error;
 pub use table::Table;
 
 use crate::error::Result;

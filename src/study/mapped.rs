@@ -51,7 +51,7 @@ pub struct Distort {
     /// Of the random numbers; 0 where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// c of r ← r + c sin(2πs) sin(πr).
+    /// c of s ← s + c sin(2πr) sin(πs).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear: Option<f64>,
 }
@@ -218,7 +218,7 @@ impl MappedDomain {
                 std::array::from_fn(|d| place[d] + share * h[d] * (2.0 * uniform(words.word()) - 1.0))
             }
             Some(Distort { shear: Some(c), .. }) if !lattice.on_side(k) => {
-                [place[0], place[1] + c * (2.0 * PI * place[0]).sin() * (PI * place[1]).sin()]
+                [place[0] + c * (2.0 * PI * place[1]).sin() * (PI * place[0]).sin(), place[1]]
             }
             _ => place,
         }

@@ -1,5 +1,6 @@
 //! From a study file to a run: text → checked parts → simulation → run directory.
 
+mod any;
 mod mapped;
 mod memory;
 mod moving_mesh;
@@ -8,9 +9,10 @@ mod run;
 mod source;
 
 pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
+pub use any::Study;
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
 pub use poisson::{
-    Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonSeconds, PoissonStudy, PoissonSummary, Sides, Solved,
+    Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary, Sides, Solved,
     StencilReport,
 };
 pub use run::{Finished, compute, run};
