@@ -17,6 +17,10 @@ impl Check {
         let study = match self.study.read()? {
             Study::MovingMesh(study) => study,
             Study::Poisson(study) => return Ok(valid(&study.to_toml(), study.memory())),
+            Study::Stefan(study) => {
+                study.warnings()?.iter().for_each(|warning| warn(warning));
+                return Ok(valid(&study.to_toml(), study.memory()));
+            }
         };
         study.warnings()?.iter().for_each(|warning| warn(warning));
         if let Err(error) = study.start(&study.simulation()?, &mut Vec::new()) {

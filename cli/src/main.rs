@@ -6,6 +6,7 @@ mod poisson;
 mod progress;
 mod reproduce;
 mod run;
+mod stefan;
 mod terminal;
 
 use clap::{Args, Parser, Subcommand};

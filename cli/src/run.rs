@@ -1,4 +1,4 @@
-use crate::{StudyArgs, poisson, progress::Progress, terminal};
+use crate::{StudyArgs, poisson, progress::Progress, stefan, terminal};
 use clap::Args;
 use driftmesh::meshing::Interface;
 use driftmesh::simulation::{Observer, RunDirectory, Summary};
@@ -30,6 +30,7 @@ impl Run {
         match study {
             Study::MovingMesh(study) => self.moving_mesh(&study, &out),
             Study::Poisson(study) => poisson::run(&study, &out, self.quiet),
+            Study::Stefan(study) => stefan::run(&study, &out, self.quiet),
         }
     }
 

@@ -1,4 +1,4 @@
-use super::{MovingMesh, PoissonStudy, Source, StudyKind};
+use super::{MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
 use crate::error::Result;
 use serde::Deserialize;
 
@@ -10,6 +10,8 @@ pub enum Study {
     MovingMesh(MovingMesh),
     /// Of kind `poisson`.
     Poisson(PoissonStudy),
+    /// Of kind `stefan`.
+    Stefan(StefanStudy),
 }
 
 impl Study {
@@ -29,6 +31,7 @@ impl Study {
         // whatever is wrong before the kind is known is told by the reader of the first kind
         match source.parse::<Peek>().map(|peek| peek.study.kind) {
             Ok(StudyKind::Poisson) => PoissonStudy::from_source(source).map(Self::Poisson),
+            Ok(StudyKind::Stefan) => StefanStudy::from_source(source).map(Self::Stefan),
             _ => MovingMesh::from_source(source).map(Self::MovingMesh),
         }
     }
@@ -38,6 +41,7 @@ impl Study {
         match self {
             Self::MovingMesh(study) => &study.study.name,
             Self::Poisson(study) => &study.study.name,
+            Self::Stefan(study) => &study.study.name,
         }
     }
 }

@@ -1,15 +1,18 @@
 //! From a study file to a run: text → checked parts → simulation → run directory.
 
 mod any;
+mod front_run;
 mod mapped;
 mod memory;
 mod moving_mesh;
 mod poisson;
 mod run;
 mod source;
+mod stefan;
 
 pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
 pub use any::Study;
+pub use front_run::{FrontError, FrontFigures, FrontFinished, FrontReport, FrontSeconds, StefanSummary};
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
 pub use poisson::{
     Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary, Sides, Solved,
@@ -17,3 +20,6 @@ pub use poisson::{
 };
 pub use run::{Finished, compute, run};
 pub use source::Source;
+pub use stefan::{
+    Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy, Walls,
+};
