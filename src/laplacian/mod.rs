@@ -130,8 +130,11 @@ pub fn stencils(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
     unchecked(mesh, laplacian)
 }
 
-/// [`stencils`] of a mesh that is known not to be folded.
-pub(crate) fn unchecked(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
+/// [`stencils`] of a mesh that is known not to be folded, such as one that was checked before.
+///
+/// # Errors
+/// As [`stencils`], without [`Failure::Folded`].
+pub fn unchecked(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
     let (lattice, extent) = (mesh.lattice(), mesh.extent());
     let patch = Patch::whole(lattice);
     if laplacian == Laplacian::Compact25 {

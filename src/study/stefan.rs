@@ -1,9 +1,10 @@
 //! Studies of kind `stefan`: what they say.
 
 use super::mapped::{Ends, check_between, parse};
-use super::{Header, Output, Source};
+use super::{Header, LaplacianTable, Output, Source};
 use crate::error::{Error, Failure, Result};
 use crate::formula::Formula;
+use crate::laplacian::Laplacian;
 use crate::setting::{Auto, fixed, pair};
 use crate::simulation::{FramesAt, Schedule};
 use crate::stefan::{Columns, Filter, Front, FrontState, LOWER, Method, Problem, Similarity, Stepping, Transfer, UPPER};
@@ -29,6 +30,9 @@ pub struct StefanStudy {
     /// `[walls]`.
     #[serde(default)]
     pub walls: Walls,
+    /// `[laplacian]`: the discrete Laplacian, of nine points.
+    #[serde(default)]
+    pub laplacian: LaplacianTable,
     /// `[exact]`: in place of the formulas of initial state, walls and front.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<ExactFront>,
@@ -408,6 +412,11 @@ impl StefanStudy {
         front.filter = self.front.filter;
         front.stepping = self.front.stepping;
         front.sides = self.walls.sides;
+        front.laplacian = self.laplacian.laplacian()?;
+        if front.laplacian == Laplacian::Compact25 {
+            let rule = "its 25 points reach across the front; take another kind";
+            return Err(Error::invalid("laplacian.kind", "\"compact25\"", rule));
+        }
         let given = self.given()?;
         let schedule = self.schedule(&given).map_err(|error| error.within("time"))?;
         let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
