@@ -1,5 +1,6 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
+mod fronts;
 mod interface_study;
 mod laplacian;
 mod payoff;
@@ -45,6 +46,13 @@ pub const ITEMS: &[Item] = &[
         line: "time to an error of 1e-2 against the viscosity, on moving and on uniform meshes",
         run: payoff::run,
     },
+    Item {
+        name: "laplacian-table",
+        line: "the optimised Laplacian and its rivals on three meshes, and the slides' table",
+        run: laplacian::run,
+    },
+    Item { name: "stefan-slides", line: "the slides' front between ice and water, with balances", run: fronts::slides },
+    Item { name: "stefan-exact", line: "fronts against three exact solutions, by every method", run: fronts::exact },
 ];
 
 impl Item {

@@ -9,7 +9,7 @@ pub const UPPER: usize = 1;
 /// A phase thinner than this share of its column vanishes.
 const VANISHED: f64 = 2e-3;
 /// A steeper front is no graph any more.
-const STEEP: f64 = 20.0;
+const STEEP: f64 = 10.0;
 
 /// Equally spaced columns between two walls; rows of both phases, closer near the front
 ///

@@ -5,7 +5,7 @@ use crate::error::{Failure, Result};
 use crate::geometry::Patch;
 use crate::laplacian::{Laplacian, unchecked};
 use crate::numerics::larger;
-use crate::numerics::linear::{LatticeMatrix, LinearSolver, SparseLu};
+use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 
 /// What a phase goes through in a step.
 pub(super) struct HeatStep<'a> {
@@ -39,7 +39,7 @@ pub(super) fn end_slope(y: [f64; 3], u: [f64; 3]) -> f64 {
 
 impl HeatStep<'_> {
     /// (u − uⁿ)/Δt − w ∂u/∂y = D Δu for u on the new mesh.
-    pub fn solve(&self, lu: &mut SparseLu, laplacian: Laplacian) -> Result<Vec<f64>> {
+    pub fn solve(&self, solver: &mut Robust<1>, laplacian: Laplacian) -> Result<Vec<f64>> {
         let mesh = self.columns.mesh(self.phase, self.y, self.mirrored)?;
         let stencils = unchecked(&mesh, laplacian)?;
         let Some(nine) = stencils.nine_points() else { return Ok(self.sides.to_vec()) };
@@ -90,7 +90,7 @@ impl HeatStep<'_> {
         }
         let size = self.sides.iter().chain(self.u).copied().fold(0.0, larger);
         // what round-off allows: the rows are scaled with the identity
-        lu.solve(&matrix, &b, &mut x, [1e-14 * largest * size.max(f64::MIN_POSITIVE)])?;
+        solver.solve(&matrix, &b, &mut x, [4e-15 * largest * size.max(f64::MIN_POSITIVE)])?;
         let mut u = self.sides.to_vec();
         for (p, x) in x.chunks_exact(width).enumerate().skip(1).take(count) {
             let i = p + first - 1;

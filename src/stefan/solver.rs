@@ -6,7 +6,7 @@ use super::implicit::Response;
 use crate::error::{Error, Failure, Result};
 use crate::laplacian::Laplacian;
 use crate::numerics::larger;
-use crate::numerics::linear::SparseLu;
+use crate::numerics::linear::Robust;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
@@ -82,8 +82,8 @@ pub struct Front {
     pub sides: Sides,
     /// The discrete Laplacian, of nine points.
     pub laplacian: Laplacian,
-    /// Analysed systems of both phases.
-    solvers: [SparseLu; 2],
+    /// Of both phases.
+    solvers: [Robust<1>; 2],
     /// Of the last step.
     response: Option<(f64, Response)>,
 }
