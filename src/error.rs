@@ -322,9 +322,15 @@ impl Failure {
             }
             Self::Subdomains { .. } => "give every axis between one subdomain and one a cell",
             Self::SelfTouching { .. } => "mend domain.map, or lower domain.distort",
-            Self::DegenerateStencil { .. } => "make the cells around it less flat: lower domain.distort or grid.grading",
-            Self::FrontOutside { .. } | Self::VanishingPhase { .. } => "end earlier with time.end, or move the walls away",
-            Self::NotAGraph { .. } => "end earlier with time.end, or refine grid.cells; a front that turns over needs another method",
+            Self::DegenerateStencil { .. } => {
+                "make the cells around it less flat: lower domain.distort or grid.grading"
+            }
+            Self::FrontOutside { .. } | Self::VanishingPhase { .. } => {
+                "end earlier with time.end, or move the walls away"
+            }
+            Self::NotAGraph { .. } => {
+                "end earlier with time.end, or refine grid.cells; a front that turns over needs another method"
+            }
             Self::FrontUnstable { .. } => "lower time.step, set it to \"auto\", or set front.stepping to \"implicit\"",
             Self::WrongSide { .. } => "let the lower phase be the warm one: mend the initial and boundary formulas",
             Self::WrongLength { .. } => "give one value a node, in lattice order",

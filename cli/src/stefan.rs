@@ -35,7 +35,8 @@ pub fn run(study: &StefanStudy, out: &Path, quiet: bool) -> driftmesh::Result<Ex
 
 /// Fronts, errors and balances in a few lines.
 fn table(summary: &StefanSummary) -> String {
-    let mut text = String::from("       t  front mean       min       max  front error  u error    energy  3-point  step limit\n");
+    let mut text =
+        String::from("       t  front mean       min       max  front error  u error    energy  3-point  step limit\n");
     for report in &summary.reports {
         let figure = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.2e}"));
         text += &format!(
@@ -56,5 +57,8 @@ fn table(summary: &StefanSummary) -> String {
     if work.work.newton_iterations > 0 {
         text += &format!(", {} Newton iterations", work.work.newton_iterations);
     }
-    text + &format!("\nseconds  {:.2} (pde {:.2}, output {:.2}), {} threads", s.wall, s.pde, s.output, summary.parallel.threads)
+    text + &format!(
+        "\nseconds  {:.2} (pde {:.2}, output {:.2}), {} threads",
+        s.wall, s.pde, s.output, summary.parallel.threads
+    )
 }

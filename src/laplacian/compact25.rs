@@ -1,5 +1,8 @@
 //! Σ a_j u(x_j) = Σ b_j Δu(x_j) on 5 × 5 points, exact to degree 5.
 
+// loops over places of several arrays of one length, which the compiler makes vectors of
+#![allow(clippy::needless_range_loop)]
+
 use super::{Stencils, degenerate, stencils::Window};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, Patch};

@@ -196,7 +196,11 @@ impl Laplacian {
             }
             _ => {
                 let names: Vec<&str> = Self::KINDS.iter().map(|(name, _)| *name).collect();
-                return Err(Error::invalid("kind", format!("\"{name}\""), format!("must be one of {}", names.join(", "))));
+                return Err(Error::invalid(
+                    "kind",
+                    format!("\"{name}\""),
+                    format!("must be one of {}", names.join(", ")),
+                ));
             }
         };
         let key = if polynomials.is_some() { "polynomials" } else { "scaling" };

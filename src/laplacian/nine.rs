@@ -1,5 +1,8 @@
 //! Weights on the eight neighbours of a node, for several nodes side by side.
 
+// loops over places of several arrays of one length, which the compiler makes vectors of
+#![allow(clippy::needless_range_loop)]
+
 use super::{Laplacian, Polynomials, Scaling};
 use crate::numerics::lanes::{LANES, Lanes, Qr};
 
@@ -187,9 +190,7 @@ fn harmonic(near: &Neighbourhood) -> Weights {
     }
     let freedoms = Qr::new(free);
     let z = freedoms.least_squares(fixed);
-    for i in 0..3 {
-        a[5 + i] = z[i];
-    }
+    a[5..].copy_from_slice(&z);
     qr.multiply(&mut a);
     let correction = qr.shortest(&missing(near, &a));
     for j in 0..8 {

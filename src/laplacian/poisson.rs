@@ -86,9 +86,9 @@ impl Poisson<'_> {
     pub fn neumann_side(&self, lattice: &Lattice<2>, index: usize) -> Option<(usize, bool)> {
         let beyond = lattice.beyond(index);
         let on = |kind: bool| {
-            (0..2).flat_map(|d| [(d, false), (d, true)]).find(move |&(d, upper)| {
-                beyond[d][usize::from(upper)] && self.neumann[d][usize::from(upper)] == kind
-            })
+            (0..2)
+                .flat_map(|d| [(d, false), (d, true)])
+                .find(move |&(d, upper)| beyond[d][usize::from(upper)] && self.neumann[d][usize::from(upper)] == kind)
         };
         if on(false).is_some() { None } else { on(true) }
     }

@@ -60,7 +60,8 @@ impl Stencils {
             let node = node(&patch, k);
             let x = mesh.x()[mesh.lattice().index(node)];
             // the slides' columns differ in size by design: their condition says nothing about the mesh
-            let near = !matches!(laplacian, Laplacian::Published { .. }) && !(condition <= NEAR_DEGENERATE);
+            let near = !matches!(laplacian, Laplacian::Published { .. })
+                && (condition.is_nan() || condition > NEAR_DEGENERATE);
             near.then_some(NearDegenerate { node, x, condition })
         };
         let near_degenerate = conditions.iter().enumerate().filter_map(tell).collect();
@@ -101,9 +102,8 @@ impl Stencils {
         let [i, j] = node(&self.patch, k);
         match &self.rows {
             Rows::Nine(rows) => {
-                let place = |c: usize, d: usize, step: isize| {
-                    (c as isize + step).rem_euclid(self.nodes[d] as isize) as usize
-                };
+                let place =
+                    |c: usize, d: usize, step: isize| (c as isize + step).rem_euclid(self.nodes[d] as isize) as usize;
                 let points = LatticeMatrix::<2, 9>::POINTS.iter().zip(&rows[k]);
                 let entry = |([p, q], a): (&[isize; 2], &f64)| {
                     let source = if *p == 0 && *q == 0 { 1.0 } else { 0.0 };

@@ -3,6 +3,9 @@
 //! Everything is inlined into its caller, so that [`pulp`] can compile the whole of it for wider vectors. Products and
 //! sums are not fused: a lane has the same bits on every machine.
 
+// loops over places of several arrays of one length, which the compiler makes vectors of
+#![allow(clippy::needless_range_loop)]
+
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Matrices side by side.

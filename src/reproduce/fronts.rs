@@ -14,7 +14,17 @@ fn compute(rest: &str) -> Result<FrontFinished> {
 pub fn slides(options: Options) -> Result<Vec<Table>> {
     let mut table = Table::new(
         "The slides' front at t = .85",
-        &["columns × rows", "settings", "h(0)", "h(±1)", "asymmetry", "4th difference at the walls", "energy", "3-point", "verdict"],
+        &[
+            "columns × rows",
+            "settings",
+            "h(0)",
+            "h(±1)",
+            "asymmetry",
+            "4th difference at the walls",
+            "energy",
+            "3-point",
+            "verdict",
+        ],
     );
     let settings = [
         ("(1,6,1)/8, as recommended", ""),
@@ -49,7 +59,13 @@ pub fn slides(options: Options) -> Result<Vec<Table>> {
                 && asymmetry <= 1e-12
                 && fourth < 1e-4
                 && report.energy_imbalance.is_some_and(|miss| miss <= 0.01);
-            let verdict = if !asked { "" } else if meets { "meets 1.2328, 1.2251 ± 5e-4, 1 %" } else { "misses" };
+            let verdict = if !asked {
+                ""
+            } else if meets {
+                "meets 1.2328, 1.2251 ± 5e-4, 1 %"
+            } else {
+                "misses"
+            };
             table.row([
                 size,
                 name.into(),
@@ -71,7 +87,12 @@ pub fn slides(options: Options) -> Result<Vec<Table>> {
 pub fn exact(options: Options) -> Result<Vec<Table>> {
     let cases = [
         ("planar", "kind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\n", "", [1.5e-4, 3e-5]),
-        ("tilted by 20°", "kind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\ntilt = 20.0\n", "[walls]\nsides = \"exact\"\n", [2e-4, 5e-5]),
+        (
+            "tilted by 20°",
+            "kind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\ntilt = 20.0\n",
+            "[walls]\nsides = \"exact\"\n",
+            [2e-4, 5e-5],
+        ),
         (
             "line source",
             "kind = \"line-source\"\nstrength = 8.0\nfar = -0.3\nstart_radius = 1.5\ncentre = [0.0, -0.5]\n",
@@ -120,9 +141,7 @@ pub fn exact(options: Options) -> Result<Vec<Table>> {
                 (_, None) => "lost".into(),
                 (_, Some(error)) => format!("{error:.2e}"),
             };
-            let order = |k: usize| {
-                at(k).zip(at(k + 1)).map_or("".into(), |(a, b)| format!("{:.2}", (a / b).log2()))
-            };
+            let order = |k: usize| at(k).zip(at(k + 1)).map_or("".into(), |(a, b)| format!("{:.2}", (a / b).log2()));
             let met = at(0).is_some_and(|e| e <= most[0])
                 && at(1).is_some_and(|e| e <= most[1])
                 && (found.len() < 3 || case != "line source" || at(2).is_some_and(|e| e <= 1.8e-5));

@@ -133,7 +133,9 @@ impl Columns {
     /// Values of both phases in the order of [`whole`](Self::whole).
     pub fn joined(&self, u: &[Vec<f64>; 2]) -> Vec<f64> {
         let [n, m] = self.rows;
-        let column = |i: usize| u[LOWER][i * (n + 1)..(i + 1) * (n + 1)].iter().chain(&u[UPPER][i * (m + 1) + 1..(i + 1) * (m + 1)]);
+        let column = |i: usize| {
+            u[LOWER][i * (n + 1)..(i + 1) * (n + 1)].iter().chain(&u[UPPER][i * (m + 1) + 1..(i + 1) * (m + 1)])
+        };
         (0..self.x.len()).flat_map(column).copied().collect()
     }
 

@@ -114,8 +114,7 @@ impl Phase<'_> {
         let mut sum = 0.0;
         self.integrate(|corners, point| {
             let (mut du, mut dphi, mut u, mut w) = ([0.0; 2], [0.0; 2], 0.0, 0.0);
-            for c in 0..4 {
-                let k = corners[c];
+            for (c, k) in corners.into_iter().enumerate() {
                 for d in 0..2 {
                     du[d] += point.gradient[c][d] * self.u[k];
                     dphi[d] += point.gradient[c][d] * self.test(k);
@@ -133,7 +132,8 @@ impl Phase<'_> {
         let (m, dx, n) = (self.nodes(), self.columns.spacing(), self.columns.x().len());
         let [_, wall] = self.columns.ends(self.phase);
         let on_wall: Vec<f64> = (0..n).map(|i| self.u[i * m + wall]).collect();
-        let [u_x, slope_x] = [&on_wall, &self.columns.wall(self.phase).to_vec()].map(|f| super::front::tilt(self.columns, f, false));
+        let [u_x, slope_x] =
+            [&on_wall, &self.columns.wall(self.phase).to_vec()].map(|f| super::front::tilt(self.columns, f, false));
         let flux = |i: usize| {
             let row = |k: usize| i * m + if wall == 0 { k } else { wall - k };
             let at = |f: &[f64]| [f[row(0)], f[row(1)], f[row(2)]];
@@ -150,11 +150,16 @@ impl Phase<'_> {
         let mut sums = [0.0; 2];
         for (side, inner, outer) in [(0, 1, 2), (n - 1, n - 2, n - 3)] {
             let flux = |j: usize| {
-                let along = |f: &[f64]| (4.0 * f[inner * m + j] - 3.0 * f[side * m + j] - f[outer * m + j]) / (2.0 * dx);
+                let along =
+                    |f: &[f64]| (4.0 * f[inner * m + j] - 3.0 * f[side * m + j] - f[outer * m + j]) / (2.0 * dx);
                 let k = side * m + j;
                 let u_y = match j {
-                    0 => end_slope([self.y[k], self.y[k + 1], self.y[k + 2]], [self.u[k], self.u[k + 1], self.u[k + 2]]),
-                    j if j + 1 == m => end_slope([self.y[k], self.y[k - 1], self.y[k - 2]], [self.u[k], self.u[k - 1], self.u[k - 2]]),
+                    0 => {
+                        end_slope([self.y[k], self.y[k + 1], self.y[k + 2]], [self.u[k], self.u[k + 1], self.u[k + 2]])
+                    }
+                    j if j + 1 == m => {
+                        end_slope([self.y[k], self.y[k - 1], self.y[k - 2]], [self.u[k], self.u[k - 1], self.u[k - 2]])
+                    }
                     _ => {
                         let w = slope([self.y[k - 1], self.y[k], self.y[k + 1]]);
                         w[0] * self.u[k - 1] + w[1] * self.u[k] + w[2] * self.u[k + 1]

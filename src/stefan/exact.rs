@@ -35,8 +35,15 @@ pub struct Similarity {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shape {
     /// Temperature of the wall; sine and cosine of its angle; its distance from the origin.
-    Planar { wall: f64, tilt: [f64; 2], offset: f64 },
-    LineSource { strength: f64, centre: [f64; 2] },
+    Planar {
+        wall: f64,
+        tilt: [f64; 2],
+        offset: f64,
+    },
+    LineSource {
+        strength: f64,
+        centre: [f64; 2],
+    },
 }
 
 impl Similarity {
@@ -48,7 +55,7 @@ impl Similarity {
     pub fn planar([wall, far]: [f64; 2], diffusivity: [f64; 2], mobility: f64, tilt: f64, offset: f64) -> Result<Self> {
         positive("wall", wall)?;
         cold(far)?;
-        if !(tilt.abs() <= 60.0) {
+        if tilt.is_nan() || tilt.abs() > 60.0 {
             return Err(Error::invalid("tilt", tilt, "must be between -60 and 60 degrees"));
         }
         if !offset.is_finite() {
@@ -71,7 +78,13 @@ impl Similarity {
     ///
     /// # Errors
     /// [`Error::Invalid`] unless the strength is positive and the temperature far away not.
-    pub fn line_source(strength: f64, far: f64, diffusivity: [f64; 2], mobility: f64, centre: [f64; 2]) -> Result<Self> {
+    pub fn line_source(
+        strength: f64,
+        far: f64,
+        diffusivity: [f64; 2],
+        mobility: f64,
+        centre: [f64; 2],
+    ) -> Result<Self> {
         positive("strength", strength)?;
         cold(far)?;
         if !centre.iter().all(|c| c.is_finite()) {
@@ -149,7 +162,7 @@ fn cold(far: f64) -> Result<()> {
 /// The zero of a function that is negative near 0 and grows through it.
 fn root(f: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut low, mut high) = (1e-12, 1.0);
-    while !(f(high) > 0.0) {
+    while f(high).is_nan() || f(high) <= 0.0 {
         high *= 2.0;
         if high > 1e6 {
             return None;
@@ -200,7 +213,9 @@ mod tests {
     /// Values of Abramowitz and Stegun, table 5.1, and the meeting of both branches.
     #[test]
     fn exponential_integral() {
-        for (z, expected) in [(0.5, 0.559_773_594_776_160_1), (1.0, 0.219_383_934_395_520_3), (2.0, 0.048_900_510_708_061_12)] {
+        for (z, expected) in
+            [(0.5, 0.559_773_594_776_160_1), (1.0, 0.219_383_934_395_520_3), (2.0, 0.048_900_510_708_061_12)]
+        {
             assert!((e1(z) / expected - 1.0).abs() < 1e-13, "{z}: {}", e1(z));
         }
         assert!((e1(1.0) / e1(1.0 + 1e-12) - 1.0).abs() < 1e-11);

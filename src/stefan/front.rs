@@ -86,7 +86,11 @@ pub(super) fn slopes(columns: &Columns, y: &[Vec<f64>; 2], u: &[Vec<f64>; 2]) ->
         let [front, _] = columns.ends(phase);
         let take = |values: &[f64], i: usize| {
             let column = &values[i * nodes..(i + 1) * nodes];
-            if front == 0 { [column[0], column[1], column[2]] } else { [column[front], column[front - 1], column[front - 2]] }
+            if front == 0 {
+                [column[0], column[1], column[2]]
+            } else {
+                [column[front], column[front - 1], column[front - 2]]
+            }
         };
         (0..columns.x().len()).map(|i| end_slope(take(&y[phase], i), take(&u[phase], i))).collect()
     })

@@ -117,7 +117,8 @@ pub(super) fn carry(y: &[f64], u: &[f64], front: usize, new: &[f64], to: &mut [f
     let toward = |j: usize| if front == last { j } else { last - j };
     let up = if front == last { 1.0 } else { -1.0 };
     let h = new[front];
-    let mut known: Vec<(f64, f64)> = (0..last).map(toward).map(|j| (y[j], u[j])).filter(|(y, _)| up * (h - y) > 0.0).collect();
+    let mut known: Vec<(f64, f64)> =
+        (0..last).map(toward).map(|j| (y[j], u[j])).filter(|(y, _)| up * (h - y) > 0.0).collect();
     known.push((h, 0.0));
     let mut k = 0;
     for j in (0..=last).map(toward) {

@@ -37,9 +37,8 @@ impl Response {
                 })
                 .collect();
             // Σ_m root_m cos(m i) cos(m j) = ½ (c(i − j) + c(i + j))
-            let c: Vec<f64> = (0..2 * (n - 1))
-                .map(|d| (0..n).map(|m| root[m] * wave[m * d % wave.len()]).sum::<f64>())
-                .collect();
+            let c: Vec<f64> =
+                (0..2 * (n - 1)).map(|d| (0..n).map(|m| root[m] * wave[m * d % wave.len()]).sum::<f64>()).collect();
             let entry = |i: usize, j: usize| 0.5 * (c[i.abs_diff(j)] + c[(i + j) % c.len()]) * half(j);
             (0..n * n).map(|k| entry(k / n, k % n)).collect()
         });

@@ -110,7 +110,7 @@ pub struct FrontState {
 }
 
 /// Newton's method ends where the front is met to this share of the box.
-const NEWTON: f64 = 1e-13;
+const NEWTON: f64 = 1e-12;
 const NEWTON_ITERATIONS: usize = 40;
 
 impl Front {
@@ -119,13 +119,19 @@ impl Front {
     /// # Errors
     /// [`Error::Invalid`] unless diffusivities and mobility are positive.
     pub fn new(columns: Columns, diffusivity: [f64; 2], mobility: f64) -> Result<Self> {
-        for (key, value) in [("phase.lower.diffusivity", diffusivity[LOWER]), ("phase.upper.diffusivity", diffusivity[UPPER])] {
+        for (key, value) in
+            [("phase.lower.diffusivity", diffusivity[LOWER]), ("phase.upper.diffusivity", diffusivity[UPPER])]
+        {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(Error::invalid(key, value, "must be above 0"));
             }
         }
         if !(mobility > 0.0 && mobility.is_finite()) {
-            return Err(Error::invalid("front.mobility", mobility, "must be above 0: it is the inverse of the latent heat"));
+            return Err(Error::invalid(
+                "front.mobility",
+                mobility,
+                "must be above 0: it is the inverse of the latent heat",
+            ));
         }
         Ok(Self {
             columns,
@@ -168,7 +174,13 @@ impl Front {
                 let nodes = self.columns.rows(phase) + 1;
                 let x = [self.columns.x()[k / nodes], self.columns.heights(phase, &front)[k]];
                 let value = u[phase][k];
-                return Err(Failure::NonFinite { what: "the initial temperature", value, node: [k / nodes, k % nodes], x }.into());
+                return Err(Failure::NonFinite {
+                    what: "the initial temperature",
+                    value,
+                    node: [k / nodes, k % nodes],
+                    x,
+                }
+                .into());
             }
         }
         let mut state = FrontState { t, step: 0, front, u, energy: Energy::default() };
@@ -271,7 +283,13 @@ impl Front {
             if self.transfer == Transfer::Interpolate {
                 for i in 0..=last {
                     let part = i * nodes..(i + 1) * nodes;
-                    carry(&old[phase][part.clone()], &state.u[phase][part.clone()], front, &new[phase][part.clone()], &mut u[part]);
+                    carry(
+                        &old[phase][part.clone()],
+                        &state.u[phase][part.clone()],
+                        front,
+                        &new[phase][part.clone()],
+                        &mut u[part],
+                    );
                 }
             }
             let mut sides = u.clone();
@@ -284,7 +302,13 @@ impl Front {
                     let x = [self.columns.x()[i], new[phase][k]];
                     sides[k] = problem.boundary(phase, x, t);
                     if !sides[k].is_finite() {
-                        return Err(Failure::NonFinite { what: "the boundary temperature", value: sides[k], node: [i, j], x }.into());
+                        return Err(Failure::NonFinite {
+                            what: "the boundary temperature",
+                            value: sides[k],
+                            node: [i, j],
+                            x,
+                        }
+                        .into());
                     }
                 }
             }
@@ -319,7 +343,8 @@ impl Front {
             Some((known, response)) if known == dt => response,
             _ => Response::new(&self.columns, self.diffusivity, dt),
         };
-        let box_height = self.columns.wall(UPPER).iter().zip(self.columns.wall(LOWER)).fold(0.0_f64, |m, (c, b)| m.max(c - b));
+        let box_height =
+            self.columns.wall(UPPER).iter().zip(self.columns.wall(LOWER)).fold(0.0_f64, |m, (c, b)| m.max(c - b));
         let tolerance = NEWTON * box_height;
         // the front as it stands is in the box whatever the step; where sides are given it follows them
         let mut h = state.front.clone();

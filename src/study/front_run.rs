@@ -193,7 +193,8 @@ impl StefanStudy {
             let mut leave = |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState| {
                 if let Some(row) = row {
                     tables.write(row, &state.front)?;
-                    let due = curves.last().is_none_or(|_| snapshot.share >= curves.len() as f64 / CURVES as f64 - 1e-9);
+                    let due =
+                        curves.last().is_none_or(|_| snapshot.share >= curves.len() as f64 / CURVES as f64 - 1e-9);
                     if due {
                         curves.push((state.t, state.front.clone()));
                     }
@@ -269,8 +270,7 @@ impl StefanStudy {
         let margin = (0.05 * (high - low)).max(1e-3 * high.abs().max(1e-12));
         let x = prepared.front.columns.x();
         let title = format!("{}, the front over time", self.study.name);
-        let picture =
-            draw_curves(&title, "t", x, &curves, [x[0], low - margin], [x[x.len() - 1], high + margin]);
+        let picture = draw_curves(&title, "t", x, &curves, [x[0], low - margin], [x[x.len() - 1], high + margin]);
         directory.write("front.svg", picture.svg.as_bytes())?;
         directory.write("front.png", &picture.png)
     }
@@ -374,7 +374,10 @@ fn report(front: &Front, given: &dyn Problem, state: &FrontState) -> FrontReport
         t: state.t,
         front: FrontFigures {
             mean: (inner + 0.5 * (h[0] + h[last])) / last as f64,
-            range: [h.iter().copied().fold(f64::INFINITY, f64::min), h.iter().copied().fold(f64::NEG_INFINITY, f64::max)],
+            range: [
+                h.iter().copied().fold(f64::INFINITY, f64::min),
+                h.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            ],
             error_linf: errors.map(|[front, _]| front),
         },
         error: errors.map(|[_, linf]| FrontError { linf }),

@@ -10,16 +10,17 @@ mod run;
 mod source;
 mod stefan;
 
-pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
 pub use any::Study;
 pub use front_run::{FrontError, FrontFigures, FrontFinished, FrontReport, FrontSeconds, StefanSummary};
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
+pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
 pub use poisson::{
-    Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary, Sides, Solved,
-    StencilReport,
+    Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary,
+    Sides, Solved, StencilReport,
 };
 pub use run::{Finished, compute, run};
 pub use source::Source;
 pub use stefan::{
-    Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy, Walls,
+    Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy,
+    Walls,
 };

@@ -229,7 +229,11 @@ impl PoissonStudy {
             let rule = "the solution is then known up to a constant only; leave one side out";
             return Err(Error::invalid("sides.neumann", "all four sides", rule));
         }
-        super::memory::check(self.grid.cells.iter().map(|&n| n as u128 + 1).product(), BYTES_PER_NODE, &self.grid.cells)?;
+        super::memory::check(
+            self.grid.cells.iter().map(|&n| n as u128 + 1).product(),
+            BYTES_PER_NODE,
+            &self.grid.cells,
+        )?;
         self.mesh().map(|_| ())
     }
 
@@ -274,7 +278,9 @@ impl PoissonStudy {
         let given = |key: &str, text: &Option<String>, needed: bool| match text {
             Some(text) => Ok(Some(Program::new([&parse(&format!("equation.{key}"), text, &VARIABLES)?]))),
             None if exact.is_some() || !needed => Ok(None),
-            None => Err(Error::invalid(format!("equation.{key}"), "not given", "add it, or the exact solution: exact.u")),
+            None => {
+                Err(Error::invalid(format!("equation.{key}"), "not given", "add it, or the exact solution: exact.u"))
+            }
         };
         Ok(Data {
             source: given("source", &self.equation.source, true)?,
@@ -305,7 +311,8 @@ impl PoissonStudy {
         }
 
         let neumann = self.neumann();
-        let known = data.exact.as_ref().map(|program| values(&mesh, "exact.u or a derivative of it", program)).transpose()?;
+        let known =
+            data.exact.as_ref().map(|program| values(&mesh, "exact.u or a derivative of it", program)).transpose()?;
         let source = match &data.source {
             Some(program) => values(&mesh, "equation.source", program)?.into_iter().map(|[f]| f).collect(),
             None => known.iter().flatten().map(|[_, _, _, xx, yy]| xx + yy).collect::<Vec<f64>>(),
@@ -321,9 +328,9 @@ impl PoissonStudy {
                 let n = outward(&mesh, index, at);
                 side[index] = match (&flux, &known) {
                     (Some(flux), _) => flux[index][0],
-                    (None, known) => known.as_ref().map_or(0.0, |known| {
-                        n[0] * known[index][1] + n[1] * known[index][2]
-                    }),
+                    (None, known) => {
+                        known.as_ref().map_or(0.0, |known| n[0] * known[index][1] + n[1] * known[index][2])
+                    }
                 };
             }
         }

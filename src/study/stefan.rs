@@ -7,7 +7,9 @@ use crate::formula::Formula;
 use crate::laplacian::Laplacian;
 use crate::setting::{Auto, fixed, pair};
 use crate::simulation::{FramesAt, Schedule};
-use crate::stefan::{Columns, Filter, Front, FrontState, LOWER, Method, Problem, Similarity, Stepping, Transfer, UPPER};
+use crate::stefan::{
+    Columns, Filter, Front, FrontState, LOWER, Method, Problem, Similarity, Stepping, Transfer, UPPER,
+};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 
@@ -273,6 +275,7 @@ pub struct FrontTime {
 
 /// What a study makes of its formulas or of its exact solution.
 #[derive(Debug, Clone)]
+#[allow(clippy::large_enum_variant)] // one value a run
 pub(super) enum Given {
     Formulas { front: Formula, initial: [Formula; 2], boundary: [Formula; 2] },
     Exact(Similarity, f64),
@@ -362,7 +365,8 @@ impl StefanStudy {
         let phases = [("lower", &self.phase.lower), ("upper", &self.phase.upper)];
         if let Some(exact) = &self.exact {
             let formulas = phases.iter().flat_map(|(name, phase)| {
-                [("initial", &phase.initial), ("boundary", &phase.boundary)].map(|(key, text)| (format!("phase.{name}.{key}"), text))
+                [("initial", &phase.initial), ("boundary", &phase.boundary)]
+                    .map(|(key, text)| (format!("phase.{name}.{key}"), text))
             });
             let all = formulas.chain([("domain.front".to_string(), &self.domain.front)]);
             if let Some((key, Some(text))) = all.into_iter().find(|(_, text)| text.is_some()) {
@@ -382,10 +386,12 @@ impl StefanStudy {
             Some(text) => parse(&key, text, variables),
             None => Err(Error::invalid(key, "not given", "add it, or an exact solution: [exact]")),
         };
-        let both = |key: &str, take: &dyn Fn(&PhaseTable) -> Option<String>, variables: &[&str]| -> Result<[Formula; 2]> {
-            let [lower, upper] = phases.map(|(name, phase)| read(format!("phase.{name}.{key}"), &take(phase), variables));
-            Ok([lower?, upper?])
-        };
+        let both =
+            |key: &str, take: &dyn Fn(&PhaseTable) -> Option<String>, variables: &[&str]| -> Result<[Formula; 2]> {
+                let [lower, upper] =
+                    phases.map(|(name, phase)| read(format!("phase.{name}.{key}"), &take(phase), variables));
+                Ok([lower?, upper?])
+            };
         Ok(Given::Formulas {
             front: read("domain.front".into(), &self.domain.front, &["x"])?,
             initial: both("initial", &|phase| phase.initial.clone(), &["x", "y"])?,
@@ -402,8 +408,9 @@ impl StefanStudy {
         let nodes = self.memory() / BYTES_PER_NODE;
         super::memory::check(nodes, BYTES_PER_NODE, &self.grid.cells)?;
         let [bottom, top] = &walls;
-        let columns = Columns::new(x, [&|x| bottom.eval(&[x]), &|x| top.eval(&[x])], self.grid.cells, self.grid.grading)
-            .map_err(|error| error.within("grid"))?;
+        let columns =
+            Columns::new(x, [&|x| bottom.eval(&[x]), &|x| top.eval(&[x])], self.grid.cells, self.grid.grading)
+                .map_err(|error| error.within("grid"))?;
         let diffusivity = [self.phase.lower.diffusivity, self.phase.upper.diffusivity];
         let mut front = Front::new(columns, diffusivity, self.front.mobility)?;
         self.front.filter.check().map_err(|error| error.within("front"))?;

@@ -23,8 +23,11 @@ const PASSES: usize = 4;
 pub struct SparseSystem {
     unknowns: usize,
     entries: Vec<(usize, usize, f64)>,
-    symbolic: Option<(Vec<(usize, usize)>, SymbolicLu<usize>)>,
+    analysed: Option<(Pattern, SymbolicLu<usize>)>,
 }
+
+/// (row, column) of all entries.
+type Pattern = Vec<(usize, usize)>;
 
 impl std::fmt::Debug for SparseSystem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -87,10 +90,10 @@ impl SparseSystem {
             self.entries.iter().map(|&(row, column, a)| Triplet::new(row, column, a)).collect();
         let matrix = SparseColMat::try_new_from_triplets(self.unknowns, self.unknowns, &entries).ok()?;
         let pattern = self.entries.iter().map(|&(row, column, _)| (row, column));
-        if self.symbolic.as_ref().is_none_or(|(known, _)| !known.iter().copied().eq(pattern.clone())) {
-            self.symbolic = Some((pattern.collect(), SymbolicLu::try_new(matrix.symbolic()).ok()?));
+        if self.analysed.as_ref().is_none_or(|(known, _)| !known.iter().copied().eq(pattern.clone())) {
+            self.analysed = Some((pattern.collect(), SymbolicLu::try_new(matrix.symbolic()).ok()?));
         }
-        let (_, symbolic) = self.symbolic.as_ref()?;
+        let (_, symbolic) = self.analysed.as_ref()?;
         Lu::try_new_with_symbolic(symbolic.clone(), matrix.as_ref()).ok()
     }
 }

@@ -1,4 +1,6 @@
-use super::picture::{BOTTOM, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, escape, png};
+use super::picture::{
+    BOTTOM, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, escape, png,
+};
 use std::fmt::Write;
 
 /// Draws curves over common x, coloured by a parameter such as the time, within the box from `lower` to `upper`.
