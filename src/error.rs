@@ -204,6 +204,70 @@ pub enum Failure {
         /// What is known about this case.
         advice: String,
     },
+    /// The sides of a mesh touch or cross each other, although no cell is folded.
+    #[error("the mesh touches itself: its sides meet at x = {}, y = {}, in cells ({}, {}) and ({}, {})", short(x[0]), short(x[1]), cells[0][0], cells[0][1], cells[1][0], cells[1][1])]
+    SelfTouching {
+        /// The cells at both sides.
+        cells: [[usize; 2]; 2],
+        /// Where they meet.
+        x: [f64; 2],
+    },
+    /// The nodes around a node determine no Laplacian.
+    #[error("the nodes around node ({}, {}), x = {}, y = {}, give no Laplacian: condition number {condition:.1e}", node[0], node[1], short(x[0]), short(x[1]))]
+    DegenerateStencil {
+        /// Indices of the node along ξ and η.
+        node: [usize; 2],
+        /// Where the node is.
+        x: [f64; 2],
+        /// Condition number of its stencil.
+        condition: f64,
+    },
+    /// The front reached a wall.
+    #[error("the front left the box: at x = {} it is at y = {}, and the {wall} at y = {}", short(x[0]), short(x[1]), short(*y))]
+    FrontOutside {
+        /// Where the front is.
+        x: [f64; 2],
+        /// The wall, `bottom` or `top`.
+        wall: &'static str,
+        /// Where the wall is.
+        y: f64,
+    },
+    /// A phase became so thin that rows of it cannot be told apart.
+    #[error("the {phase} phase vanishes at x = {}: only {thickness:.1e} of its column of {of:.3} is left", short(*x))]
+    VanishingPhase {
+        /// `lower` or `upper`.
+        phase: &'static str,
+        /// Where.
+        x: f64,
+        /// What is left.
+        thickness: f64,
+        /// From wall to wall.
+        of: f64,
+    },
+    /// The front turns over, or is too steep for the distance of the columns.
+    #[error("the front stops being a graph over x at x = {}, y = {}: its slope is {slope:.1e}", short(x[0]), short(x[1]))]
+    NotAGraph {
+        /// Where.
+        x: [f64; 2],
+        /// dh/dx there; infinite where it turns over.
+        slope: f64,
+    },
+    /// A time step past the stability limit of the explicit front.
+    #[error("the step {dt:.3e} is past the stability limit of the explicit front, {limit:.3e}")]
+    FrontUnstable {
+        /// The step.
+        dt: f64,
+        /// The longest stable step, as estimated.
+        limit: f64,
+    },
+    /// The warm phase lies on the wrong side of the front: the problem is ill-posed.
+    #[error("the warm phase is on the wrong side of the front at x = {}, y = {}: D₀ ∂u₀/∂y + D₁ ∂u₁/∂y = {slope:.3e} is above 0, and the problem ill-posed", short(x[0]), short(x[1]))]
+    WrongSide {
+        /// Where.
+        x: [f64; 2],
+        /// D₀ ∂u₀/∂y + D₁ ∂u₁/∂y.
+        slope: f64,
+    },
     /// An array does not fit the lattice it is given with.
     #[error("{what} has {found} values, but the lattice has {expected} nodes")]
     WrongLength {
@@ -237,6 +301,13 @@ impl Failure {
             Self::Subdomains { .. } => "subdomains",
             Self::LineDensity { .. } => "line-density",
             Self::NotConverged { .. } => "not-converged",
+            Self::SelfTouching { .. } => "self-touching",
+            Self::DegenerateStencil { .. } => "degenerate-stencil",
+            Self::FrontOutside { .. } => "front-outside",
+            Self::VanishingPhase { .. } => "vanishing-phase",
+            Self::NotAGraph { .. } => "not-a-graph",
+            Self::FrontUnstable { .. } => "front-unstable",
+            Self::WrongSide { .. } => "wrong-side",
             Self::WrongLength { .. } => "wrong-length",
         }
     }
@@ -286,6 +357,18 @@ impl Failure {
             Self::NotConverged { .. } => {
                 "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"galerkin\""
             }
+            Self::SelfTouching { .. } => "mend domain.map, or lower domain.distort",
+            Self::DegenerateStencil { .. } => {
+                "make the cells around it less flat: lower domain.distort or grid.grading"
+            }
+            Self::FrontOutside { .. } | Self::VanishingPhase { .. } => {
+                "end earlier with time.end, or move the walls away"
+            }
+            Self::NotAGraph { .. } => {
+                "end earlier with time.end, or refine grid.cells; a front that turns over needs another method"
+            }
+            Self::FrontUnstable { .. } => "lower time.step, set it to \"auto\", or set front.stepping to \"implicit\"",
+            Self::WrongSide { .. } => "let the lower phase be the warm one: mend the initial and boundary formulas",
             Self::WrongLength { .. } => "give one value a node, in lattice order",
         }
     }

@@ -52,8 +52,11 @@ pub mod numerics;
 
 pub mod density;
 pub mod equidistribution;
+pub mod laplacian;
 pub mod meshing;
 pub mod physics;
+
+pub mod stefan;
 
 pub mod simulation;
 

@@ -56,9 +56,16 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Auto<T> {
 
 /// An array of exactly two entries; serde's own arrays take the first two of more.
 pub(crate) fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<[T; 2], D::Error> {
+    fixed(deserializer)
+}
+
+/// An array of exactly N entries.
+pub(crate) fn fixed<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<[T; N], D::Error> {
     let entries = Vec::<T>::deserialize(deserializer)?;
-    <[T; 2]>::try_from(entries)
-        .map_err(|entries| de::Error::custom(format!("expected an array of length 2, found {}", entries.len())))
+    <[T; N]>::try_from(entries)
+        .map_err(|entries| de::Error::custom(format!("expected an array of length {N}, found {}", entries.len())))
 }
 
 /// A formula: text, or a number in its place.

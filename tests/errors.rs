@@ -278,3 +278,79 @@ fn unwritable_busy_and_foreign() {
     let error = RunDirectory::check(place.path()).unwrap_err();
     assert_says(error, &["is not empty and was not written by driftmesh", "file"], Some("--out"), false);
 }
+
+/// A mesh of 4 × 4 cells from its mapping of the unit square.
+fn image(map: impl Fn([f64; 2]) -> [f64; 2]) -> Mesh<2> {
+    let lattice = Lattice::bounded([4, 4]).unwrap();
+    let x = (0..lattice.len()).map(|k| map(lattice.node(k).map(|i| i as f64 / 4.0)));
+    Mesh::mapped(lattice, x.collect()).unwrap()
+}
+
+#[test]
+fn self_touching() {
+    let around = image(|[s, r]| [(1.0 + s) * (7.0 * r).cos(), (1.0 + s) * (7.0 * r).sin()]);
+    let failure = driftmesh::geometry::check_simple(&around).unwrap_err();
+    assert_says(failure, &["touches itself", "in cells ("], Some("domain.map"), true);
+}
+
+/// Cells so small that weights overflow.
+#[test]
+fn degenerate_stencil() {
+    use driftmesh::laplacian::{Laplacian, stencils};
+    let tiny = image(|x| x.map(|x| 1e-155 * x));
+    for kind in [Laplacian::Optimised, Laplacian::Harmonic, Laplacian::Mapped, Laplacian::Compact25] {
+        let error = stencils(&tiny, kind).unwrap_err();
+        assert_says(error, &["give no Laplacian", "node (1, 1)"], Some("domain.distort"), true);
+    }
+}
+
+/// A front at height `h` below the lid y = 2, temperatures 1 and −1 at the walls.
+struct Flat(fn(f64) -> f64, f64);
+
+impl driftmesh::stefan::Problem for Flat {
+    fn boundary(&self, phase: usize, _x: [f64; 2], _t: f64) -> f64 {
+        if phase == driftmesh::stefan::LOWER { self.1 } else { -self.1 }
+    }
+
+    fn initial(&self, _phase: usize, [x, y]: [f64; 2]) -> f64 {
+        self.1 * (self.0(x) - y)
+    }
+
+    fn initial_front(&self, x: f64) -> f64 {
+        self.0(x)
+    }
+
+    fn exact_front(&self, _x: f64, _t: f64) -> Option<f64> {
+        None
+    }
+
+    fn exact(&self, _x: [f64; 2], _t: f64) -> Option<f64> {
+        None
+    }
+}
+
+#[test]
+fn fronts() {
+    use driftmesh::stefan::{Columns, Front};
+    let mut front = {
+        let columns = Columns::new([0.0, 1.0], [&|_| 0.0, &|_| 2.0], [10, 8, 8], 1.5).unwrap();
+        Front::new(columns, [1.0, 1.0], 1.0).unwrap()
+    };
+    let start = |problem: Flat| front.start(&problem, 0.0).unwrap_err();
+    assert_says(start(Flat(|_| 3.0, 1.0)), &["left the box", "the top at y = 2.0"], Some("time.end"), true);
+    assert_says(start(Flat(|_| -1.0, 1.0)), &["left the box", "the bottom at y = 0.0"], Some("time.end"), true);
+    assert_says(start(Flat(|_| 1.999, 1.0)), &["the upper phase vanishes at x = "], Some("time.end"), true);
+    assert_says(
+        start(Flat(|x| if x < 0.5 { 0.1 } else { 1.9 }, 1.0)),
+        &["stops being a graph"],
+        Some("grid.cells"),
+        true,
+    );
+    assert_says(start(Flat(|_| 1.0, -1.0)), &["wrong side", "ill-posed"], Some("initial"), true);
+    let problem = Flat(|_| 1.0, 1.0);
+    let mut state = front.start(&problem, 0.0).unwrap();
+    let before = state.clone();
+    let error = front.step(&problem, &mut state, 1.0).unwrap_err();
+    assert_says(error, &["past the stability limit"], Some("front.stepping"), true);
+    assert_eq!(state, before);
+}

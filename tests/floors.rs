@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 /// Lowest floor first; modules on one floor are siblings that do not know each other.
-const FLOORS: [&[&str]; 8] = [
+const FLOORS: [&[&str]; 9] = [
     &["error"],
     &["formula", "kind", "parallel", "random", "setting", "work"],
     &["geometry"],
     &["numerics"],
-    &["density", "equidistribution", "meshing", "physics"],
+    &["density", "equidistribution", "laplacian", "meshing", "physics"],
+    &["stefan"],
     &["simulation"],
     &["study"],
     &["reproduce"],

@@ -3,6 +3,7 @@ use crate::{
     terminal::{complain, say, warn},
 };
 use clap::Args;
+use driftmesh::study::Study;
 use std::process::ExitCode;
 
 #[derive(Args)]
@@ -13,14 +14,26 @@ pub struct Check {
 
 impl Check {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
-        let study = self.study.read()?;
+        let study = match self.study.read()? {
+            Study::MovingMesh(study) => study,
+            Study::Poisson(study) => return Ok(valid(&study.to_toml(), study.memory())),
+            Study::Stefan(study) => {
+                study.warnings()?.iter().for_each(|warning| warn(warning));
+                return Ok(valid(&study.to_toml(), study.memory()));
+            }
+        };
         study.warnings()?.iter().for_each(|warning| warn(warning));
         if let Err(error) = study.start(&study.simulation()?, &mut driftmesh::simulation::Record::default()) {
             return Ok(complain(&error, study.remedy(&error).or_else(|| error.help()), None));
         }
-        say(study.to_toml().trim_end());
-        let mebibytes = study.memory() as f64 / f64::from(1 << 20);
-        say(format_args!("\n# valid; needs about {:.0} MiB of memory", mebibytes.max(1.0)));
-        Ok(ExitCode::SUCCESS)
+        Ok(valid(&study.to_toml(), study.memory()))
     }
+}
+
+/// The study with its defaults, and what it needs.
+fn valid(study: &str, bytes: u128) -> ExitCode {
+    say(study.trim_end());
+    let mebibytes = bytes as f64 / f64::from(1 << 20);
+    say(format_args!("\n# valid; needs about {:.0} MiB of memory", mebibytes.max(1.0)));
+    ExitCode::SUCCESS
 }

@@ -2,6 +2,7 @@ use crate::terminal::say;
 use clap::{Args, ValueEnum};
 use driftmesh::{
     density::MonitorKind,
+    laplacian::Laplacian,
     meshing::{EstimatorKind, GeneratorKind},
     physics::PdeKind,
 };
@@ -19,6 +20,7 @@ enum Topic {
     Monitors,
     Generators,
     Estimators,
+    Laplacians,
 }
 
 impl List {
@@ -28,6 +30,7 @@ impl List {
             (Topic::Monitors, "monitors", "monitor.kind", MonitorKind::KINDS),
             (Topic::Generators, "generators", "mesh.generator.kind", GeneratorKind::KINDS),
             (Topic::Estimators, "estimators", "mesh.generator.estimator.kind", EstimatorKind::KINDS),
+            (Topic::Laplacians, "laplacians", "laplacian.kind", Laplacian::KINDS),
         ];
         for (topic, title, key, kinds) in topics {
             if self.topic.is_none_or(|only| only == topic) {

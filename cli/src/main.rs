@@ -2,13 +2,15 @@
 
 mod check;
 mod list;
+mod poisson;
 mod progress;
 mod reproduce;
 mod run;
+mod stefan;
 mod terminal;
 
 use clap::{Args, Parser, Subcommand};
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Source, Study};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -48,10 +50,10 @@ struct StudyArgs {
 }
 
 impl StudyArgs {
-    fn read(&self) -> driftmesh::Result<MovingMesh> {
+    fn read(&self) -> driftmesh::Result<Study> {
         let mut source = Source::read(&self.study)?;
         self.set.iter().try_for_each(|assignment| source.set(assignment))?;
-        MovingMesh::from_source(&source)
+        Study::from_source(&source)
     }
 }
 

@@ -1,9 +1,9 @@
-use crate::{StudyArgs, progress::Progress, terminal};
+use crate::{StudyArgs, poisson, progress::Progress, stefan, terminal};
 use clap::Args;
 use driftmesh::meshing::Interface;
 use driftmesh::simulation::{Observer, RunDirectory, Summary};
-use driftmesh::study::{self, UniformEquivalent};
-use std::path::PathBuf;
+use driftmesh::study::{self, MovingMesh, Study, UniformEquivalent};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(Args)]
@@ -24,15 +24,23 @@ pub struct Run {
 impl Run {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
         let study = self.study.read()?;
-        let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&study.study.name));
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(study.name()));
         RunDirectory::check(&out)?;
         terminal::use_threads(self.threads)?;
+        match study {
+            Study::MovingMesh(study) => self.moving_mesh(&study, &out),
+            Study::Poisson(study) => poisson::run(&study, &out, self.quiet),
+            Study::Stefan(study) => stefan::run(&study, &out, self.quiet),
+        }
+    }
+
+    fn moving_mesh(&self, study: &MovingMesh, out: &Path) -> driftmesh::Result<ExitCode> {
         let mut progress = Progress::new();
         let finished = if self.quiet {
-            study::run(&study, &out, &mut [])
+            study::run(study, out, &mut [])
         } else {
             let watchers: &mut [&mut dyn Observer] = &mut [&mut progress];
-            study::run(&study, &out, watchers)
+            study::run(study, out, watchers)
         };
         progress.clear();
         let finished = match finished {

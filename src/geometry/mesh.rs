@@ -62,6 +62,28 @@ impl<const D: usize> Mesh<D> {
         Ok(Self { lattice, lower, upper, x })
     }
 
+    /// A mesh of any shape from one position a node in lattice order; its box is the smallest around it.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where an axis is periodic; [`Failure::WrongLength`] where the number of positions is not the
+    /// number of nodes.
+    pub fn mapped(lattice: Lattice<D>, x: Vec<[f64; D]>) -> Result<Self> {
+        if lattice.periodic().contains(&true) {
+            return Err(Error::invalid("periodic", "true", "a mesh without a box of its own needs bounded axes"));
+        }
+        if x.len() != lattice.len() {
+            return Err(Failure::WrongLength { what: "the mesh", found: x.len(), expected: lattice.len() }.into());
+        }
+        let (mut lower, mut upper) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+        for x in &x {
+            for d in 0..D {
+                lower[d] = lower[d].min(x[d]);
+                upper[d] = upper[d].max(x[d]);
+            }
+        }
+        Ok(Self { lattice, lower, upper, x })
+    }
+
     /// The same lattice and box with other positions, one a node in lattice order.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ mod locate;
 mod mesh;
 mod patch;
 mod quality;
+mod simple;
 
 pub use dual::{DualCells, padded};
 pub use field::Field;
@@ -16,3 +17,4 @@ pub use locate::interpolate;
 pub use mesh::Mesh;
 pub use patch::Patch;
 pub use quality::{Comparison, Quality, cell_areas, check_unfolded, compare, node_areas, quality};
+pub use simple::check_simple;

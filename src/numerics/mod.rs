@@ -1,6 +1,7 @@
 //! How things are computed: differences on the lattice and linear systems on patches of it.
 
 pub mod difference;
+pub(crate) mod lanes;
 pub mod linear;
 
 /// max(m, |value|) that keeps a NaN: for norms in which nothing may be lost.

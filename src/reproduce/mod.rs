@@ -1,13 +1,16 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
 mod figure;
+mod fronts;
 mod interface_study;
+mod laplacian;
 mod payoff;
 mod table;
 mod tables;
 
 pub use figure::{Curve, Figure};
 pub use interface_study::{InterfaceStep, Measured};
+pub use laplacian::slides_error;
 pub use table::Table;
 
 use crate::error::Result;
@@ -75,6 +78,21 @@ pub const ITEMS: &[Item] = &[
         name: "payoff",
         line: "time to an error of 1e-2 against the viscosity, on moving and on uniform meshes",
         run: payoff::run,
+    },
+    Item {
+        name: "laplacian-table",
+        line: "the optimised Laplacian and its rivals on three meshes, and the slides' table",
+        run: |options| laplacian::run(options).map(Rerun::from),
+    },
+    Item {
+        name: "stefan-slides",
+        line: "the slides' front between ice and water, with balances",
+        run: |options| fronts::slides(options).map(Rerun::from),
+    },
+    Item {
+        name: "stefan-exact",
+        line: "fronts against three exact solutions, by every method",
+        run: |options| fronts::exact(options).map(Rerun::from),
     },
 ];
 

@@ -11,7 +11,7 @@ pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
 pub use report::{Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Summary, WorkTotal};
 pub(crate) use report::{FONT, png};
-pub use report::{Picture, draw, final_arrays};
+pub use report::{Picture, draw, draw_curves, final_arrays};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;

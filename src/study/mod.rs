@@ -1,11 +1,28 @@
 //! From a study file to a run: text → checked parts → simulation → run directory.
 
+mod any;
+mod front_run;
+mod mapped;
+mod memory;
 mod moving_mesh;
+mod poisson;
 mod run;
 mod source;
+mod stefan;
 mod uniform;
 
+pub use any::Study;
+pub use front_run::{FrontError, FrontFigures, FrontFinished, FrontReport, FrontSeconds, StefanSummary};
+pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
 pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
+pub use poisson::{
+    Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary,
+    Sides, Solved, StencilReport,
+};
 pub use run::{Finished, compute, run};
 pub use source::Source;
+pub use stefan::{
+    Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy,
+    Walls,
+};
 pub use uniform::UniformEquivalent;

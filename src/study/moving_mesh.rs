@@ -55,12 +55,32 @@ pub struct Header {
     pub kind: StudyKind,
 }
 
+impl Header {
+    /// Refuses a name that is none for a directory.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub(super) fn check_name(&self) -> Result<()> {
+        let name = &self.name;
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if name.is_empty() || name.len() > 100 || name.starts_with('.') || !name.chars().all(plain) {
+            let rule = "must be 1 to 100 of the characters a-z A-Z 0-9 - _ . and not begin with a dot";
+            return Err(Error::invalid("study.name", format!("{name:?}"), rule));
+        }
+        Ok(())
+    }
+}
+
 /// What a study is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyKind {
     /// A PDE in two dimensions on a moving mesh.
     MovingMesh,
+    /// Poisson's equation on a mesh of any shape.
+    Poisson,
+    /// Two phases and the front between them.
+    Stefan,
 }
 
 /// `[domain]`.
@@ -205,12 +225,7 @@ impl MovingMesh {
     /// # Errors
     /// [`Error::Invalid`] with the dotted key of the first setting out of range.
     pub fn resolve(&mut self) -> Result<()> {
-        let name = &self.study.name;
-        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-        if name.is_empty() || name.len() > 100 || name.starts_with('.') || !name.chars().all(plain) {
-            let rule = "must be 1 to 100 of the characters a-z A-Z 0-9 - _ . and not begin with a dot";
-            return Err(Error::invalid("study.name", format!("{name:?}"), rule));
-        }
+        self.study.check_name()?;
         self.pde.check().map_err(|error| error.within("pde"))?;
         self.check_axes()?;
         self.check_stepper()?;

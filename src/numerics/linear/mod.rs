@@ -12,6 +12,7 @@ mod krylov;
 mod lu;
 mod pcg;
 mod relaxation;
+mod sparse;
 
 pub use bicgstab::Bicgstab;
 pub use block::BlockBicgstab;
@@ -19,6 +20,7 @@ pub use ilu::IluBicgstab;
 pub use lu::SparseLu;
 pub use pcg::Pcg;
 pub use relaxation::{Smoother, relax};
+pub use sparse::SparseSystem;
 
 use super::larger;
 use crate::error::Failure;

@@ -18,7 +18,18 @@ pub struct RunDirectory {
 const LOCK: &str = "run.lock";
 
 /// Everything that a run may write.
-const OURS: [&str; 7] = ["summary.json", "study.toml", "history.csv", "run.pvd", "final.npz", "mesh.png", "mesh.svg"];
+const OURS: [&str; 10] = [
+    "summary.json",
+    "study.toml",
+    "history.csv",
+    "run.pvd",
+    "final.npz",
+    "mesh.png",
+    "mesh.svg",
+    "front.csv",
+    "front.png",
+    "front.svg",
+];
 
 impl RunDirectory {
     /// Refuses a directory that [`RunDirectory::claim`] would refuse, touching nothing.

@@ -1,11 +1,13 @@
 //! What a run leaves behind: the summary, the arrays, the picture and the directory that holds them.
 
 mod arrays;
+mod curves;
 mod directory;
 mod picture;
 mod summary;
 
 pub use arrays::final_arrays;
+pub use curves::draw_curves;
 pub use directory::RunDirectory;
 pub(super) use directory::write_file;
 pub(crate) use picture::{FONT, png};

@@ -14,12 +14,12 @@ pub struct Picture {
 /// The font of all drawings.
 pub(crate) const FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
 /// Longer edge of the box in the drawing.
-const LONGER: f64 = 640.0;
-const SHORTER_AT_LEAST: f64 = 160.0;
-const LEFT: f64 = 76.0;
-const TOP: f64 = 48.0;
-const RIGHT: f64 = 116.0;
-const BOTTOM: f64 = 64.0;
+pub(super) const LONGER: f64 = 640.0;
+pub(super) const SHORTER_AT_LEAST: f64 = 160.0;
+pub(super) const LEFT: f64 = 76.0;
+pub(super) const TOP: f64 = 48.0;
+pub(super) const RIGHT: f64 = 116.0;
+pub(super) const BOTTOM: f64 = 64.0;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
 const MAX_CELLS: usize = 240;
 
@@ -121,7 +121,7 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
     s
 }
 
-fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, height]: [f64; 2]) {
+pub(super) fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, height]: [f64; 2]) {
     let bottom = TOP + height;
     let _ = writeln!(
         s,
@@ -150,7 +150,7 @@ fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, height]: [f64
     let _ = writeln!(s, "<text x=\"20\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">y</text>", y + 5.0);
 }
 
-fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: f64, height: f64) {
+pub(super) fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: f64, height: f64) {
     const BANDS: usize = 64;
     let band = height / BANDS as f64;
     for k in 0..BANDS {
@@ -183,7 +183,7 @@ fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: f64, height
 }
 
 /// Round values 1, 2 or 5 times a power of ten apart, four to nine of them, with their labels.
-fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+pub(super) fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let span = high - low;
     let scale = low.abs().max(high.abs());
     if !(span > 1e-12 * scale && span.is_finite()) {
@@ -197,7 +197,7 @@ fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     (first..=last).map(|k| (k as f64 * step, label(k as f64 * step))).collect()
 }
 
-fn colour(fraction: f64) -> String {
+pub(super) fn colour(fraction: f64) -> String {
     let c = colorous::VIRIDIS.eval_continuous(if fraction.is_finite() { fraction.clamp(0.0, 1.0) } else { 0.5 });
     format!("#{c:x}")
 }
@@ -206,7 +206,7 @@ fn point([x, y]: [f64; 2]) -> String {
     format!("{x:.2},{y:.2}")
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 

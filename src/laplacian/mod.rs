@@ -1,0 +1,212 @@
+//! The pointwise optimised Laplacian on structured quadrilateral meshes.
+//!
+//! ```text
+//! Δu(x₀) ≈ Σ_j a_j (u(x_j) − u(x₀))        or, for `compact25`,        Σ_j a_j u(x_j) = Σ_j b_j Δu(x_j)
+//! ```
+//!
+//! The weights a of each node follow from the positions of its neighbours alone: no elements, no assembly, every node by
+//! itself. [`stencils`] gives those of a whole mesh, for any [`Laplacian`].
+//!
+//! # Source
+//! Castillo and Izsák, *Efficient discretization of the Laplacian: application to moving boundary problems* (2024).
+
+mod compact25;
+mod nine;
+mod poisson;
+mod stencils;
+
+pub use poisson::{Poisson, outward};
+pub use stencils::{NearDegenerate, Stencils};
+
+use crate::error::{Error, Failure, Result};
+use crate::geometry::{Mesh, Patch, check_unfolded, padded};
+use crate::parallel;
+use serde::{Deserialize, Serialize};
+
+/// How the weights of a node follow from its neighbours.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Laplacian {
+    /// Exact for all quadratics; among those the weights of smallest Σ(|d_j|³ a_j)², d_j the distances. Second order on
+    /// meshes that a smooth mapping makes, and on perturbed ones.
+    #[default]
+    Optimised,
+    /// Exact for all quadratics; the rest by least squares on the harmonic polynomials of degree 3 to 5 in the unit of the
+    /// coordinates. More accurate on sheared meshes, unstable on moving ones.
+    Harmonic,
+    /// The slides' least squares on eleven weighted polynomials: exact for nothing but constants.
+    Published {
+        /// The polynomials as they are printed, or without the misprints.
+        polynomials: Polynomials,
+        /// The unit of length of the polynomials.
+        scaling: Scaling,
+    },
+    /// 25 points and weights on Δu too, exact to degree 5: fourth order where the solution is smooth.
+    Compact25,
+    /// The conservative curvilinear form, for comparison.
+    Mapped,
+}
+
+/// The polynomials of [`Laplacian::Published`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Polynomials {
+    /// As the slides print them: three of them are not harmonic.
+    #[default]
+    Printed,
+    /// x³ − 3xy², y³ − 3x²y and x⁴ − 6x²y² + y⁴ in their places.
+    Harmonic,
+}
+
+/// The unit of length of [`Laplacian::Published`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scaling {
+    /// That of the coordinates.
+    #[default]
+    None,
+    /// The spacing of the lattice along ξ.
+    Global,
+    /// The largest distance to a neighbour along an axis, node by node.
+    Local,
+}
+
+impl Laplacian {
+    /// Name and description of every kind.
+    pub const KINDS: &'static [(&'static str, &'static str)] = &[
+        ("optimised", "exact for quadratics, smallest distance-weighted weights: the default"),
+        ("harmonic", "exact for quadratics, the rest fitted to harmonic polynomials; not for moving meshes"),
+        ("compact25", "25 points with weights on the source: fourth order"),
+        ("published", "the slides' least squares on weighted polynomials; does not converge on every mesh"),
+        ("mapped", "the conservative curvilinear form, for comparison"),
+    ];
+
+    /// Its name in a study.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Optimised => "optimised",
+            Self::Harmonic => "harmonic",
+            Self::Published { .. } => "published",
+            Self::Compact25 => "compact25",
+            Self::Mapped => "mapped",
+        }
+    }
+}
+
+/// Condition numbers above this are told: exactness of degree 2 then falls behind 1e-11.
+pub const NEAR_DEGENERATE: f64 = 3e3;
+
+/// The weights of all nodes of a mesh that are not on a bounded side
+///
+/// ```text
+/// (A u)_i = Σ_j a_ij u_j ≈ Δu(x_i)
+/// ```
+///
+/// Nodes are independent of each other; all threads take part, with the same bits for any number of them.
+///
+/// # Errors
+/// [`Failure::Folded`] or [`Failure::NonFinite`] where the mesh is no mesh; [`Failure::DegenerateStencil`] where the
+/// neighbours of a node determine no Laplacian; [`Error::Invalid`] for `compact25` on a periodic axis or with fewer than 4
+/// cells. Nodes that come near that are in [`Stencils::near_degenerate`].
+///
+/// # Example
+/// ```
+/// use driftmesh::geometry::{Lattice, Mesh};
+/// use driftmesh::laplacian::{Laplacian, stencils};
+/// // a parallelogram: x = s + r/2, y = r
+/// let mesh = Mesh::uniform(Lattice::bounded([8, 8])?, [0.0, 0.0], [1.5, 1.0])?;
+/// let mesh = mesh.moved(mesh.x().iter().map(|&[x, y]| [x / 1.5 + 0.5 * y, y]).collect())?;
+/// let a = stencils(&mesh, Laplacian::Optimised)?;
+/// let u: Vec<f64> = mesh.x().iter().map(|[x, y]| x * x + 3.0 * x * y + y * y).collect();
+/// // Δu = 4, exactly
+/// assert!(a.apply(&u).iter().all(|v| (v - 4.0).abs() < 1e-10));
+/// assert_eq!(a.exact_degree(&mesh), Some(3)); // it is a mesh of equal cells
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+///
+/// # Source
+/// Castillo and Izsák (2024); the constrained form is this project's.
+pub fn stencils(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
+    check_unfolded(mesh)?;
+    unchecked(mesh, laplacian)
+}
+
+/// [`stencils`] of a mesh that is known not to be folded, such as one that was checked before.
+///
+/// # Errors
+/// As [`stencils`], without [`Failure::Folded`].
+pub fn unchecked(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
+    let (lattice, extent) = (mesh.lattice(), mesh.extent());
+    let patch = Patch::whole(lattice);
+    if laplacian == Laplacian::Compact25 {
+        return compact25::stencils(mesh, patch);
+    }
+    // padded like the patch: positions of the sides, or of images
+    let everything = padded(lattice, mesh.x(), [[extent[0], 0.0], [0.0, extent[1]]]);
+    let width = lattice.nodes()[1] + 2;
+    let skip = patch.wraps.map(|wraps| usize::from(!wraps));
+    let row = |i: usize| {
+        let first = (i + skip[0]) * width + skip[1];
+        &everything[first..first + patch.size[1] + 2]
+    };
+    let n = patch.size[1];
+    let mut rows = vec![[0.0; 9]; patch.len()];
+    let mut conditions = vec![0.0; patch.len()];
+    parallel::for_each_row_pair(&mut rows, n, &mut conditions, n, |i, rows, conditions| {
+        pulp::Arch::new().dispatch(nine::Batch {
+            laplacian: &laplacian,
+            spacing: lattice.spacing()[0],
+            x: [row(i), row(i + 1), row(i + 2)],
+            rows,
+            conditions,
+        });
+    });
+    if let Some(k) = rows.iter().position(|row| !row.iter().all(|a| a.is_finite())) {
+        return Err(degenerate(mesh, &patch, k, f64::INFINITY).into());
+    }
+    Ok(Stencils::nine(mesh, laplacian, patch, rows, &conditions))
+}
+
+/// The node of an unknown.
+fn node(patch: &Patch<2>, k: usize) -> [usize; 2] {
+    [patch.origin[0] + k / patch.size[1], patch.origin[1] + k % patch.size[1]]
+}
+
+fn degenerate(mesh: &Mesh<2>, patch: &Patch<2>, k: usize, condition: f64) -> Failure {
+    let node = node(patch, k);
+    Failure::DegenerateStencil { node, x: mesh.x()[mesh.lattice().index(node)], condition }
+}
+
+/// Refuses settings that go only with another kind.
+impl Laplacian {
+    /// The kind of this name; `polynomials` and `scaling` belong to `published`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where there is no such kind, or where it has no such setting.
+    pub fn named(name: &str, polynomials: Option<Polynomials>, scaling: Option<Scaling>) -> Result<Self> {
+        let found = match name {
+            "optimised" => Self::Optimised,
+            "harmonic" => Self::Harmonic,
+            "compact25" => Self::Compact25,
+            "mapped" => Self::Mapped,
+            "published" => {
+                return Ok(Self::Published {
+                    polynomials: polynomials.unwrap_or_default(),
+                    scaling: scaling.unwrap_or_default(),
+                });
+            }
+            _ => {
+                let names: Vec<&str> = Self::KINDS.iter().map(|(name, _)| *name).collect();
+                return Err(Error::invalid(
+                    "kind",
+                    format!("\"{name}\""),
+                    format!("must be one of {}", names.join(", ")),
+                ));
+            }
+        };
+        let key = if polynomials.is_some() { "polynomials" } else { "scaling" };
+        match (polynomials, scaling) {
+            (None, None) => Ok(found),
+            _ => Err(Error::invalid(key, "given", "only kind = \"published\" has it; leave it out")),
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Δu = f on any structured mesh.
+
+use super::Stencils;
+use crate::error::Failure;
+use crate::geometry::{Lattice, Mesh};
+use crate::numerics::lanes::{Lanes, Qr};
+use crate::numerics::linear::SparseSystem;
+
+/// Poisson's equation with given values or normal derivatives on the sides of a mesh
+///
+/// ```text
+/// Δu = f inside,   u = g   or   n·∇u = g on the sides,   n outward
+/// ```
+///
+/// All arrays have one value a node in lattice order.
+///
+/// # Example
+/// ```
+/// use driftmesh::geometry::{Lattice, Mesh};
+/// use driftmesh::laplacian::{Laplacian, Poisson, stencils};
+/// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 2.0])?;
+/// let exact: Vec<f64> = mesh.x().iter().map(|[x, y]| x * x + x * y).collect();
+/// let problem = Poisson { source: &[2.0; 25], side: &exact, neumann: [[false; 2]; 2] };
+/// let u = problem.solve(&mesh, &stencils(&mesh, Laplacian::Optimised)?)?;
+/// assert!(u.iter().zip(&exact).all(|(u, e)| (u - e).abs() < 1e-13));
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Poisson<'a> {
+    /// f, at every node.
+    pub source: &'a [f64],
+    /// g, at every node of the sides: a value, or on Neumann sides the normal derivative.
+    pub side: &'a [f64],
+    /// Neumann sides: the lower and upper one across each axis. A corner between two kinds belongs to the other kind.
+    pub neumann: [[bool; 2]; 2],
+}
+
+impl Poisson<'_> {
+    /// The solution at every node, by a sparse direct solver.
+    ///
+    /// # Errors
+    /// [`Failure::WrongLength`] where an array does not fit the mesh; [`Failure::LinearStalled`] where the system is
+    /// singular, as it is with Neumann sides alone.
+    pub fn solve(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<Vec<f64>, Failure> {
+        let lattice = mesh.lattice();
+        let expected = lattice.len();
+        for (what, values) in [("the source", self.source), ("the side data", self.side)] {
+            if values.len() != expected {
+                return Err(Failure::WrongLength { what, found: values.len(), expected });
+            }
+        }
+        let known = |index: usize| lattice.on_side(index) && self.neumann_side(lattice, index).is_none();
+        let mut place = vec![usize::MAX; expected];
+        let unknown: Vec<usize> = (0..expected).filter(|&index| !known(index)).collect();
+        unknown.iter().enumerate().for_each(|(k, &index)| place[index] = k);
+
+        let mut system = SparseSystem::new(unknown.len());
+        let mut b = vec![0.0; unknown.len()];
+        let mut couple = |row: usize, index: usize, a: f64, b: &mut f64| match place[index] {
+            usize::MAX => *b -= a * self.side[index],
+            column => system.add(row, column, a),
+        };
+        for k in 0..stencils.patch().len() {
+            let row = place[stencils.index(k)];
+            for (index, a, source) in stencils.row(k) {
+                couple(row, index, a, &mut b[row]);
+                b[row] += source * self.source[index];
+            }
+        }
+        for &index in &unknown {
+            if let Some(side) = self.neumann_side(lattice, index) {
+                let row = place[index];
+                for (index, a) in derivative(mesh, index, outward(mesh, index, side))? {
+                    couple(row, index, a, &mut b[row]);
+                }
+                b[row] += self.side[index];
+            }
+        }
+        let solution = system.solve(&b)?;
+        let mut u = self.side.to_vec();
+        unknown.iter().zip(solution).for_each(|(&index, value)| u[index] = value);
+        Ok(u)
+    }
+
+    /// The Neumann side that a node stands on, as (axis, upper), if it stands on no other kind.
+    pub fn neumann_side(&self, lattice: &Lattice<2>, index: usize) -> Option<(usize, bool)> {
+        let beyond = lattice.beyond(index);
+        let on = |kind: bool| {
+            (0..2)
+                .flat_map(|d| [(d, false), (d, true)])
+                .find(move |&(d, upper)| beyond[d][usize::from(upper)] && self.neumann[d][usize::from(upper)] == kind)
+        };
+        if on(false).is_some() { None } else { on(true) }
+    }
+}
+
+/// The outward normal at a node of a side, from the nodes beside it along the side.
+pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f64; 2] {
+    let (lattice, x) = (mesh.lattice(), mesh.x());
+    let (node, nodes, along) = (lattice.node(index), lattice.nodes(), 1 - axis);
+    let at = |k: usize| {
+        let mut node = node;
+        node[along] = k;
+        x[lattice.index(node)]
+    };
+    let (before, after) = (at(node[along].max(1) - 1), at((node[along] + 1).min(nodes[along] - 1)));
+    let t = [after[0] - before[0], after[1] - before[1]];
+    // rotated to the upper side of the axis, where the mesh is not mirrored
+    let sign = if (axis == 0) == upper { 1.0 } else { -1.0 };
+    let size = t[0].hypot(t[1]);
+    [sign * t[1] / size, -sign * t[0] / size]
+}
+
+/// n·∇u at a node of a side from the 3 × 3 nodes next to it, exact for quadratics: (lattice index, weight).
+fn derivative(mesh: &Mesh<2>, index: usize, n: [f64; 2]) -> Result<[(usize, f64); 9], Failure> {
+    let (lattice, x) = (mesh.lattice(), mesh.x());
+    let (node, nodes) = (lattice.node(index), lattice.nodes());
+    let first: [usize; 2] = std::array::from_fn(|d| (node[d].max(1) - 1).min(nodes[d] - 3));
+    let mut points = [index; 9];
+    let around = (0..9).map(|p| lattice.index([first[0] + p / 3, first[1] + p % 3])).filter(|&p| p != index);
+    points[1..].iter_mut().zip(around).for_each(|(point, p)| *point = p);
+    let away = points.map(|p| [x[p][0] - x[index][0], x[p][1] - x[index][1]]);
+    let h = away.iter().flatten().fold(0.0_f64, |h, d| h.max(d.abs()));
+    let mut columns = [[Lanes::ZERO; 8]; 5];
+    let share: [f64; 8] = std::array::from_fn(|j| (h / away[j + 1][0].hypot(away[j + 1][1])).powi(3));
+    for j in 0..8 {
+        let [x, y] = away[j + 1].map(|d| d / h);
+        for (column, p) in columns.iter_mut().zip([x, y, x * y, x * x - y * y, x * x]) {
+            column[j] = Lanes::splat(p * share[j]);
+        }
+    }
+    let qr = Qr::new(columns);
+    let a = qr.shortest(&[n[0], n[1], 0.0, 0.0, 0.0].map(Lanes::splat));
+    let mut row = points.map(|p| (p, 0.0));
+    for j in 0..8 {
+        row[j + 1].1 = a[j].0[0] * share[j] / h;
+        row[0].1 -= row[j + 1].1;
+    }
+    match row.iter().all(|(_, a)| a.is_finite()) {
+        true => Ok(row),
+        false => Err(Failure::DegenerateStencil { node, x: x[index], condition: qr.condition().0[0] }),
+    }
+}

@@ -1,0 +1,174 @@
+use crate::error::{Error, Failure, Result};
+use crate::geometry::{Lattice, Mesh};
+
+/// The phase below the front, warm: number 1 of the equations.
+pub const LOWER: usize = 0;
+/// The phase above the front, cold: number 0 of the equations.
+pub const UPPER: usize = 1;
+
+/// A phase thinner than this share of its column vanishes.
+const VANISHED: f64 = 2e-3;
+/// A steeper front is no graph any more.
+const STEEP: f64 = 10.0;
+
+/// Equally spaced columns between two walls; rows of both phases, closer near the front
+///
+/// ```text
+/// below:  y = b + (h − b)(1 − (1 − s)^p)      above:  y = h + (c − h) s^p      s = j / rows
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    x: Vec<f64>,
+    walls: [Vec<f64>; 2],
+    rows: [usize; 2],
+    /// Share of the way from the lower end of each phase to the upper one, row by row.
+    shares: [Vec<f64>; 2],
+}
+
+impl Columns {
+    /// Columns from x\[0\] to x\[1\]; `walls` gives the bottom and the top.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for `cells` below \[2, 3, 3\] or a power that is not between 1 and 4.
+    pub fn new(x: [f64; 2], walls: [&dyn Fn(f64) -> f64; 2], cells: [usize; 3], power: f64) -> Result<Self> {
+        if cells[0] < 4 || cells[1] < 3 || cells[2] < 3 {
+            let rule = "needs at least 4 cells across and 3 in each phase";
+            return Err(Error::invalid("cells", format!("{cells:?}"), rule));
+        }
+        if cells.iter().try_fold(1_usize, |all, &n| all.checked_mul(n + 3)).is_none() {
+            return Err(Error::invalid("cells", format!("{cells:?}"), "so many nodes cannot be counted; lower it"));
+        }
+        if !(1.0..=4.0).contains(&power) {
+            return Err(Error::invalid("grading", power, "must be between 1 (equal rows) and 4"));
+        }
+        let n = cells[0];
+        let middle = 0.5 * (x[0] + x[1]);
+        // mirrored to the last bit about the middle
+        let half = 0.5 * (x[1] - x[0]);
+        let x: Vec<f64> = (0..=n).map(|i| middle + half * ((2 * i) as f64 - n as f64) / n as f64).collect();
+        let shares = [LOWER, UPPER].map(|phase| {
+            let rows = cells[1 + phase];
+            let share = |j: usize| match phase {
+                LOWER if j < rows => 1.0 - (1.0 - j as f64 / rows as f64).powf(power),
+                UPPER if j < rows => (j as f64 / rows as f64).powf(power),
+                _ => 1.0,
+            };
+            (0..=rows).map(share).collect()
+        });
+        let walls = walls.map(|wall| x.iter().map(|&x| wall(x)).collect());
+        Ok(Self { x, walls, rows: [cells[1], cells[2]], shares })
+    }
+
+    /// x of each column.
+    pub fn x(&self) -> &[f64] {
+        &self.x
+    }
+
+    /// Distance of the columns.
+    pub fn spacing(&self) -> f64 {
+        (self.x[self.x.len() - 1] - self.x[0]) / (self.x.len() - 1) as f64
+    }
+
+    /// Cells across a phase.
+    pub fn rows(&self, phase: usize) -> usize {
+        self.rows[phase]
+    }
+
+    /// Height of the wall of a phase, the bottom for the lower one.
+    pub fn wall(&self, phase: usize) -> &[f64] {
+        &self.walls[phase]
+    }
+
+    /// Row of the front and of the wall in a phase.
+    pub fn ends(&self, phase: usize) -> [usize; 2] {
+        if phase == LOWER { [self.rows[LOWER], 0] } else { [0, self.rows[UPPER]] }
+    }
+
+    /// y of all nodes of a phase, column by column.
+    pub fn heights(&self, phase: usize, front: &[f64]) -> Vec<f64> {
+        let mut y = Vec::with_capacity(self.x.len() * (self.rows[phase] + 1));
+        for (wall, &h) in self.walls[phase].iter().zip(front) {
+            let (low, high) = if phase == LOWER { (*wall, h) } else { (h, *wall) };
+            let last = self.rows[phase];
+            y.extend(self.shares[phase].iter().enumerate().map(|(j, share)| match j {
+                j if j == last => high,
+                _ => low + (high - low) * share,
+            }));
+        }
+        y
+    }
+
+    /// The mesh of a phase; with a mirrored column beyond each side where `mirrored`.
+    pub(super) fn mesh(&self, phase: usize, y: &[f64], mirrored: bool) -> Result<Mesh<2>> {
+        let (n, m) = (self.x.len(), self.rows[phase] + 1);
+        let h = self.spacing();
+        let mut nodes = Vec::with_capacity((n + 2) * m);
+        let mut column = |x: f64, i: usize| nodes.extend(y[i * m..(i + 1) * m].iter().map(|&y| [x, y]));
+        if mirrored {
+            column(self.x[0] - h, 1);
+        }
+        (0..n).for_each(|i| column(self.x[i], i));
+        if mirrored {
+            column(self.x[n - 1] + h, n - 2);
+        }
+        let across = n - 1 + if mirrored { 2 } else { 0 };
+        Mesh::mapped(Lattice::bounded([across, m - 1])?, nodes)
+    }
+
+    /// Both phases as one mesh, the front being row `rows(LOWER)`.
+    ///
+    /// # Errors
+    /// [`Failure::NonFinite`] where a height is not finite.
+    pub fn whole(&self, front: &[f64]) -> Result<Mesh<2>> {
+        let [low, high] = [LOWER, UPPER].map(|phase| self.heights(phase, front));
+        let [n, m] = self.rows;
+        let mut nodes = Vec::with_capacity(self.x.len() * (n + m + 1));
+        for (i, &x) in self.x.iter().enumerate() {
+            nodes.extend(low[i * (n + 1)..(i + 1) * (n + 1)].iter().map(|&y| [x, y]));
+            nodes.extend(high[i * (m + 1) + 1..(i + 1) * (m + 1)].iter().map(|&y| [x, y]));
+        }
+        Mesh::mapped(Lattice::bounded([self.x.len() - 1, n + m])?, nodes)
+    }
+
+    /// Values of both phases in the order of [`whole`](Self::whole).
+    pub fn joined(&self, u: &[Vec<f64>; 2]) -> Vec<f64> {
+        let [n, m] = self.rows;
+        let column = |i: usize| {
+            u[LOWER][i * (n + 1)..(i + 1) * (n + 1)].iter().chain(&u[UPPER][i * (m + 1) + 1..(i + 1) * (m + 1)])
+        };
+        (0..self.x.len()).flat_map(column).copied().collect()
+    }
+
+    /// Refuses a front that is not between the walls, leaves too little of a phase, or is no graph.
+    ///
+    /// # Errors
+    /// [`Failure::NonFinite`], [`Failure::FrontOutside`], [`Failure::VanishingPhase`] or [`Failure::NotAGraph`].
+    pub fn check(&self, front: &[f64]) -> Result<(), Failure> {
+        for (i, (&x, &y)) in self.x.iter().zip(front).enumerate() {
+            if !y.is_finite() {
+                return Err(Failure::NonFinite { what: "the front", value: y, node: [i, self.rows[LOWER]], x: [x, y] });
+            }
+            let [bottom, top] = self.walls.each_ref().map(|wall| wall[i]);
+            if y <= bottom {
+                return Err(Failure::FrontOutside { x: [x, y], wall: "bottom", y: bottom });
+            }
+            if y >= top {
+                return Err(Failure::FrontOutside { x: [x, y], wall: "top", y: top });
+            }
+            let of = top - bottom;
+            for (phase, thickness) in [("lower", y - bottom), ("upper", top - y)] {
+                if thickness < VANISHED * of {
+                    return Err(Failure::VanishingPhase { phase, x, thickness, of });
+                }
+            }
+        }
+        let h = self.spacing();
+        for (i, pair) in front.windows(2).enumerate() {
+            let slope = (pair[1] - pair[0]) / h;
+            if slope.abs() > STEEP {
+                return Err(Failure::NotAGraph { x: [self.x[i], pair[0]], slope });
+            }
+        }
+        Ok(())
+    }
+}

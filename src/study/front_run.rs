@@ -1,0 +1,392 @@
+//! Studies of kind `stefan`: how they run, and what they leave.
+
+use super::StefanStudy;
+use super::stefan::Prepared;
+use crate::error::{Error, Moment, Result};
+use crate::geometry::{Field, quality};
+use crate::simulation::{
+    Event, Failed, Frames, Observer, Parallel, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw, draw_curves,
+    final_arrays,
+};
+use crate::stefan::{Front, FrontState, LOWER, Problem, Stepping, UPPER};
+use serde::Serialize;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// `summary.json` of a study of kind `stefan`.
+#[derive(Debug, Clone, Serialize)]
+pub struct StefanSummary {
+    /// Version of this format.
+    pub schema: u32,
+    /// Name of the study.
+    pub study: String,
+    /// `stefan`.
+    pub kind: String,
+    /// Version of the program.
+    pub version: String,
+    /// `running`, `completed` or `failed`.
+    pub status: String,
+    /// What failed and when, if it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<Failed>,
+    /// Where the time went.
+    pub seconds: FrontSeconds,
+    /// What the run had at its disposal.
+    pub parallel: Parallel,
+    /// Steps and their cost.
+    pub work: WorkTotal,
+    /// One entry for each time of `time.report` that was reached.
+    pub reports: Vec<FrontReport>,
+    /// What the user should know although nothing failed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+}
+
+/// Seconds by part.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct FrontSeconds {
+    /// By the clock.
+    pub wall: f64,
+    /// Moving the front and solving the heat equation.
+    pub pde: f64,
+    /// History, frames, pictures.
+    pub output: f64,
+}
+
+/// The state at one of the times asked for.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct FrontReport {
+    /// Time.
+    pub t: f64,
+    /// Of the front.
+    pub front: FrontFigures,
+    /// Of the temperature, where an exact solution is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<FrontError>,
+    /// |ΔE − ∫F dt| / |ΔE| with fluxes by weighted residual; none before anything changed.
+    pub energy_imbalance: Option<f64>,
+    /// The same with fluxes by differences over three rows.
+    pub energy_imbalance_by_differences: Option<f64>,
+    /// The longest stable explicit step, as estimated; none where the front is at rest.
+    pub step_limit: Option<f64>,
+}
+
+/// Of the front.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct FrontFigures {
+    /// Mean height over the width.
+    pub mean: f64,
+    /// Lowest and highest point.
+    pub range: [f64; 2],
+    /// Largest error of its height, where an exact solution is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_linf: Option<f64>,
+}
+
+/// Error of the temperature.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct FrontError {
+    /// Largest over the nodes.
+    pub linf: f64,
+}
+
+/// What a run of a front left behind.
+#[derive(Debug)]
+pub struct FrontFinished {
+    /// What `summary.json` holds.
+    pub summary: StefanSummary,
+    /// The last good state.
+    pub state: FrontState,
+    /// x of its columns.
+    pub columns: Vec<f64>,
+    /// Why the run ended early, if it did.
+    pub failure: Option<Error>,
+}
+
+/// Automatic steps are at most this share of what is stable …
+const OF_THE_LIMIT: f64 = 0.5;
+/// … and this part of the run.
+const PARTS: f64 = 50.0;
+/// An implicit front has no limit but accuracy.
+const IMPLICIT_PARTS: f64 = 100.0;
+/// Fronts drawn over time.
+const CURVES: usize = 16;
+
+#[derive(Serialize)]
+struct Row {
+    t: f64,
+    dt: f64,
+    front_mean: f64,
+    front_min: f64,
+    front_max: f64,
+    front_error_linf: Option<f64>,
+    error_linf: Option<f64>,
+    energy_imbalance: Option<f64>,
+    energy_imbalance_by_differences: Option<f64>,
+    step_limit: Option<f64>,
+    min_scaled_jacobian: f64,
+    q_max: f64,
+    q_mean: f64,
+    newton_iterations: usize,
+    seconds: f64,
+}
+
+/// `history.csv` and `front.csv`.
+struct Tables {
+    path: PathBuf,
+    history: csv::Writer<File>,
+    fronts: csv::Writer<File>,
+}
+
+impl Tables {
+    fn create(directory: &Path, x: &[f64]) -> Result<Self> {
+        let open = |name: &str| {
+            let path = directory.join(name);
+            csv::Writer::from_path(&path).map_err(|error| Error::Unwritable { path, reason: error.to_string() })
+        };
+        let mut tables = Self { path: directory.into(), history: open("history.csv")?, fronts: open("front.csv")? };
+        let heads = ["t".to_string()].into_iter().chain(x.iter().map(|x| format!("x={x}")));
+        tables.fronts.write_record(heads).map_err(|error| tables.unwritable(&error.to_string()))?;
+        Ok(tables)
+    }
+
+    fn unwritable(&self, reason: &str) -> Error {
+        Error::Unwritable { path: self.path.clone(), reason: reason.into() }
+    }
+
+    /// Row by row, so that a run that is killed leaves whole rows.
+    fn write(&mut self, row: Row, front: &[f64]) -> Result<()> {
+        let heights = [row.t].into_iter().chain(front.iter().copied()).map(|value| value.to_string());
+        let fronts = self.fronts.write_record(heights).map_err(|error| error.to_string());
+        let written = self.history.serialize(row).map_err(|error| error.to_string()).and(fronts);
+        let flushed = self.history.flush().and_then(|()| self.fronts.flush()).map_err(|error| error.to_string());
+        written.and(flushed).map_err(|reason| self.unwritable(&reason))
+    }
+}
+
+impl StefanStudy {
+    /// Runs the study into a directory, with further observers watching
+    ///
+    /// A failure after the start is not an error of this function: everything up to the last good state is written, and
+    /// [`FrontFinished::failure`] says what happened. `summary.json` tells the same.
+    ///
+    /// # Errors
+    /// As [`StefanStudy::check`]; [`Error::ForeignDirectory`], [`Error::Busy`] or [`Error::Unwritable`] for the directory.
+    pub fn run(&self, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<FrontFinished> {
+        let begin = Instant::now();
+        let mut prepared = self.prepare()?;
+        let directory = RunDirectory::claim(directory)?;
+        directory.write("study.toml", self.to_toml().as_bytes())?;
+        let mut summary = self.summary();
+        summary.warnings = self.warnings()?;
+        let write = |summary: &StefanSummary| {
+            let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
+            text.push('\n');
+            directory.write("summary.json", text.as_bytes())
+        };
+        write(&summary)?;
+        let mut tables = Tables::create(directory.path(), prepared.front.columns.x())?;
+        let mut frames = Frames::create(directory.path(), prepared.frames.clone())?;
+        let mut curves: Vec<(f64, Vec<f64>)> = Vec::new();
+        let failure = {
+            let mut leave = |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState| {
+                if let Some(row) = row {
+                    tables.write(row, &state.front)?;
+                    let due =
+                        curves.last().is_none_or(|_| snapshot.share >= curves.len() as f64 / CURVES as f64 - 1e-9);
+                    if due {
+                        curves.push((state.t, state.front.clone()));
+                    }
+                }
+                frames.observe(event, snapshot)?;
+                watchers.iter_mut().try_for_each(|watcher| watcher.observe(event, snapshot))
+            };
+            go(&mut prepared, &mut summary, begin, &mut leave).err()
+        };
+        let output = Instant::now();
+        let kept = self.keep(&directory, &prepared, &mut frames, &curves);
+        summary.seconds.output += output.elapsed().as_secs_f64();
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+        summary.error = failure.as_ref().map(Failed::from);
+        write(&summary)?;
+        kept?;
+        let columns = prepared.front.columns.x().to_vec();
+        Ok(FrontFinished { summary, state: prepared.state, columns, failure })
+    }
+
+    /// Runs the study without leaving anything on disk.
+    ///
+    /// # Errors
+    /// As [`StefanStudy::check`].
+    pub fn compute(&self) -> Result<FrontFinished> {
+        let mut prepared = self.prepare()?;
+        let mut summary = self.summary();
+        let failure = go(&mut prepared, &mut summary, Instant::now(), &mut |_, _, _, _| Ok(())).err();
+        summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+        let columns = prepared.front.columns.x().to_vec();
+        Ok(FrontFinished { summary, state: prepared.state, columns, failure })
+    }
+
+    fn summary(&self) -> StefanSummary {
+        StefanSummary {
+            schema: 1,
+            study: self.study.name.clone(),
+            kind: "stefan".into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            status: "running".into(),
+            error: None,
+            seconds: FrontSeconds::default(),
+            parallel: Parallel { ranks: 1, threads: rayon::current_num_threads() },
+            work: WorkTotal::default(),
+            reports: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Writes the last good state: as a frame, as arrays, as pictures.
+    fn keep(
+        &self,
+        directory: &RunDirectory,
+        prepared: &Prepared,
+        frames: &mut Frames,
+        curves: &[(f64, Vec<f64>)],
+    ) -> Result<()> {
+        let names = ["u".to_string()];
+        let state = pictured(&prepared.front, &prepared.state)?;
+        frames.write(&names, &state)?;
+        directory.write("final.npz", &final_arrays(&names, &state))?;
+        let t: f64 = format!("{:.9}", state.t).parse().unwrap_or(state.t);
+        let picture = draw(&format!("{}, t = {t}", self.study.name), "u", &state);
+        directory.write("mesh.svg", picture.svg.as_bytes())?;
+        directory.write("mesh.png", &picture.png)?;
+        let mut curves = curves.to_vec();
+        if curves.last().is_none_or(|(t, _)| *t != prepared.state.t) {
+            curves.push((prepared.state.t, prepared.state.front.clone()));
+        }
+        let all = || curves.iter().flat_map(|(_, h)| h.iter().copied());
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+        let margin = (0.05 * (high - low)).max(1e-3 * high.abs().max(1e-12));
+        let x = prepared.front.columns.x();
+        let title = format!("{}, the front over time", self.study.name);
+        let picture = draw_curves(&title, "t", x, &curves, [x[0], low - margin], [x[x.len() - 1], high + margin]);
+        directory.write("front.svg", picture.svg.as_bytes())?;
+        directory.write("front.png", &picture.png)
+    }
+}
+
+/// Both phases as one state.
+fn pictured(front: &Front, state: &FrontState) -> Result<State> {
+    let mesh = front.columns.whole(&state.front)?;
+    let u = front.columns.joined(&state.u);
+    let rho = vec![1.0; u.len()];
+    let velocity = vec![[0.0; 2]; rho.len()];
+    Ok(State { t: state.t, step: state.step, mesh, u: Field::scalar(u), rho, velocity })
+}
+
+type Leave<'a> = dyn FnMut(Event, &Snapshot<'_>, Option<Row>, &FrontState) -> Result<()> + 'a;
+
+/// The time loop.
+fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leave: &mut Leave<'_>) -> Result<()> {
+    let Prepared { front, given, state, schedule, .. } = prepared;
+    let [start, end] = [schedule.start(), schedule.end()];
+    let names = ["u".to_string()];
+    let mut tell = |event, front: &Front, state: &FrontState, dt: f64, summary: &mut StefanSummary| {
+        let output = Instant::now();
+        let picture = pictured(front, state)?;
+        let quality = quality(&picture.mesh, &picture.rho);
+        let report = report(front, given, state);
+        let seconds = begin.elapsed().as_secs_f64();
+        let row = (event != Event::Finished).then(|| Row {
+            t: state.t,
+            dt,
+            front_mean: report.front.mean,
+            front_min: report.front.range[0],
+            front_max: report.front.range[1],
+            front_error_linf: report.front.error_linf,
+            error_linf: report.error.map(|error| error.linf),
+            energy_imbalance: report.energy_imbalance,
+            energy_imbalance_by_differences: report.energy_imbalance_by_differences,
+            step_limit: report.step_limit,
+            min_scaled_jacobian: quality.min_scaled_jacobian,
+            q_max: quality.q_max,
+            q_mean: quality.q_mean,
+            newton_iterations: summary.work.work.newton_iterations,
+            seconds,
+        });
+        if event != Event::Finished && schedule.reports_at(state.t) {
+            summary.reports.push(report);
+        }
+        let snapshot = Snapshot {
+            state: &picture,
+            unknowns: &names,
+            dt,
+            steps: schedule.steps(),
+            share: (state.t - start) / (end - start),
+            quality,
+            error: None,
+            work: summary.work,
+            interface: None,
+            seconds,
+        };
+        let left = leave(event, &snapshot, row, state);
+        summary.seconds.output += output.elapsed().as_secs_f64();
+        left
+    };
+    tell(Event::Started, front, state, 0.0, summary)?;
+    while let Some(t) = next(front, state, schedule) {
+        let (clock, dt) = (Instant::now(), t - state.t);
+        let stepped = front.step(given, state, t);
+        summary.seconds.pde += clock.elapsed().as_secs_f64();
+        summary.work.work += stepped.map_err(|error| match error {
+            Error::Failed { failure, .. } => {
+                Error::Failed { failure, moment: Some(Moment { t, step: state.step + 1 }) }
+            }
+            other => other,
+        })?;
+        summary.work.steps += 1;
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        tell(Event::Stepped, front, state, dt, summary)?;
+    }
+    tell(Event::Finished, front, state, 0.0, summary)
+}
+
+/// Time at the end of the next step; none at the end.
+fn next(front: &Front, state: &FrontState, schedule: &Schedule) -> Option<f64> {
+    if !schedule.is_automatic() {
+        return schedule.step_from(state.step).map(|_| schedule.time(state.step + 1));
+    }
+    let span = schedule.end() - schedule.start();
+    let dt = match front.stepping {
+        // the schedule may lengthen a step by a third
+        Stepping::Explicit => (OF_THE_LIMIT * front.limit(state)).min(span / PARTS),
+        Stepping::Implicit => span / IMPLICIT_PARTS,
+    };
+    schedule.after(state.t, dt)
+}
+
+fn report(front: &Front, given: &dyn Problem, state: &FrontState) -> FrontReport {
+    let (h, last) = (&state.front, state.front.len() - 1);
+    let inner: f64 = h[1..last].iter().sum();
+    let errors = front.errors(given, state);
+    let limit = front.limit(state);
+    FrontReport {
+        t: state.t,
+        front: FrontFigures {
+            mean: (inner + 0.5 * (h[0] + h[last])) / last as f64,
+            range: [
+                h.iter().copied().fold(f64::INFINITY, f64::min),
+                h.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            ],
+            error_linf: errors.map(|[front, _]| front),
+        },
+        error: errors.map(|[_, linf]| FrontError { linf }),
+        energy_imbalance: state.energy.imbalance(),
+        energy_imbalance_by_differences: state.energy.imbalance_by_differences(),
+        step_limit: limit.is_finite().then_some(limit),
+    }
+}
+
+// the phases are told by number where a study tells them by name
+const _: () = assert!(LOWER == 0 && UPPER == 1);

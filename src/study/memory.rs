@@ -1,0 +1,24 @@
+use crate::error::{Error, Result};
+
+/// Refuses a grid that needs more memory than the machine has.
+///
+/// # Errors
+/// [`Error::Invalid`] for `grid.cells`.
+pub(super) fn check(nodes: u128, bytes_per_node: u128, cells: &[usize]) -> Result<()> {
+    let there = sysinfo::System::new().map_or(u128::MAX, |mut system| {
+        system.refresh_memory();
+        u128::from(system.total_memory())
+    });
+    let needed = nodes.saturating_mul(bytes_per_node);
+    if needed <= there {
+        return Ok(());
+    }
+    let gib = |bytes: u128| (bytes as f64 / (1_u64 << 30) as f64).ceil();
+    let rule = format!(
+        "{:.2e} nodes need about {:.3e} GiB and this machine has {}; lower it",
+        nodes as f64,
+        gib(needed),
+        gib(there)
+    );
+    Err(Error::invalid("grid.cells", format!("{cells:?}"), rule))
+}

@@ -1,0 +1,518 @@
+//! Studies of kind `stefan`: what they say.
+
+use super::mapped::{Ends, check_between, parse};
+use super::{Header, LaplacianTable, Output, Source};
+use crate::error::{Error, Failure, Result};
+use crate::formula::Formula;
+use crate::laplacian::Laplacian;
+use crate::setting::{Auto, fixed, pair};
+use crate::simulation::{FramesAt, Schedule};
+use crate::stefan::{
+    Columns, Filter, Front, FrontState, LOWER, Method, Problem, Similarity, Stepping, Transfer, UPPER,
+};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::fmt;
+
+/// A study of kind `stefan`: two phases and the front between them.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StefanStudy {
+    /// `[study]`.
+    pub study: Header,
+    /// `[domain]`.
+    pub domain: FrontDomain,
+    /// `[grid]`.
+    pub grid: FrontGrid,
+    /// `[phase.lower]` and `[phase.upper]`.
+    #[serde(default)]
+    pub phase: Phases,
+    /// `[front]`.
+    #[serde(default)]
+    pub front: FrontTable,
+    /// `[walls]`.
+    #[serde(default)]
+    pub walls: Walls,
+    /// `[laplacian]`: the discrete Laplacian, of nine points.
+    #[serde(default)]
+    pub laplacian: LaplacianTable,
+    /// `[exact]`: in place of the formulas of initial state, walls and front.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact: Option<ExactFront>,
+    /// `[time]`.
+    pub time: FrontTime,
+    /// `[output]`.
+    #[serde(default)]
+    pub output: Output,
+}
+
+/// `[domain]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrontDomain {
+    /// From the left to the right side.
+    pub x: Ends,
+    /// The wall below, a formula of x.
+    pub bottom: String,
+    /// The wall above, a formula of x.
+    pub top: String,
+    /// The front at the start, a formula of x; from `[exact]` where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub front: Option<String>,
+}
+
+/// `[grid]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrontGrid {
+    /// Cells across, in the lower and in the upper phase.
+    #[serde(deserialize_with = "fixed")]
+    pub cells: [usize; 3],
+    /// Power by which rows are closer near the front.
+    #[serde(default = "grading")]
+    pub grading: f64,
+}
+
+fn grading() -> f64 {
+    1.5
+}
+
+/// `[phase]`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Phases {
+    /// Below the front, warm.
+    pub lower: PhaseTable,
+    /// Above it, cold.
+    pub upper: PhaseTable,
+}
+
+/// `[phase.lower]` or `[phase.upper]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhaseTable {
+    /// D.
+    pub diffusivity: f64,
+    /// Temperature at the start, a formula of x and y.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial: Option<String>,
+    /// Temperature of the wall, a formula of x, y and t.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub boundary: Option<String>,
+}
+
+impl Default for PhaseTable {
+    fn default() -> Self {
+        Self { diffusivity: 1.0, initial: None, boundary: None }
+    }
+}
+
+/// `[front]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FrontTable {
+    /// L, the inverse of the latent heat.
+    pub mobility: f64,
+    /// How the front is moved.
+    pub method: Method,
+    /// How temperatures get to the new mesh.
+    pub transfer: Transfer,
+    /// Across the columns.
+    #[serde(serialize_with = "write_filter", deserialize_with = "read_filter")]
+    pub filter: Filter,
+    /// From which temperatures the front moves.
+    pub stepping: Stepping,
+}
+
+impl Default for FrontTable {
+    fn default() -> Self {
+        Self {
+            mobility: 1.0,
+            method: Method::default(),
+            transfer: Transfer::default(),
+            filter: Filter::default(),
+            stepping: Stepping::default(),
+        }
+    }
+}
+
+fn write_filter<S: Serializer>(filter: &Filter, serializer: S) -> Result<S::Ok, S::Error> {
+    match filter.0 {
+        Some(weights) => weights.serialize(serializer),
+        None => serializer.serialize_str("none"),
+    }
+}
+
+fn read_filter<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Filter, D::Error> {
+    struct Visitor;
+    impl<'de> de::Visitor<'de> for Visitor {
+        type Value = Filter;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("three weights such as [1, 6, 1], or \"none\"")
+        }
+
+        fn visit_str<E: de::Error>(self, text: &str) -> Result<Filter, E> {
+            if text == "none" { Ok(Filter(None)) } else { Err(E::invalid_value(de::Unexpected::Str(text), &self)) }
+        }
+
+        fn visit_seq<A: de::SeqAccess<'de>>(self, entries: A) -> Result<Filter, A::Error> {
+            fixed(de::value::SeqAccessDeserializer::new(entries)).map(|weights| Filter(Some(weights)))
+        }
+    }
+    deserializer.deserialize_any(Visitor)
+}
+
+/// `[walls]`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Walls {
+    /// What holds on the sides.
+    pub sides: crate::stefan::Sides,
+}
+
+/// `[exact]`: an exact solution.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExactFront {
+    /// Which one.
+    pub kind: ExactKind,
+    /// Temperature far away, at most 0.
+    pub far: f64,
+    /// `planar`: temperature of the wall.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall: Option<f64>,
+    /// `planar`: distance of the front from the wall at the start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_front: Option<f64>,
+    /// `planar`: angle by which it rises to the right, in degrees; 0 where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tilt: Option<f64>,
+    /// `planar`: distance of the wall from the origin; 0 where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+    /// `line-source`: heat given off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<f64>,
+    /// `line-source`: distance of the front at the start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_radius: Option<f64>,
+    /// `line-source`: where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre: Option<Centre>,
+}
+
+/// A point.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Centre(#[serde(deserialize_with = "pair")] pub [f64; 2]);
+
+/// An exact solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExactKind {
+    /// Neumann's similarity solution.
+    Planar,
+    /// Melting around a line.
+    LineSource,
+}
+
+impl ExactFront {
+    /// The solution and the time at which it starts.
+    fn solution(&self, diffusivity: [f64; 2], mobility: f64) -> Result<(Similarity, f64)> {
+        let planar = self.kind == ExactKind::Planar;
+        let given = [
+            ("wall", self.wall.is_some(), true),
+            ("start_front", self.start_front.is_some(), true),
+            ("tilt", self.tilt.is_some(), true),
+            ("offset", self.offset.is_some(), true),
+            ("strength", self.strength.is_some(), false),
+            ("start_radius", self.start_radius.is_some(), false),
+            ("centre", self.centre.is_some(), false),
+        ];
+        if let Some((key, ..)) = given.into_iter().find(|&(_, given, of_planar)| given && of_planar != planar) {
+            let kind = if planar { "planar" } else { "line-source" };
+            return Err(Error::invalid(key, "given", format!("kind = \"{kind}\" does not have it; leave it out")));
+        }
+        let need = |key, value: Option<f64>| value.ok_or_else(|| Error::invalid(key, "not given", "add it"));
+        let (key, distance, solution) = match self.kind {
+            ExactKind::Planar => {
+                let (wall, start) = (need("wall", self.wall)?, need("start_front", self.start_front)?);
+                let (tilt, offset) = (self.tilt.unwrap_or(0.0), self.offset.unwrap_or(0.0));
+                ("start_front", start, Similarity::planar([wall, self.far], diffusivity, mobility, tilt, offset)?)
+            }
+            ExactKind::LineSource => {
+                let (strength, start) = (need("strength", self.strength)?, need("start_radius", self.start_radius)?);
+                let Centre(centre) = self.centre.ok_or_else(|| Error::invalid("centre", "not given", "add it"))?;
+                ("start_radius", start, Similarity::line_source(strength, self.far, diffusivity, mobility, centre)?)
+            }
+        };
+        match distance > 0.0 && distance.is_finite() {
+            true => Ok((solution, solution.time(distance))),
+            false => Err(Error::invalid(key, distance, "must be above 0")),
+        }
+    }
+}
+
+/// `[time]`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrontTime {
+    /// Time of the initial state; 0 where nothing is said, and from `[exact]` where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<f64>,
+    /// Time of the last state; or `duration`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end: Option<f64>,
+    /// From start to end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub duration: Option<f64>,
+    /// Longest step; or half of what is stable, and at most a fiftieth of the run.
+    #[serde(default)]
+    pub step: Auto<f64>,
+    /// Times at which `summary.json` reports; the end where none are given.
+    #[serde(default)]
+    pub report: Vec<f64>,
+}
+
+/// What a study makes of its formulas or of its exact solution.
+#[derive(Debug, Clone)]
+#[allow(clippy::large_enum_variant)] // one value a run
+pub(super) enum Given {
+    Formulas { front: Formula, initial: [Formula; 2], boundary: [Formula; 2] },
+    Exact(Similarity, f64),
+}
+
+impl Problem for Given {
+    fn boundary(&self, phase: usize, [x, y]: [f64; 2], t: f64) -> f64 {
+        match self {
+            Self::Formulas { boundary, .. } => boundary[phase].eval(&[x, y, t]),
+            Self::Exact(solution, _) => solution.temperature([x, y], t),
+        }
+    }
+
+    fn initial(&self, phase: usize, x: [f64; 2]) -> f64 {
+        match self {
+            Self::Formulas { initial, .. } => initial[phase].eval(&x),
+            Self::Exact(solution, start) => solution.temperature(x, *start),
+        }
+    }
+
+    fn initial_front(&self, x: f64) -> f64 {
+        match self {
+            Self::Formulas { front, .. } => front.eval(&[x]),
+            Self::Exact(solution, start) => solution.height(x, *start),
+        }
+    }
+
+    fn exact_front(&self, x: f64, t: f64) -> Option<f64> {
+        match self {
+            Self::Formulas { .. } => None,
+            Self::Exact(solution, _) => Some(solution.height(x, t)),
+        }
+    }
+
+    fn exact(&self, x: [f64; 2], t: f64) -> Option<f64> {
+        match self {
+            Self::Formulas { .. } => None,
+            Self::Exact(solution, _) => Some(solution.temperature(x, t)),
+        }
+    }
+}
+
+/// Everything that a run needs.
+pub(super) struct Prepared {
+    pub front: Front,
+    pub given: Given,
+    pub state: FrontState,
+    pub schedule: Schedule,
+    pub frames: FramesAt,
+}
+
+/// Memory for each node: nodal arrays, the sparse matrix and its factors.
+const BYTES_PER_NODE: u128 = 6000;
+const FRAMES_BY_DEFAULT: usize = 20;
+
+impl StefanStudy {
+    /// Reads and checks a study.
+    ///
+    /// # Errors
+    /// [`Error::Study`] at the place of the first mistake.
+    pub fn from_source(source: &Source) -> Result<Self> {
+        let study: Self = source.parse()?;
+        study.check().map_err(|error| source.locate(error))?;
+        Ok(study)
+    }
+
+    /// Refuses settings out of range, and a start that is none.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] or [`Error::Formula`] with the dotted key.
+    pub fn check(&self) -> Result<()> {
+        self.prepare().map(|_| ())
+    }
+
+    /// Memory that the run needs, in bytes.
+    pub fn memory(&self) -> u128 {
+        let [across, lower, upper] = self.grid.cells.map(|n| n as u128 + 1);
+        across * (lower + upper) * BYTES_PER_NODE
+    }
+
+    /// The study as a file, every default filled in.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a study is plain data")
+    }
+
+    fn given(&self) -> Result<Given> {
+        let phases = [("lower", &self.phase.lower), ("upper", &self.phase.upper)];
+        if let Some(exact) = &self.exact {
+            let formulas = phases.iter().flat_map(|(name, phase)| {
+                [("initial", &phase.initial), ("boundary", &phase.boundary)]
+                    .map(|(key, text)| (format!("phase.{name}.{key}"), text))
+            });
+            let all = formulas.chain([("domain.front".to_string(), &self.domain.front)]);
+            if let Some((key, Some(text))) = all.into_iter().find(|(_, text)| text.is_some()) {
+                let rule = "the exact solution of [exact] gives it; leave one of them out";
+                return Err(Error::invalid(key, format!("{text:?}"), rule));
+            }
+            let diffusivity = phases.map(|(_, phase)| phase.diffusivity);
+            let (solution, start) =
+                exact.solution(diffusivity, self.front.mobility).map_err(|error| error.within("exact"))?;
+            return Ok(Given::Exact(solution, start));
+        }
+        if self.walls.sides == crate::stefan::Sides::Exact {
+            let rule = "needs an exact solution; add [exact], or set it to \"neumann\"";
+            return Err(Error::invalid("walls.sides", "\"exact\"", rule));
+        }
+        let read = |key: String, text: &Option<String>, variables: &[&str]| match text {
+            Some(text) => parse(&key, text, variables),
+            None => Err(Error::invalid(key, "not given", "add it, or an exact solution: [exact]")),
+        };
+        let both =
+            |key: &str, take: &dyn Fn(&PhaseTable) -> Option<String>, variables: &[&str]| -> Result<[Formula; 2]> {
+                let [lower, upper] =
+                    phases.map(|(name, phase)| read(format!("phase.{name}.{key}"), &take(phase), variables));
+                Ok([lower?, upper?])
+            };
+        Ok(Given::Formulas {
+            front: read("domain.front".into(), &self.domain.front, &["x"])?,
+            initial: both("initial", &|phase| phase.initial.clone(), &["x", "y"])?,
+            boundary: both("boundary", &|phase| phase.boundary.clone(), &["x", "y", "t"])?,
+        })
+    }
+
+    pub(super) fn prepare(&self) -> Result<Prepared> {
+        self.study.check_name()?;
+        let Ends(x) = self.domain.x;
+        let wall = |key: &str, text: &str| parse(&format!("domain.{key}"), text, &["x"]);
+        let walls = [wall("bottom", &self.domain.bottom)?, wall("top", &self.domain.top)?];
+        check_between(x, &walls).map_err(|error| error.within("domain"))?;
+        let nodes = self.memory() / BYTES_PER_NODE;
+        super::memory::check(nodes, BYTES_PER_NODE, &self.grid.cells)?;
+        let [bottom, top] = &walls;
+        let columns =
+            Columns::new(x, [&|x| bottom.eval(&[x]), &|x| top.eval(&[x])], self.grid.cells, self.grid.grading)
+                .map_err(|error| error.within("grid"))?;
+        let diffusivity = [self.phase.lower.diffusivity, self.phase.upper.diffusivity];
+        let mut front = Front::new(columns, diffusivity, self.front.mobility)?;
+        self.front.filter.check().map_err(|error| error.within("front"))?;
+        front.method = self.front.method;
+        front.transfer = self.front.transfer;
+        front.filter = self.front.filter;
+        front.stepping = self.front.stepping;
+        front.sides = self.walls.sides;
+        front.laplacian = self.laplacian.laplacian()?;
+        if front.laplacian == Laplacian::Compact25 {
+            let rule = "its 25 points reach across the front; take another kind";
+            return Err(Error::invalid("laplacian.kind", "\"compact25\"", rule));
+        }
+        let given = self.given()?;
+        let schedule = self.schedule(&given).map_err(|error| error.within("time"))?;
+        let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
+        let [start, end] = [schedule.start(), schedule.end()];
+        let frames = self.output.frames.clone().unwrap_or_else(|| match schedule.steps() {
+            Some(steps) => FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)),
+            None => {
+                let part = |n: usize| start + (end - start) * n as f64 / FRAMES_BY_DEFAULT as f64;
+                FramesAt::Times((1..FRAMES_BY_DEFAULT).map(part).collect())
+            }
+        });
+        frames.check([start, end]).map_err(|error| error.within("output"))?;
+        Ok(Prepared { front, given, state, schedule, frames })
+    }
+
+    fn schedule(&self, given: &Given) -> Result<Schedule> {
+        let FrontTime { start, end, duration, step, report } = &self.time;
+        let from = match (given, start) {
+            (Given::Exact(_, _), Some(start)) => {
+                let rule = "the exact solution of [exact] starts at a time of its own; leave this out";
+                return Err(Error::invalid("start", start, rule));
+            }
+            (Given::Exact(_, start), None) => *start,
+            (Given::Formulas { .. }, start) => start.unwrap_or(0.0),
+        };
+        let to = match (end, duration) {
+            (Some(end), None) => *end,
+            (None, Some(duration)) if *duration > 0.0 && duration.is_finite() => from + duration,
+            (None, Some(duration)) => return Err(Error::invalid("duration", duration, "must be above 0")),
+            (None, None) => return Err(Error::invalid("end", "not given", "give one of end and duration")),
+            (Some(_), Some(duration)) => {
+                return Err(Error::invalid("duration", duration, "goes not with end; leave one of them out"));
+            }
+        };
+        let report = if report.is_empty() { vec![to] } else { report.clone() };
+        match *step {
+            Auto::Value(step) => Schedule::new(from, to, step, report),
+            Auto::Auto => Schedule::automatic(from, to, report),
+        }
+    }
+
+    /// The setting behind a start that is none.
+    fn blame(&self, error: Error) -> Error {
+        let Error::Failed { failure, .. } = &error else { return error };
+        let key = match (failure, self.exact.as_ref().map(|exact| exact.kind)) {
+            (Failure::WrongSide { .. }, None) => "phase.lower.initial",
+            (Failure::NonFinite { what: "the initial temperature", .. }, None) => "phase.lower.initial",
+            (_, None) => "domain.front",
+            (_, Some(ExactKind::Planar)) => "exact.start_front",
+            (_, Some(ExactKind::LineSource)) => "exact.start_radius",
+        };
+        let table = toml::Table::try_from(self).unwrap_or_default();
+        let present = key.split('.').try_fold(toml::Value::Table(table), |value, part| value.get(part).cloned());
+        let value = present.map_or("not given".into(), |value| value.to_string());
+        Error::invalid(key, value, format!("{failure}; {}", failure.help()))
+    }
+
+    /// What is allowed but probably not meant.
+    ///
+    /// # Errors
+    /// As [`StefanStudy::check`].
+    pub fn warnings(&self) -> Result<Vec<String>> {
+        const NOT_ROUNDING: f64 = 1e-9;
+        let Prepared { front, given, state, .. } = self.prepare()?;
+        let mut warnings = Vec::new();
+        if let Given::Exact(..) = given {
+            return Ok(warnings);
+        }
+        for (phase, name) in [(LOWER, "lower"), (UPPER, "upper")] {
+            let columns = front.columns.x().iter().zip(&state.front).zip(front.columns.wall(phase));
+            let (mut on_front, mut on_wall) = ((0.0_f64, 0.0), (0.0_f64, 0.0));
+            for ((&x, &h), &wall) in columns {
+                let off = given.initial(phase, [x, h]).abs();
+                let gap = (given.initial(phase, [x, wall]) - given.boundary(phase, [x, wall], state.t)).abs();
+                on_front = if off > on_front.0 { (off, x) } else { on_front };
+                on_wall = if gap > on_wall.0 { (gap, x) } else { on_wall };
+            }
+            let size = state.u[phase].iter().fold(0.0_f64, |m, u| m.max(u.abs()));
+            if on_front.0 > NOT_ROUNDING * size {
+                let (off, x) = on_front;
+                warnings.push(format!("`phase.{name}.initial` is not 0 on the front: off by {off:.1e} at x = {x}"));
+            }
+            if on_wall.0 > NOT_ROUNDING * size {
+                let (gap, x) = on_wall;
+                warnings.push(format!(
+                    "`phase.{name}.boundary` is not `phase.{name}.initial` at the start: they differ by {gap:.1e} at x = {x}"
+                ));
+            }
+        }
+        Ok(warnings)
+    }
+}
