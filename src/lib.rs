@@ -33,10 +33,12 @@
 //! # Ok::<(), driftmesh::Error>(())
 //! ```
 //!
+//! Laplacians on any structured mesh are in [`laplacian`], moving phase boundaries in [`stefan`].
+//!
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
-//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`meshing`] and [`physics`],
-//! then [`simulation`], then [`study`].
+//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`laplacian`], [`meshing`] and
+//! [`physics`], then [`stefan`], then [`simulation`], then [`study`].
 
 pub mod error;
 pub mod formula;

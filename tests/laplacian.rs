@@ -161,6 +161,17 @@ fn neumann_sides_are_of_second_order() {
     }
 }
 
+/// The iteration gives what the direct solver gives.
+#[test]
+fn both_solvers_agree() {
+    let mut study = study(40, "kind = \"optimised\"", SHEAR);
+    let direct = study.solve().unwrap();
+    study.solver.kind = driftmesh::study::SolverKind::Krylov;
+    let iterated = study.solve().unwrap();
+    let apart = direct.u.iter().zip(&iterated.u).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    assert!(apart < 1e-10 && iterated.iterations > 0, "{apart:e} after {}", iterated.iterations);
+}
+
 /// Refused at their place in the study, with the cell or the point.
 #[test]
 fn bad_studies_are_refused_at_their_place() {
@@ -178,6 +189,8 @@ fn bad_studies_are_refused_at_their_place() {
         (&["laplacian.scaling=\"local\""], &["laplacian.scaling", "published"]),
         (&["exact.u=\"x +* y\""], &["exact.u"]),
         (&["sides.neumann=[\"left\", \"right\", \"top\", \"bottom\"]"], &["sides.neumann", "constant"]),
+        (&["solver.kind=\"krylov\"", "laplacian.kind=\"compact25\""], &["solver.kind", "nine-point"]),
+        (&["solver.kind=\"krylov\"", "sides.neumann=[\"left\"]"], &["solver.kind", "all sides"]),
         (&["grid.cells=[1, 4]"], &["grid.cells", "2 cells"]),
     ] {
         let mut source = Source::read(file.as_ref()).unwrap();

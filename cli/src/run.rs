@@ -50,17 +50,8 @@ impl Run {
         finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
         if !self.quiet {
             terminal::say(table(&finished.summary));
-            if let Some(report) = finished.summary.reports.first()
-                && let Some(UniformEquivalent { nodes: [n, m], thicker, t }) = study.uniform_equivalent(report)?
-            {
-                let scaled = if thicker > 1.0 {
-                    format!(", scaled from a front {thicker} times as thick")
-                } else {
-                    String::new()
-                };
-                terminal::say(format_args!(
-                    "uniform  about {n} × {m} nodes have the same l_inf at t = {t} (order 2{scaled})"
-                ));
+            if let Some(line) = uniform(study, &finished.summary)? {
+                terminal::say(line);
             }
             terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
             terminal::say(format_args!("run      {}", out.display()));
@@ -79,6 +70,18 @@ impl Run {
     }
 }
 
+/// The uniform meshes with the errors of the reports, where they can be told.
+fn uniform(study: &MovingMesh, summary: &Summary) -> driftmesh::Result<Option<String>> {
+    let mut found = Vec::new();
+    for report in &summary.reports {
+        found.extend(study.uniform_equivalent(report)?);
+    }
+    let Some(UniformEquivalent { thicker, .. }) = found.first().copied() else { return Ok(None) };
+    let nodes: Vec<String> = found.iter().map(|at| format!("{} × {}", at.nodes[0], at.nodes[1])).collect();
+    let scaled = if thicker > 1.0 { format!(", scaled from a front {thicker} times as thick") } else { String::new() };
+    Ok(Some(format!("uniform  about {} nodes have the same l_inf (order 2{scaled})", nodes.join(", "))))
+}
+
 /// Time, error, mesh quality, work and seconds in a few lines.
 fn table(summary: &Summary) -> String {
     let compared = summary.reports.iter().any(|report| report.comparison.is_some());
@@ -87,9 +90,13 @@ fn table(summary: &Summary) -> String {
     for report in &summary.reports {
         let [linf, l2] = report.error.map_or(["-".into(), "-".into()], |e| [e.linf, e.l2].map(|e| format!("{e:.3e}")));
         let q = report.quality;
+        let smallest = match q.min_scaled_jacobian {
+            small if small > 0.0 && small < 1e-3 => format!("{small:.0e}"),
+            j => format!("{j:.4}"),
+        };
         text += &format!(
-            "{:8.4} {linf:>9} {l2:>9} {:7.3} {:7.3} {:7.4} {:9.3}",
-            report.t, q.q_max, q.q_mean, q.min_scaled_jacobian, q.equidistribution
+            "{:8.4} {linf:>9} {l2:>9} {:7.3} {:7.3} {smallest:>7} {:9.3}",
+            report.t, q.q_max, q.q_mean, q.equidistribution
         );
         if let Some(c) = report.comparison {
             text += &format!(" {:7.4} {:7.4} {:9.1e}", c.r_max, c.r_mean, c.mesh_rms);

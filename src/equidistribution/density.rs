@@ -35,7 +35,8 @@ const KRONROD: [[f64; 3]; 8] = [
     [0.207_784_955_007_898_47, 0.204_432_940_075_298_89, 0.0],
     [0.0, 0.209_482_141_084_727_82, 0.417_959_183_673_469_4],
 ];
-const DEEPEST: usize = 40;
+/// Halvings beyond which what is left is taken as rounding.
+const DEEPEST: usize = 12;
 
 impl LineDensity {
     /// M by a formula of x and t.

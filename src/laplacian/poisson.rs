@@ -4,7 +4,11 @@ use super::Stencils;
 use crate::error::Failure;
 use crate::geometry::{Lattice, Mesh};
 use crate::numerics::lanes::{Lanes, Qr};
-use crate::numerics::linear::SparseSystem;
+use crate::numerics::larger;
+use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport, SparseSystem};
+
+/// Residual of the iteration, rows over their diagonal, as a share of the largest given value.
+const ITERATED: f64 = 1e-13;
 
 /// Poisson's equation with given values or normal derivatives on the sides of a mesh
 ///
@@ -80,6 +84,38 @@ impl Poisson<'_> {
         let mut u = self.side.to_vec();
         unknown.iter().zip(solution).for_each(|(&index, value)| u[index] = value);
         Ok(u)
+    }
+
+    /// The solution by an iteration, for nine-point stencils on a mesh with values on all sides: less memory than the direct
+    /// solver, and faster on fine meshes. Also tells the number of iterations, 0 where the direct solver had to step in.
+    ///
+    /// # Errors
+    /// As [`Poisson::solve`]; [`Failure::WrongLength`] for stencils of 25 points or Neumann sides, which it does not take.
+    pub fn iterate(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<(Vec<f64>, usize), Failure> {
+        let lattice = mesh.lattice();
+        let expected = lattice.len();
+        for (what, values) in [("the source", self.source), ("the side data", self.side)] {
+            if values.len() != expected {
+                return Err(Failure::WrongLength { what, found: values.len(), expected });
+            }
+        }
+        let patch = *stencils.patch();
+        let nine = match stencils.nine_points() {
+            Some(nine) if self.neumann == [[false; 2]; 2] && patch.padded_len() == expected => nine,
+            _ => return Err(Failure::WrongLength { what: "a nine-point system with given sides", found: 0, expected }),
+        };
+        let mut matrix = BlockMatrix::<2, 9, 1>::zero_blocks(patch);
+        let mut b = vec![[0.0]; patch.len()];
+        for (k, row) in nine.iter().enumerate() {
+            matrix.rows[k] = row.map(|a| [[a / row[0]]]);
+            b[k] = [self.source[stencils.index(k)] / row[0]];
+        }
+        // with bounded axes a padded vector is the lattice
+        let mut x: Vec<[f64; 1]> = self.side.iter().map(|&u| [u]).collect();
+        patch.places().for_each(|k| x[k] = [0.0]);
+        let size = b.as_flattened().iter().chain(self.side).copied().fold(f64::MIN_POSITIVE, larger);
+        let iterations = RobustTransport::<1>::default().solve(&matrix, &b, &mut x, [ITERATED * size])?;
+        Ok((x.into_flattened(), iterations))
     }
 
     /// The Neumann side that a node stands on, as (axis, upper), if it stands on no other kind.

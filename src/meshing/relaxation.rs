@@ -33,7 +33,7 @@ pub enum Relaxation {
 pub struct Steps {
     /// τ over Δt.
     pub steps: f64,
-    /// γ, from 0 (no prediction) to 1.
+    /// γ, from 0 (no prediction) to ½.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prediction: f64,
 }
@@ -46,6 +46,8 @@ fn is_zero(gain: &f64) -> bool {
 pub const STEPS_WORTH_A_WARNING: f64 = 15.0;
 /// With fewer steps than this it folds on any thin layer.
 const FEWEST_STEPS: f64 = 2.0;
+/// With more, the mesh swings about its density.
+const MOST_PREDICTION: f64 = 0.5;
 
 impl From<f64> for Relaxation {
     fn from(tau: f64) -> Self {
@@ -88,8 +90,12 @@ impl Relaxation {
         match self {
             Self::Time(tau) if tau.is_finite() && tau > 0.0 => Ok(()),
             Self::Time(tau) => Err(Error::invalid("relaxation", tau, "must be a finite number above 0")),
-            Self::Steps(Steps { prediction, .. }) if !(0.0..=1.0).contains(&prediction) => {
-                Err(Error::invalid("relaxation.prediction", prediction, "must be between 0, for none, and 1"))
+            Self::Steps(Steps { prediction, .. }) if !(0.0..=MOST_PREDICTION).contains(&prediction) => {
+                Err(Error::invalid(
+                    "relaxation.prediction",
+                    prediction,
+                    format!("must be between 0, for none, and {MOST_PREDICTION}"),
+                ))
             }
             Self::Steps(Steps { steps, .. }) if steps.is_finite() && steps >= FEWEST_STEPS => Ok(()),
             Self::Steps(Steps { steps, .. }) => {

@@ -35,7 +35,7 @@ const COLOURS: [RGBColor; 6] = [
 ];
 const SIZE: (u32, u32) = (760, 520);
 /// Room around the points, as a factor.
-const ROOM: f64 = 1.6;
+const ROOM: f64 = 1.1;
 
 impl Figure {
     /// Draws it.
@@ -53,7 +53,7 @@ impl Figure {
         let points = || self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
         let range = |d: usize| {
             let ends = points().fold([f64::INFINITY, 0.0_f64], |[low, high], p| [low.min(p[d]), high.max(p[d])]);
-            (ends[0] / ROOM..ends[1] * ROOM).log_scale()
+            (whole(ends[0] / ROOM, f64::floor)..whole(ends[1] * ROOM, f64::ceil)).log_scale()
         };
         let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
         area.fill(&WHITE)?;
@@ -96,6 +96,11 @@ impl Figure {
         area.present()?;
         Ok(())
     }
+}
+
+/// The next power of ten, down or up.
+fn whole(x: f64, round: fn(f64) -> f64) -> f64 {
+    10_f64.powf(round(x.log10()))
 }
 
 /// A number on an axis, as 0.01 or as 1e-5; nothing for those that would stand too close together.

@@ -17,7 +17,7 @@ pub use schedule::Schedule;
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
-use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, Whole};
+use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Whole};
 use crate::physics::Physics;
 use crate::work::Work;
 use pace::Pace;
@@ -101,6 +101,7 @@ const STEPS_OF_THE_START: f64 = 30.0;
 const MAX_STEPS_OF_THE_START: usize = 500;
 /// Motion in one step, as a share of the shortest edge, below which the mesh at the start rests.
 const AT_REST: f64 = 4e-3;
+const HASTY: &str = "`mesh.relaxation` is short";
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
@@ -191,6 +192,7 @@ impl Simulation {
         };
         while let Some((t, dt)) = self.next(state, pace.as_ref()) {
             let step = state.step + 1;
+            self.warn_of_haste(state.t, dt, record);
             let next =
                 coupling::advance(self, state, t, dt, pace.as_ref().map_or(dt, Pace::scale), &mut record.seconds);
             let judged = match &mut pace {
@@ -223,6 +225,18 @@ impl Simulation {
         match pace {
             None => Some((self.schedule.time(state.step + 1), self.schedule.step_from(state.step)?)),
             Some(pace) => self.schedule.after(state.t, pace.step()).map(|t| (t, t - state.t)),
+        }
+    }
+
+    /// Says once in a run that τ, given in units of time, is too few steps.
+    fn warn_of_haste(&self, t: f64, dt: f64, record: &mut Record) {
+        let Relaxation::Time(tau) = self.equation.relaxation else { return };
+        if tau < STEPS_WORTH_A_WARNING * dt && !record.warnings.iter().any(|said| said.starts_with(HASTY)) {
+            record.warnings.push(format!(
+                "{HASTY}: at t = {t} it is {:.2e} time steps; below {STEPS_WORTH_A_WARNING} the mesh overshoots its density \
+                 from step to step, and may fold",
+                tau / dt
+            ));
         }
     }
 

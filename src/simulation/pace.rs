@@ -6,7 +6,7 @@ use crate::numerics::larger;
 use crate::physics::Motion;
 
 /// Steps as long as the solution and the mesh allow: at no moving node does the first unknown change by much more than
-/// three hundredths of its range
+/// three hundredths of the largest range that it had
 ///
 /// Where the mesh goes along with a front, little changes at its nodes, and a step may carry the front over many times its
 /// width. The next step is chosen from the change in the last one; a step in which much more changes, or that fails, is
@@ -16,6 +16,8 @@ pub(super) struct Pace {
     dt: f64,
     longest: f64,
     scale: f64,
+    /// The largest range of the first unknown so far.
+    range: f64,
 }
 
 /// Change in a step, as a share of the range.
@@ -36,17 +38,18 @@ impl Pace {
     /// The first step from a state.
     pub fn new(simulation: &mut Simulation, state: &State) -> Result<Self> {
         let longest = (simulation.schedule.end() - simulation.schedule.start()) / FEWEST;
+        let range = range(&state.u);
         let mut trial = TRIAL * longest;
         let mut number = 1;
         loop {
             let motion = Motion { t: state.t, dt: trial, old: &state.mesh, new: &state.mesh };
             match simulation.physics.step(motion, &state.u) {
                 Ok((u, _)) => {
-                    let share = change_at_nodes(state.mesh.lattice(), &state.u, &u);
+                    let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), range);
                     // a trial in which too much happens says little
                     if share <= CHANGE || number == TRIALS {
                         let dt = (trial * CHANGE / share).min(longest);
-                        return Ok(Self { dt, longest, scale: dt });
+                        return Ok(Self { dt, longest, scale: dt, range });
                     }
                 }
                 Err(failure) if number == TRIALS => {
@@ -83,7 +86,9 @@ impl Pace {
             }
         };
         let after = &step.state;
-        let (dt, share) = (after.t - before.t, change_at_nodes(after.mesh.lattice(), &before.u, &after.u));
+        self.range = self.range.max(range(&after.u));
+        let dt = after.t - before.t;
+        let share = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), self.range);
         // a step that was cut short to meet a report says what a whole one would have done
         let whole = share * self.dt / dt;
         let factor = if whole.is_finite() { (CHANGE / whole).clamp(GROWTH[0], GROWTH[1]) } else { GROWTH[0] };
@@ -96,7 +101,7 @@ impl Pace {
         }
         let mut scale = self.dt;
         if scale < self.scale {
-            let in_place = dt * CHANGE / change_in_place(before, after);
+            let in_place = dt * CHANGE / self::share(change_in_place(before, after), self.range);
             scale = scale.max(in_place.min(self.scale));
         }
         self.scale = scale;
@@ -104,15 +109,15 @@ impl Pace {
     }
 }
 
-/// The largest change of the first unknown at a node inside, over its range; 0 for constants. On sides, where values are
+/// The largest change of the first unknown at a node inside. On sides, where values are
 /// given, nothing has to be solved for.
 fn change_at_nodes(lattice: &Lattice<2>, before: &Field, after: &Field) -> f64 {
     let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
     let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; 2]);
-    over_range(inside.fold(0.0, |m, (_, change)| larger(m, change)), after)
+    inside.fold(0.0, |m, (_, change)| larger(m, change))
 }
 
-/// The largest change of the first unknown at a fixed place, past which the nodes move, over its range.
+/// The largest change of the first unknown at a fixed place, past which the nodes move.
 fn change_in_place(before: &State, after: &State) -> f64 {
     let (from, to) = (DualCells::new(&before.mesh), DualCells::new(&after.mesh));
     let swept = from.swept(&to);
@@ -130,13 +135,17 @@ fn change_in_place(before: &State, after: &State) -> f64 {
         }
         new[k][0] - carried / to.areas()[i]
     });
-    over_range(changes.fold(0.0, larger), &after.u)
+    changes.fold(0.0, larger)
 }
 
-/// A change as a share of the range of the first unknown.
-fn over_range(change: f64, u: &Field) -> f64 {
+/// The range of the first unknown; 0 where it is of rounding.
+fn range(u: &Field) -> f64 {
     let extremes = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = u.component(0).fold(extremes, |(low, high), u| (low.min(u), high.max(u)));
-    // differences below this are of rounding
-    if high - low > 1e-12 * low.abs().max(high.abs()) { change / (high - low) } else { 0.0 }
+    if high - low > 1e-12 * low.abs().max(high.abs()) { high - low } else { 0.0 }
+}
+
+/// A change as a share of a range; 0 for constants.
+fn share(change: f64, range: f64) -> f64 {
+    if range > 0.0 { change / range } else { 0.0 }
 }

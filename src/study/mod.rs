@@ -17,7 +17,7 @@ pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
 pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
 pub use poisson::{
     Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary,
-    Sides, Solved, StencilReport,
+    Sides, Solved, SolverKind, SolverTable, StencilReport,
 };
 pub use run::{Finished, compute, run};
 pub use source::Source;

@@ -35,6 +35,9 @@ pub struct PoissonStudy {
     /// `[laplacian]`.
     #[serde(default)]
     pub laplacian: LaplacianTable,
+    /// `[solver]`.
+    #[serde(default)]
+    pub solver: SolverTable,
     /// `[output]`.
     #[serde(default)]
     pub output: Output,
@@ -81,6 +84,25 @@ pub struct Equation {
 pub struct Sides {
     /// Sides where the normal derivative is given instead of the value.
     pub neumann: Vec<Side>,
+}
+
+/// `[solver]`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverTable {
+    /// How the system is solved.
+    pub kind: SolverKind,
+}
+
+/// How the system is solved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SolverKind {
+    /// Sparse LU.
+    #[default]
+    Lu,
+    /// BiCGSTAB with incomplete factors, for nine-point stencils and values on all sides.
+    Krylov,
 }
 
 /// `[laplacian]`.
@@ -194,6 +216,8 @@ pub struct Solved {
     pub stencils: Stencils,
     /// Against the exact solution.
     pub error: Option<PoissonError>,
+    /// Of the solver, 0 where it is direct.
+    pub iterations: usize,
     seconds: PoissonSeconds,
 }
 
@@ -222,9 +246,14 @@ impl PoissonStudy {
     /// [`Error::Invalid`] or [`Error::Formula`] with the dotted key.
     pub fn check(&self) -> Result<()> {
         self.study.check_name()?;
-        self.laplacian.laplacian()?;
+        let laplacian = self.laplacian.laplacian()?;
         self.data()?;
         let neumann = self.neumann();
+        let iterates = laplacian != Laplacian::Compact25 && neumann == [[false; 2]; 2];
+        if self.solver.kind == SolverKind::Krylov && !iterates {
+            let rule = "takes nine-point stencils with values on all sides; set it to \"lu\"";
+            return Err(Error::invalid("solver.kind", "\"krylov\"", rule));
+        }
         if neumann == [[true; 2]; 2] {
             let rule = "the solution is then known up to a constant only; leave one side out";
             return Err(Error::invalid("sides.neumann", "all four sides", rule));
@@ -335,7 +364,11 @@ impl PoissonStudy {
             }
         }
         let clock = Instant::now();
-        let u = Poisson { side: &side, ..problem }.solve(&mesh, &stencils)?;
+        let problem = Poisson { side: &side, ..problem };
+        let (u, iterations) = match self.solver.kind {
+            SolverKind::Lu => (problem.solve(&mesh, &stencils)?, 0),
+            SolverKind::Krylov => problem.iterate(&mesh, &stencils)?,
+        };
         seconds.solve = clock.elapsed().as_secs_f64();
         let exact: Option<Vec<f64>> = known.map(|known| known.iter().map(|v| v[0]).collect());
         let error = exact.as_ref().map(|exact| {
@@ -345,7 +378,7 @@ impl PoissonStudy {
             let area = sum(areas.iter().copied());
             PoissonError { linf: off().fold(0.0, larger), l2: (squares / area).sqrt(), l2_integral: squares.sqrt() }
         });
-        Ok(Solved { mesh, u, exact, stencils, error, seconds })
+        Ok(Solved { mesh, u, exact, stencils, error, iterations, seconds })
     }
 
     /// Runs the study into a directory.
@@ -387,6 +420,7 @@ impl PoissonStudy {
         if let Ok((solved, output)) = &outcome {
             summary.seconds = PoissonSeconds { output: *output, ..solved.seconds };
             summary.error = solved.error;
+            summary.work.linear_iterations = solved.iterations;
             summary.stencil = Some(solved.report());
             summary.warnings = solved.warnings();
         }

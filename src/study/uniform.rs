@@ -19,6 +19,7 @@ const THINNEST: f64 = 5e-3;
 /// Cells along the longer side in the first run, and the most there may be.
 const CELLS: f64 = 120.0;
 const MOST: f64 = 400.0;
+const FEWEST: f64 = 8.0;
 const RUNS: usize = 3;
 
 impl MovingMesh {
@@ -59,6 +60,10 @@ impl MovingMesh {
             cells *= (found.linf / error.linf).sqrt();
             if cells > MOST {
                 break;
+            }
+            // the front is not there
+            if cells.is_nan() || cells < FEWEST {
+                return Ok(None);
             }
         }
         let nodes = along(cells * thicker).map(|n| n + 1);
