@@ -199,7 +199,7 @@ fn bad_settings_are_refused_by_name() {
         ("pde.viscosty=1", &["unknown key `viscosty`", "did you mean `viscosity`?"]),
         ("pdes.viscosity=1", &["unknown key `pdes`", "did you mean `pde`?"]),
         ("mesh.generator.kind=hole", &["unknown name `hole`", "did you mean `whole`?"]),
-        ("study.kind=stefan", &["unknown name `stefan`", "moving-mesh"]),
+        ("study.kind=statics", &["unknown name `statics`", "moving-mesh"]),
         ("pde.convection=advectiv", &["did you mean `advective`?"]),
         ("time.step=\"fast\"", &["expected a number"]),
         ("grid.cells=40", &["integer `40`, expected an array"]),

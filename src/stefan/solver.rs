@@ -109,7 +109,7 @@ pub struct FrontState {
     pub energy: Energy,
 }
 
-/// Newton's method ends where the front is met to this share of the box.
+/// Newton's method ends where the front is met to this share of the box, times the largest temperature above 1.
 const NEWTON: f64 = 1e-12;
 const NEWTON_ITERATIONS: usize = 40;
 
@@ -345,7 +345,9 @@ impl Front {
         };
         let box_height =
             self.columns.wall(UPPER).iter().zip(self.columns.wall(LOWER)).fold(0.0_f64, |m, (c, b)| m.max(c - b));
-        let tolerance = NEWTON * box_height;
+        // jumps carry the round-off of the temperatures
+        let size = state.u.iter().flatten().copied().fold(1.0, larger);
+        let tolerance = NEWTON * box_height * size;
         // the front as it stands is in the box whatever the step; where sides are given it follows them
         let mut h = state.front.clone();
         if !self.mirrored() {
