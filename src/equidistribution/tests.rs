@@ -267,7 +267,8 @@ fn steep_densities() {
 fn coarse_correction() {
     let method = Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse: Coarse::Galerkin };
     let c300 = || LineDensity::formula("300*(x - 0.5)^2 + 1").unwrap();
-    let rows: [(&str, fn() -> LineDensity, &[usize]); 3] = [
+    type Row = (&'static str, fn() -> LineDensity, &'static [usize]);
+    let rows: [Row; 3] = [
         ("x²+1", square, &[3, 3, 3, 3, 3, 3]),
         ("u₈₁", layer, &[7, 8, 10, 9, 9, 9]),
         ("C = 300", c300, &[10, 9, 9, 9, 8]),
