@@ -155,8 +155,18 @@ pub fn compare(mesh: &Mesh<2>, reference: &Mesh<2>) -> Comparison {
     }
 }
 
+/// Smallest corner Jacobian of every cell over that of the uniform mesh, in lattice order.
+pub fn cell_jacobians(mesh: &Mesh<2>) -> Vec<f64> {
+    let uniform = uniform_jacobian(mesh);
+    let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
+    for_each_cell(mesh, |_, _, corners| {
+        all.push(corner_jacobians(corners).into_iter().fold(f64::INFINITY, f64::min) / uniform);
+    });
+    all
+}
+
 /// Q of every cell, in lattice order.
-fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
+pub fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
     let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
     for_each_cell(mesh, |_, _, corners| all.push(shape(corners)));
     all

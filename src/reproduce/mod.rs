@@ -1,6 +1,5 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
-mod figure;
 mod fronts;
 mod interface_study;
 mod laplacian;
@@ -8,7 +7,7 @@ mod payoff;
 mod table;
 mod tables;
 
-pub use figure::{Curve, Figure};
+pub use crate::simulation::{Curve, Figure};
 pub use interface_study::{InterfaceStep, Measured};
 pub use laplacian::slides_error;
 pub use table::Table;

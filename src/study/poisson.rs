@@ -404,12 +404,7 @@ impl PoissonStudy {
             stencil: None,
             warnings: Vec::new(),
         };
-        let write = |summary: &PoissonSummary| {
-            let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
-            text.push('\n');
-            directory.write("summary.json", text.as_bytes())
-        };
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         let outcome = self.solve().and_then(|solved| {
             let output = Instant::now();
             keep(self, &directory, &solved)?;
@@ -425,7 +420,7 @@ impl PoissonStudy {
             summary.warnings = solved.warnings();
         }
         summary.seconds.wall = begin.elapsed().as_secs_f64();
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         outcome.map(|_| summary)
     }
 }
@@ -489,7 +484,7 @@ fn keep(study: &PoissonStudy, directory: &RunDirectory, solved: &Solved) -> Resu
     let rho = vec![1.0; solved.u.len()];
     let velocity = vec![[0.0; 2]; rho.len()];
     let state = State { t: 0.0, step: 0, mesh: solved.mesh.clone(), u: Field::joined(&fields), rho, velocity };
-    Frames::create(directory.path(), FramesAt::Every(1))?.write(&names, &state)?;
+    Frames::create(directory.path(), FramesAt::Every(1), [1, 1])?.write(&names, &state)?;
     directory.write("final.npz", &final_arrays(&names, &state))?;
     let title = format!("{}, {}", study.study.name, study.laplacian.kind);
     let picture = draw(&title, "u", &state);
