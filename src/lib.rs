@@ -38,7 +38,7 @@
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
 //! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`laplacian`], [`meshing`] and
-//! [`physics`], then [`stefan`], then [`simulation`], then [`study`].
+//! [`physics`], then [`stefan`], then [`simulation`], then [`report`], then [`study`].
 
 pub mod error;
 pub mod formula;
@@ -61,6 +61,8 @@ pub mod physics;
 pub mod stefan;
 
 pub mod simulation;
+
+pub mod report;
 
 pub mod study;
 

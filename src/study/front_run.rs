@@ -4,6 +4,7 @@ use super::StefanStudy;
 use super::stefan::Prepared;
 use crate::error::{Error, Moment, Result};
 use crate::geometry::{Field, quality};
+use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, Observer, Parallel, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw, draw_curves,
     final_arrays,
@@ -207,6 +208,11 @@ impl StefanStudy {
         summary.error = failure.as_ref().map(Failed::from);
         directory.write_summary(&summary)?;
         kept?;
+        let output = Instant::now();
+        report::finish(directory.path(), self.output.report, self.output.animation)?;
+        summary.seconds.output += output.elapsed().as_secs_f64();
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        directory.write_summary(&summary)?;
         let columns = prepared.front.columns.x().to_vec();
         Ok(FrontFinished { summary, state: prepared.state, columns, failure })
     }
@@ -291,7 +297,7 @@ fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leav
         let output = Instant::now();
         let picture = pictured(front, state)?;
         let quality = quality(&picture.mesh, &picture.rho);
-        let report = report(front, given, state);
+        let report = reported(front, given, state);
         let seconds = begin.elapsed().as_secs_f64();
         let row = (event != Event::Finished).then(|| Row {
             t: state.t,
@@ -361,7 +367,7 @@ fn next(front: &Front, state: &FrontState, schedule: &Schedule) -> Option<f64> {
     schedule.after(state.t, dt)
 }
 
-fn report(front: &Front, given: &dyn Problem, state: &FrontState) -> FrontReport {
+fn reported(front: &Front, given: &dyn Problem, state: &FrontState) -> FrontReport {
     let (h, last) = (&state.front, state.front.len() - 1);
     let inner: f64 = h[1..last].iter().sum();
     let errors = front.errors(given, state);

@@ -5,6 +5,7 @@ use crate::formula::{Formula, Program};
 use crate::geometry::{Field, Mesh, node_areas};
 use crate::laplacian::{Laplacian, Poisson, Polynomials, Scaling, Stencils, outward, unchecked};
 use crate::numerics::{larger, sum};
+use crate::report;
 use crate::setting::pair;
 use crate::simulation::{Failed, Frames, FramesAt, Parallel, RunDirectory, State, draw, final_arrays};
 use crate::study::Source;
@@ -421,7 +422,13 @@ impl PoissonStudy {
         }
         summary.seconds.wall = begin.elapsed().as_secs_f64();
         directory.write_summary(&summary)?;
-        outcome.map(|_| summary)
+        outcome?;
+        let output = Instant::now();
+        report::finish(directory.path(), self.output.report, self.output.animation)?;
+        summary.seconds.output += output.elapsed().as_secs_f64();
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        directory.write_summary(&summary)?;
+        Ok(summary)
     }
 }
 

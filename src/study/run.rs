@@ -1,6 +1,7 @@
 use super::MovingMesh;
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, compare};
+use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw,
     final_arrays,
@@ -80,6 +81,13 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     let written = directory.write_summary(&summary);
     let (state, failure) = outcome?;
     written?;
+    // the report shows the summary; what it took itself is added afterwards
+    let output = Instant::now();
+    report::finish(directory.path(), study.output.report, study.output.animation)?;
+    let spent = output.elapsed().as_secs_f64();
+    summary.seconds.output += spent;
+    summary.seconds.wall += spent;
+    directory.write_summary(&summary)?;
     Ok(Finished { summary, state, failure })
 }
 

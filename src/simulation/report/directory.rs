@@ -18,7 +18,7 @@ pub struct RunDirectory {
 const LOCK: &str = "run.lock";
 
 /// Everything that a run may write, beside its frames.
-const OURS: [&str; 23] = [
+const OURS: [&str; 29] = [
     "summary.json",
     "study.toml",
     "history.csv",
@@ -40,6 +40,12 @@ const OURS: [&str; 23] = [
     "quality.svg",
     "contraction.png",
     "contraction.svg",
+    "energy.png",
+    "energy.svg",
+    "front-error.png",
+    "front-error.svg",
+    "front-position.png",
+    "front-position.svg",
     "steps.png",
     "steps.svg",
 ];
@@ -140,7 +146,7 @@ fn wrote(path: &Path) -> bool {
 }
 
 /// Writes a file under another name and renames it when it is complete.
-pub(in crate::simulation) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
+pub(crate) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);

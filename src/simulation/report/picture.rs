@@ -262,13 +262,26 @@ pub(super) fn escape(text: &str) -> String {
 
 /// A drawing in both formats: SVG with its font inside, and PNG.
 pub(super) fn picture(svg: String) -> Picture {
-    let png = pixels(&svg, 2).encode_png().expect("writing to memory cannot fail");
+    let png = encoded(&pixels(&svg, 2)).expect("writing to memory cannot fail");
     let font = format!(
         "<style>@font-face{{font-family:\"DejaVu Sans\";src:url(data:font/ttf;base64,{})}}</style>\n",
         STANDARD.encode(FONT)
     );
     let open = svg.find('>').map_or(0, |end| end + 1);
     Picture { svg: [&svg[..open], "\n", &font, &svg[open..]].concat(), png }
+}
+
+/// Pixels without their opacity, which is full, compressed fast: writing must not take longer than computing.
+fn encoded(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, png::EncodingError> {
+    let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb)?;
+    writer.finish()?;
+    Ok(bytes)
 }
 
 /// A drawing as pixels, so many times its size.
