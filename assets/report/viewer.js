@@ -89,6 +89,8 @@ function line(out, w, h, x0, y0, x1, y1, shade, strength) {
 // ---- words ------------------------------------------------------------------------------------------------------------
 
 const SYMBOLS = { rho: "ρ", "mesh density": "mesh density ρ" };
+/** What is positive and may span much. */
+const SKEWED = ["rho", "mesh density", "Q", "Jacobian"];
 const symbol = (name) => SYMBOLS[name] ?? name;
 
 /** Six digits, as a power of ten where that is shorter. */
@@ -310,7 +312,7 @@ class Viewer {
         if (this.fields.includes(field)) this.arrays[stage.m][field][f].forEach(take);
         else this.cellValues(stage, field, f).forEach(take);
       }));
-      return { low, high, log: !this.fields.slice(0, -1).includes(field) && low > 0 && high > 30 * low && field !== this.fields[0] };
+      return { low, high, log: SKEWED.includes(field) && low > 0 && high > 30 * low };
     })();
   }
 
@@ -332,7 +334,7 @@ class Viewer {
   drawStage(stage, { low, high, log }) {
     const { canvas, context, mesh } = stage, { extent, lower, stride } = this.data, ratio = Math.min(2, window.devicePixelRatio || 1);
     const style = getComputedStyle(document.body), ink = style.color, paper = style.backgroundColor;
-    const [left, right, top, bottom] = [52, 14, 8, 30].map((p) => Math.round(p * ratio));
+    const [left, right, top, bottom] = [62, 14, 8, 44].map((p) => Math.round(p * ratio));
     const width = Math.max(160, Math.round(canvas.clientWidth * ratio)), w = width - left - right;
     const h = Math.round(w * Math.min(1.25, Math.max(0.3, extent[1] / extent[0]))), height = top + h + bottom;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
@@ -342,7 +344,9 @@ class Viewer {
     const [t, place] = this.placeOf(mesh);
     stage.place = place;
     const theirs = Number.isInteger(place) ? mesh.times[place] : t;
-    stage.caption.textContent = [mesh.name, this.stages.length > 1 && this.data.meshes[0].times.length > 1 ? `t = ${number(theirs)}` : ""].filter(Boolean).join(", ");
+    const pair = this.stages.length > 1, role = stage.m ? "compared with: " : "generator: ";
+    stage.caption.textContent = (mesh.name && role + mesh.name) + (pair ? `, t = ${number(theirs)}` : "");
+    stage.caption.hidden = !stage.caption.textContent;
 
     const field = this.controls.field.value, [n, m] = mesh.lines, nodes = n * m;
     const x = this.values(stage, "x", place), y = this.values(stage, "y", place);
@@ -357,8 +361,6 @@ class Viewer {
     const colours = (this.maps.find((map) => map.name === this.controls.map.value) ?? this.maps[0]).colours;
     const px = new Float64Array(nodes), py = new Float64Array(nodes);
     const dark = r + g + b < 384, lines = this.controls.lines.checked || field === "nothing";
-    // lines fade where cells are few pixels wide
-    const strength = Math.min(0.55, 0.12 * scale * Math.sqrt(extent[0] * extent[1] / nodes));
     const cuts = [];
     for (const shift of this.shifts()) {
       for (let k = 0; k < nodes; k++) {
@@ -376,15 +378,18 @@ class Viewer {
         }
       }
       if (lines) {
-        const segment = (a, b, v) => {
-          const shade = levels ? (v < 153 ? 255 : 0) : dark ? 255 : 0;
-          line(out, w, h, px[a], py[a], px[b], py[b], shade, levels ? strength : 0.75);
+        // c is a node of the cell beside: lines fade where that is few pixels wide
+        const segment = (a, b, c, v) => {
+          const shade = levels ? (v < 153 ? 255 : 0) : dark ? 255 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
+          const wide = Math.abs(dx * (py[c] - py[a]) - dy * (px[c] - px[a])) / Math.hypot(dx, dy);
+          const strength = Math.min(levels ? 0.55 : 0.8, (levels ? 0.1 : 0.25) * wide);
+          if (strength > 0.02) line(out, w, h, px[a], py[a], px[b], py[b], shade, strength);
         };
         const value = (k, i, j) => !levels ? 0 : cell ? levels[Math.min(i, n - 2) * (m - 1) + Math.min(j, m - 2)] : levels[k];
         for (let i = 0, k = 0; i < n; i++) {
           for (let j = 0; j < m; j++, k++) {
-            if (j + 1 < m) segment(k, k + 1, value(k, i, j));
-            if (i + 1 < n) segment(k, k + m, value(k, i, j));
+            if (j + 1 < m) segment(k, k + 1, i + 1 < n ? k + m : k - m, value(k, i, j));
+            if (i + 1 < n) segment(k, k + m, j + 1 < m ? k + 1 : k - 1, value(k, i, j));
           }
         }
       }
@@ -442,8 +447,11 @@ class Viewer {
     for (const [v, text] of ticks(from[1], to[1], Math.max(2, h / ratio / 60))) {
       const p = top + h / 2 - (v - this.centre[1]) * scale;
       context.fillRect(left - 4 * ratio, p - ratio / 2, 4 * ratio, ratio);
-      context.fillText(text, left - 7 * ratio, Math.min(height - 8 * ratio, Math.max(7 * ratio, p)), left - 8 * ratio);
+      context.fillText(text, left - 7 * ratio, Math.max(7 * ratio, p), left - 22 * ratio);
     }
+    context.textAlign = "center";
+    context.fillText("x", left + w / 2, height - 8 * ratio);
+    context.fillText("y", 7 * ratio, top + h / 2);
     const what = field === "nothing" ? "the mesh" : `the mesh over ${symbol(field)}`;
     const lattice = `${(n - 1) * stride} by ${(m - 1) * stride} cells`;
     canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, at t = ${number(theirs)}, from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
@@ -514,28 +522,26 @@ class Viewer {
     this.draw();
   }
 
-  /** Writes what is known at the chosen node into the table. */
+  /** Writes what is known at the chosen node, a line a mesh. */
   read() {
-    const [head, body] = ["thead", "tbody"].map((tag) => document.querySelector(`.readout ${tag}`));
-    const row = (tag, cells) => {
-      const line = document.createElement("tr");
-      line.append(...cells.map((text, k) => {
-        const cell = document.createElement(k ? tag : "th");
-        cell.scope = tag === "th" ? "col" : "row";
-        cell.textContent = text;
-        return cell;
-      }));
+    document.querySelector(".readout").replaceChildren(...this.stages.map((stage) => {
+      const line = document.createElement("dl"), m = stage.mesh.lines[1], { stride, cells } = this.data;
+      const entry = (name, text) => {
+        const [pair, dt, dd] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
+        dt.textContent = name;
+        dd.textContent = text;
+        pair.append(dt, dd);
+        line.append(pair);
+      };
+      if (this.stages.length > 1) entry("mesh", stage.mesh.name.split(",")[0]);
+      const k = this.node && this.node[0] * m + this.node[1], known = (value) => (this.node ? number(value()) : "–");
+      entry("node", this.node ? `(${this.node.map((index, d) => Math.min(index * stride, cells[d])).join(", ")})` : "–");
+      for (const name of ["x", "y"]) entry(name, known(() => stage[name][k]));
+      for (const name of this.fields) entry(symbol(name), known(() => this.values(stage, name, stage.place)[k]));
+      const figures = this.node && shape(stage.x, stage.y, this.cell[0] * m + this.cell[1], m, this.uniform(stage));
+      entry("Q of the cell", known(() => figures[0]));
+      entry("its Jacobian", known(() => figures[1]));
       return line;
-    };
-    head.replaceChildren(row("th", ["node", "x", "y", ...this.fields.map(symbol), "Q of the cell", "Jacobian"]));
-    body.replaceChildren(...this.stages.map((stage) => {
-      const named = this.stages.length > 1 ? `${stage.mesh.name.split(",")[0]} ` : "";
-      if (!this.node) return row("td", [`${named}–`, ...Array(4 + this.fields.length).fill("–")]);
-      const [i, j] = this.node, m = stage.mesh.lines[1], k = i * m + j, { stride, cells } = this.data;
-      const [q, jacobian] = shape(stage.x, stage.y, this.cell[0] * m + this.cell[1], m, this.uniform(stage));
-      const values = this.fields.map((name) => this.values(stage, name, stage.place)[k]);
-      const node = [i, j].map((index, d) => Math.min(index * stride, cells[d]));
-      return row("td", [`${named}(${node.join(", ")})`, ...[stage.x[k], stage.y[k], ...values, q, jacobian].map(number)]);
     }));
   }
 }

@@ -76,10 +76,15 @@ pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
     let lattice = mesh.lattice();
     let nodes = lattice.nodes();
     let mut areas = vec![0.0; lattice.len()];
-    for_each_cell(mesh, |[i, j], _, corners| {
+    let bounded = lattice.periodic() == [false; 2];
+    for_each_cell(mesh, |[i, j], closed, corners| {
         let share = 0.25 * area(corners);
-        for (di, dj) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
-            areas[lattice.index([(i + di) % nodes[0], (j + dj) % nodes[1]])] += share;
+        if bounded {
+            closed.into_iter().for_each(|k| areas[k] += share);
+        } else {
+            for (di, dj) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+                areas[lattice.index([(i + di) % nodes[0], (j + dj) % nodes[1]])] += share;
+            }
         }
     });
     areas

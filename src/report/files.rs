@@ -1,5 +1,6 @@
-use super::frame::Frame;
+use super::frame::{Frame, attribute};
 use crate::error::{Error, Result};
+use crate::parallel::map;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -59,7 +60,7 @@ impl RunFiles {
             toml::Table::new()
         });
         let history = history(&directory.join("history.csv"), &mut notes);
-        let series = ["run.pvd", "compare.pvd"].map(|name| Series::read(&directory.join(name), &mut notes));
+        let series = ["run.pvd", "compare.pvd"].map(|name| Series::read(&directory.join(name)));
         Ok(Self { directory: directory.into(), summary, study_text, study, history, series, notes })
     }
 
@@ -82,9 +83,10 @@ impl RunFiles {
     /// The frames of a series at these places; what is damaged is left out and told of.
     pub fn frames(&mut self, series: usize, places: &[usize]) -> Vec<Frame> {
         let mut frames: Vec<Frame> = Vec::new();
-        for &place in places {
-            let (t, name) = &self.series[series].frames[place];
-            let read = Frame::read(&self.directory.join(name), *t).and_then(|frame| match frames.first() {
+        let files: Vec<&(f64, String)> = places.iter().map(|&place| &self.series[series].frames[place]).collect();
+        let found = map(&files, |(t, name)| Frame::read(&self.directory.join(name), *t));
+        for ((_, name), read) in files.into_iter().zip(found) {
+            let read = read.and_then(|frame| match frames.first() {
                 Some(first) if !first.fits(&frame) => Err("it is not of the same mesh as the frames before".into()),
                 _ => Ok(frame),
             });
@@ -103,23 +105,16 @@ impl RunFiles {
 }
 
 impl Series {
-    /// Reads a `.pvd` file; nothing where there is none.
-    fn read(path: &Path, notes: &mut Vec<String>) -> Self {
-        let Ok(text) = std::fs::read_to_string(path) else { return Self::default() };
-        let document = match roxmltree::Document::parse(&text) {
-            Ok(document) => document,
-            Err(error) => {
-                notes.push(format!("{} is left out: {error}", path.file_name().unwrap_or_default().display()));
-                return Self::default();
-            }
-        };
-        let entries = document.descendants().filter(|node| node.has_tag_name("DataSet"));
-        let frames = entries.filter_map(|node| {
-            let t: f64 = node.attribute("timestep")?.parse().ok()?;
-            let file = node.attribute("file")?;
+    /// Reads a `.pvd` file as runs of ours write it; nothing where there is none.
+    fn read(path: &Path) -> Self {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        let entries = text.lines().filter(|line| line.starts_with("<DataSet "));
+        let frames = entries.filter_map(|line| {
+            let t: f64 = attribute(line, "timestep")?.parse().ok()?;
+            let file = attribute(line, "file")?;
             // only what lies in the directory itself
-            let inside = Path::new(file).components().all(|part| matches!(part, std::path::Component::Normal(_)));
-            (t.is_finite() && inside).then(|| (t, file.to_string()))
+            let inside = Path::new(&file).components().all(|part| matches!(part, std::path::Component::Normal(_)));
+            (t.is_finite() && inside).then_some((t, file))
         });
         Self { frames: frames.collect() }
     }

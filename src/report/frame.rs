@@ -1,6 +1,5 @@
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::read::ZlibDecoder;
-use roxmltree::Node;
 use std::io::Read;
 use std::path::Path;
 
@@ -21,10 +20,9 @@ impl Frame {
     /// Reads a `.vtu` file as runs of ours write it.
     pub fn read(path: &Path, t: f64) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
-        let document = roxmltree::Document::parse(&text).map_err(|error| error.to_string())?;
+        let arrays: Vec<Array<'_>> = arrays(&text);
         let array = |section: &str, name: &str| {
-            let arrays = document.descendants().find(|node| node.has_tag_name(section));
-            let found = arrays.and_then(|node| node.children().find(|array| array.attribute("Name") == Some(name)));
+            let found = arrays.iter().find(|array| array.section == section && array.name == name);
             found.ok_or(format!("it has no array {name:?}"))
         };
         let points = doubles(array("Points", "Points")?)?;
@@ -36,17 +34,12 @@ impl Frame {
         }
         let cells = [x.len() / row - 1, row - 1];
         let mut fields = Vec::new();
-        let nodal = document.descendants().find(|node| node.has_tag_name("PointData"));
-        for array in nodal.iter().flat_map(Node::children).filter(|node| node.has_tag_name("DataArray")) {
-            let name = array.attribute("Name").unwrap_or_default();
-            let scalar = array.attribute("NumberOfComponents").is_none_or(|n| n == "1");
-            if scalar {
-                let values = doubles(array)?;
-                if values.len() != x.len() {
-                    return Err(format!("{name:?} has {} values for {} nodes", values.len(), x.len()));
-                }
-                fields.push((name.to_string(), values));
+        for array in arrays.iter().filter(|array| array.section == "PointData" && array.scalar) {
+            let values = doubles(array)?;
+            if values.len() != x.len() {
+                return Err(format!("{:?} has {} values for {} nodes", array.name, values.len(), x.len()));
             }
+            fields.push((array.name.clone(), values));
         }
         if !x.as_flattened().iter().chain(fields.iter().flat_map(|(_, values)| values)).all(|v| v.is_finite()) {
             return Err("it holds a value that is not finite".into());
@@ -71,22 +64,51 @@ fn cuts([n, m]: [usize; 2], subdomains: &[usize]) -> [Vec<usize>; 2] {
     [changes(n, &|i| subdomains[i * m]), changes(m, &|j| subdomains[j])]
 }
 
-fn doubles(array: Node<'_, '_>) -> Result<Vec<f64>, String> {
+/// An array as it stands in a file.
+struct Array<'a> {
+    section: &'a str,
+    name: String,
+    scalar: bool,
+    text: &'a str,
+}
+
+/// The arrays of a file that a run of ours wrote: each a line, between the lines of its section.
+fn arrays(text: &str) -> Vec<Array<'_>> {
+    let mut section = "";
+    let mut arrays = Vec::new();
+    for line in text.lines() {
+        match line.strip_prefix("<DataArray ").and_then(|line| line.strip_suffix("</DataArray>")?.split_once('>')) {
+            Some((head, text)) => {
+                let name = attribute(head, "Name").unwrap_or_default();
+                arrays.push(Array { section, name, scalar: attribute(head, "NumberOfComponents").is_none(), text });
+            }
+            None => section = line.trim_start_matches('<').trim_end_matches('>'),
+        }
+    }
+    arrays
+}
+
+/// An attribute of a tag.
+pub fn attribute(tag: &str, name: &str) -> Option<String> {
+    let (_, rest) = tag.split_once(&format!("{name}=\""))?;
+    let (value, _) = rest.split_once('"')?;
+    Some(value.replace("&quot;", "\"").replace("&lt;", "<").replace("&amp;", "&"))
+}
+
+fn doubles(array: &Array<'_>) -> Result<Vec<f64>, String> {
     Ok(bytes(array)?.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect())
 }
 
-fn integers<const N: usize>(array: Node<'_, '_>) -> Result<Vec<usize>, String> {
+fn integers<const N: usize>(array: &Array<'_>) -> Result<Vec<usize>, String> {
     let number = |b: &[u8]| b.iter().rev().fold(0, |n, &byte| n << 8 | usize::from(byte));
     Ok(bytes(array)?.chunks_exact(N).map(number).collect())
 }
 
 /// One block behind a header of four numbers.
-fn bytes(array: Node<'_, '_>) -> Result<Vec<u8>, String> {
+fn bytes(array: &Array<'_>) -> Result<Vec<u8>, String> {
     const HEADER: usize = 44;
-    let name = array.attribute("Name").unwrap_or_default();
-    let damaged = |what: &str| format!("its array {name:?} is damaged ({what})");
-    let text = array.text().unwrap_or_default().trim();
-    let compressed = text.get(HEADER..).ok_or_else(|| damaged("too short"))?;
+    let damaged = |what: &str| format!("its array {:?} is damaged ({what})", array.name);
+    let compressed = array.text.get(HEADER..).ok_or_else(|| damaged("too short"))?;
     let compressed = STANDARD.decode(compressed).map_err(|error| damaged(&error.to_string()))?;
     let mut bytes = Vec::new();
     ZlibDecoder::new(compressed.as_slice()).read_to_end(&mut bytes).map_err(|error| damaged(&error.to_string()))?;

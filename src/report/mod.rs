@@ -9,6 +9,7 @@ mod tables;
 mod viewer;
 
 use crate::error::Result;
+use crate::parallel::join;
 use crate::simulation::write_file;
 use files::RunFiles;
 use std::path::{Path, PathBuf};
@@ -34,12 +35,15 @@ pub struct Built {
 pub fn build(directory: &Path) -> Result<Built> {
     let mut run = RunFiles::read(directory)?;
     let plots = plots::of(&run);
-    for (name, figure) in &plots {
-        let picture = figure.draw();
-        write_file(&directory.join(format!("{name}.svg")), picture.svg.as_bytes())?;
-        write_file(&directory.join(format!("{name}.png")), &picture.png)?;
-    }
-    let viewer = viewer::Viewer::of(&mut run);
+    let pictures = || {
+        plots.iter().try_for_each(|(name, figure)| {
+            let picture = figure.draw();
+            write_file(&directory.join(format!("{name}.svg")), picture.svg.as_bytes())?;
+            write_file(&directory.join(format!("{name}.png")), &picture.png)
+        })
+    };
+    let (viewer, drawn) = join(|| viewer::Viewer::of(&mut run), pictures);
+    drawn?;
     if run.asks_for("animation") {
         animation::write(&mut run)?;
     }

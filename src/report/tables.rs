@@ -102,6 +102,8 @@ fn of_records(key: &str, records: &[Value]) -> Table {
             paths.push(path);
         }
     }
+    // what no record knows is no row
+    paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && !value.is_null()));
     let at = |record: &[(String, Value)], path: &String| {
         record.iter().find(|(other, _)| other == path).map_or("–".into(), |(_, value)| shown(value))
     };

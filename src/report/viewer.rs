@@ -51,7 +51,7 @@ impl Viewer {
             left_out.push(format!("{shown} of {} frames", counts[0]));
         }
         if stride > 1 {
-            left_out.push(format!("every {stride}th mesh line"));
+            left_out.push(format!("one mesh line in {stride}"));
         }
         let thinned = (!left_out.is_empty()).then(|| {
             format!("Shown here: {}, which keeps this page below 5 MB. run.pvd opens everything in ParaView.", left_out.join(", "))

@@ -106,7 +106,6 @@ fn svg(sheet: &Sheet<'_>) -> String {
         escape(title)
     );
 
-    // cells, each outlined in its own colour so that no gap shines through
     let lines = cells.map(|n| {
         let stride = n.div_ceil(MAX_CELLS);
         (0..n).step_by(stride).chain([n]).collect::<Vec<usize>>()
@@ -124,12 +123,17 @@ fn svg(sheet: &Sheet<'_>) -> String {
         !(outside(0, lx, wx) || outside(1, ly, wy))
     };
     let place = |k: usize, shift: [f64; 2]| point(to([x[k][0] + shift[0], x[k][1] + shift[1]]));
-    let _ = writeln!(
-        s,
-        "<clipPath id=\"box\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\n\
-         <g clip-path=\"url(#box)\">"
-    );
-    s.push_str("<g stroke-width=\"0.6\" stroke-linejoin=\"round\">\n");
+    if periodic.contains(&true) {
+        let _ = writeln!(
+            s,
+            "<clipPath id=\"box\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\n\
+             <g clip-path=\"url(#box)\">"
+        );
+    } else {
+        s.push_str("<g>\n");
+    }
+    // cells, without soft edges, so that no gap shines through
+    s.push_str("<g shape-rendering=\"crispEdges\">\n");
     for i in lines[0].windows(2) {
         for j in lines[1].windows(2) {
             let corners = [at(i[0], j[0]), at(i[1], j[0]), at(i[1], j[1]), at(i[0], j[1])];
@@ -137,7 +141,7 @@ fn svg(sheet: &Sheet<'_>) -> String {
             let fill = colour((mean - low) / (high - low));
             for &shift in shifts.iter().filter(|&&shift| shown(&corners, shift)) {
                 let points: Vec<String> = corners.iter().map(|&k| place(k, shift)).collect();
-                let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\" stroke=\"{fill}\"/>", points.join(" "));
+                let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\"/>", points.join(" "));
             }
         }
     }
