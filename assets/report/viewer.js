@@ -46,43 +46,48 @@ function shape(x, y, a, row, uniform) {
 
 // ---- pixels -----------------------------------------------------------------------------------------------------------
 
-/** Fills a triangle with colours between the values (0 to 255) at its corners. */
-function triangle(out, w, h, colours, ax, ay, av, bx, by, bv, cx, cy, cv) {
-  const top = Math.max(0, Math.ceil(Math.min(ay, by, cy) - 0.5)), bottom = Math.min(h - 1, Math.floor(Math.max(ay, by, cy) - 0.5));
-  if (top > bottom || Math.max(ax, bx, cx) < 0 || Math.min(ax, bx, cx) > w) return;
-  const det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
-  if (det === 0) return;
-  const vx = ((bv - av) * (cy - ay) - (cv - av) * (by - ay)) / det, vy = ((cv - av) * (bx - ax) - (bv - av) * (cx - ax)) / det;
+/** Fills a quadrilateral, between its leftmost and rightmost point in every row, with colours between the values (0 to 255) there. */
+function quadrilateral(out, w, h, colours, ax, ay, av, bx, by, bv, cx, cy, cv, dx, dy, dv) {
+  const low = ay < by ? (ay < cy ? ay : cy) : by < cy ? by : cy, high = ay > by ? (ay > cy ? ay : cy) : by > cy ? by : cy;
+  const top = Math.max(0, Math.ceil((low < dy ? low : dy) - 0.5)), bottom = Math.min(h - 1, Math.floor((high > dy ? high : dy) - 0.5));
+  if (top > bottom) return;
+  const ab = 1 / (by - ay), bc = 1 / (cy - by), cd = 1 / (dy - cy), da = 1 / (ay - dy);
   for (let j = top; j <= bottom; j++) {
-    const y = j + 0.5;
-    let from = Infinity, to = -Infinity;
-    if ((ay <= y) !== (by <= y)) { const x = ax + (bx - ax) * (y - ay) / (by - ay); if (x < from) from = x; if (x > to) to = x; }
-    if ((by <= y) !== (cy <= y)) { const x = bx + (cx - bx) * (y - by) / (cy - by); if (x < from) from = x; if (x > to) to = x; }
-    if ((cy <= y) !== (ay <= y)) { const x = cx + (ax - cx) * (y - cy) / (ay - cy); if (x < from) from = x; if (x > to) to = x; }
-    const first = Math.max(0, Math.ceil(from - 0.5)), last = Math.min(w - 1, Math.ceil(to - 0.5) - 1);
-    let v = av + vx * (first + 0.5 - ax) + vy * (y - ay);
-    for (let i = first; i <= last; i++, v += vx) out[j * w + i] = colours[v < 0 ? 0 : v > 255 ? 255 : v | 0];
+    const y = j + 0.5, a = ay <= y, b = by <= y, c = cy <= y, d = dy <= y;
+    let from = Infinity, to = -Infinity, v0 = 0, v1 = 0, s, x;
+    if (a !== b) { s = (y - ay) * ab; x = ax + s * (bx - ax); if (x < from) { from = x; v0 = av + s * (bv - av); } if (x > to) { to = x; v1 = av + s * (bv - av); } }
+    if (b !== c) { s = (y - by) * bc; x = bx + s * (cx - bx); if (x < from) { from = x; v0 = bv + s * (cv - bv); } if (x > to) { to = x; v1 = bv + s * (cv - bv); } }
+    if (c !== d) { s = (y - cy) * cd; x = cx + s * (dx - cx); if (x < from) { from = x; v0 = cv + s * (dv - cv); } if (x > to) { to = x; v1 = cv + s * (dv - cv); } }
+    if (d !== a) { s = (y - dy) * da; x = dx + s * (ax - dx); if (x < from) { from = x; v0 = dv + s * (av - dv); } if (x > to) { to = x; v1 = dv + s * (av - dv); } }
+    if (to < 0 || from > w) continue;
+    const first = Math.max(0, Math.ceil(from - 0.5)), last = j * w + Math.min(w - 1, Math.ceil(to - 0.5) - 1);
+    const slope = to > from ? (v1 - v0) / (to - from) : 0;
+    let v = v0 + slope * (first + 0.5 - from);
+    for (let k = j * w + first; k <= last; k++, v += slope) out[k] = colours[v < 0 ? 0 : v > 255 ? 255 : v | 0];
   }
+}
+
+/** Mixes a share (of 256) of black or white (0 or 255) into a pixel. */
+function mix(pixel, shade, share) {
+  const r = pixel & 255, g = pixel >> 8 & 255, b = pixel >> 16 & 255;
+  return -16777216 | b + ((shade - b) * share >> 8) << 16 | g + ((shade - g) * share >> 8) << 8 | r + ((shade - r) * share >> 8);
 }
 
 /** Mixes black or white (0 or 255) into a line of pixels, after Wu. */
 function line(out, w, h, x0, y0, x1, y1, shade, strength) {
-  const steep = Math.abs(y1 - y0) > Math.abs(x1 - x0);
-  if (steep) [x0, y0, x1, y1] = [y0, x0, y1, x1];
-  if (x0 > x1) [x0, y0, x1, y1] = [x1, y1, x0, y0];
-  const along = steep ? h : w, across = steep ? w : h, slope = x1 > x0 ? (y1 - y0) / (x1 - x0) : 0;
-  const step = steep ? w : 1, other = steep ? 1 : w;
-  const first = Math.max(0, Math.round(x0)), last = Math.min(along - 1, Math.round(x1) - 1);
+  if (Math.abs(y1 - y0) > Math.abs(x1 - x0)) along(out, h, w, w, 1, y0, x0, y1, x1, shade, strength);
+  else along(out, w, h, 1, w, x0, y0, x1, y1, shade, strength);
+}
+
+/** A line that goes farther along the first of its axes, which has so many pixels, `step` apart, than along the second. */
+function along(out, count, across, step, other, x0, y0, x1, y1, shade, strength) {
+  const slope = x1 === x0 ? 0 : (y1 - y0) / (x1 - x0), from = x0 < x1 ? x0 : x1, to = x0 < x1 ? x1 : x0;
+  const first = Math.max(0, Math.round(from)), last = Math.min(count - 1, Math.round(to) - 1);
   let y = y0 - 0.5 + slope * (first + 0.5 - x0);
   for (let i = first; i <= last; i++, y += slope) {
-    const low = Math.floor(y), part = y - low;
-    for (let side = 0; side < 2; side++) {
-      const j = low + side;
-      if (j < 0 || j >= across) continue;
-      const k = i * step + j * other, pixel = out[k], share = strength * (side ? part : 1 - part) * 256 | 0;
-      const r = pixel & 255, g = pixel >> 8 & 255, b = pixel >> 16 & 255;
-      out[k] = -16777216 | b + ((shade - b) * share >> 8) << 16 | g + ((shade - g) * share >> 8) << 8 | r + ((shade - r) * share >> 8);
-    }
+    const low = Math.floor(y), part = (y - low) * strength * 256, k = i * step + low * other;
+    if (low >= 0 && low < across) out[k] = mix(out[k], shade, strength * 256 - part | 0);
+    if (low + 1 >= 0 && low + 1 < across) out[k + other] = mix(out[k + other], shade, part | 0);
   }
 }
 
@@ -249,7 +254,9 @@ class Viewer {
     const frames = this.arrays[stage.m][name], from = Math.floor(place), part = place - from;
     if (!part) return frames[from];
     const [a, b] = [frames[from], frames[from + 1]];
-    return a.map((v, k) => v + (b[k] - v) * part);
+    const mixed = new Float64Array(a.length);
+    for (let k = 0; k < a.length; k++) mixed[k] = a[k] + (b[k] - a[k]) * part;
+    return mixed;
   }
 
   // space
@@ -368,12 +375,11 @@ class Viewer {
         py[k] = h / 2 - (y[k] + shift[1] - this.centre[1]) * scale;
       }
       if (levels) {
-        for (let i = 0; i < n - 1; i++) {
-          for (let j = 0; j < m - 1; j++) {
-            const a = i * m + j, b = a + m, c = b + 1, d = a + 1, v = cell ? levels[i * (m - 1) + j] : 0;
-            const [va, vb, vc, vd] = cell ? [v, v, v, v] : [levels[a], levels[b], levels[c], levels[d]];
-            triangle(out, w, h, colours, px[a], py[a], va, px[b], py[b], vb, px[c], py[c], vc);
-            triangle(out, w, h, colours, px[a], py[a], va, px[c], py[c], vc, px[d], py[d], vd);
+        for (let i = 0, cellAt = 0; i < n - 1; i++) {
+          for (let j = 0; j < m - 1; j++, cellAt++) {
+            const a = i * m + j, b = a + m, c = b + 1, d = a + 1;
+            const va = levels[cell ? cellAt : a], vb = cell ? va : levels[b], vc = cell ? va : levels[c], vd = cell ? va : levels[d];
+            quadrilateral(out, w, h, colours, px[a], py[a], va, px[b], py[b], vb, px[c], py[c], vc, px[d], py[d], vd);
           }
         }
       }
@@ -381,7 +387,7 @@ class Viewer {
         // c is a node of the cell beside: lines fade where that is few pixels wide
         const segment = (a, b, c, v) => {
           const shade = levels ? (v < 153 ? 255 : 0) : dark ? 255 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
-          const wide = Math.abs(dx * (py[c] - py[a]) - dy * (px[c] - px[a])) / Math.hypot(dx, dy);
+          const wide = Math.abs(dx * (py[c] - py[a]) - dy * (px[c] - px[a])) / Math.sqrt(dx * dx + dy * dy);
           const strength = Math.min(levels ? 0.55 : 0.8, (levels ? 0.1 : 0.25) * wide);
           if (strength > 0.02) line(out, w, h, px[a], py[a], px[b], py[b], shade, strength);
         };
