@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista
+from selenium import webdriver
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCREENSHOTS = ROOT / "out/screenshots"
 CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
 
-webdriver = pytest.importorskip("selenium.webdriver")
 browser_is_here = pytest.mark.skipif(
     not (CHROMIUM and DRIVER or os.environ.get("CI")),
     reason="NO BROWSER: the viewer goes untested; install Debian's chromium and chromium-driver",
