@@ -10,8 +10,7 @@ mod schedule;
 pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
 pub use report::{Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Summary, WorkTotal};
-pub(crate) use report::{FONT, png};
-pub use report::{Picture, draw, draw_curves, final_arrays};
+pub use report::{Curve, Figure, Picture, Scale, draw, draw_curves, final_arrays};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;

@@ -180,12 +180,7 @@ impl StefanStudy {
         directory.write("study.toml", self.to_toml().as_bytes())?;
         let mut summary = self.summary();
         summary.warnings = self.warnings()?;
-        let write = |summary: &StefanSummary| {
-            let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
-            text.push('\n');
-            directory.write("summary.json", text.as_bytes())
-        };
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         let mut tables = Tables::create(directory.path(), prepared.front.columns.x())?;
         let mut frames = Frames::create(directory.path(), prepared.frames.clone())?;
         let mut curves: Vec<(f64, Vec<f64>)> = Vec::new();
@@ -210,7 +205,7 @@ impl StefanStudy {
         summary.seconds.wall = begin.elapsed().as_secs_f64();
         summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
         summary.error = failure.as_ref().map(Failed::from);
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         kept?;
         let columns = prepared.front.columns.x().to_vec();
         Ok(FrontFinished { summary, state: prepared.state, columns, failure })

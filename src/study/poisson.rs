@@ -404,12 +404,7 @@ impl PoissonStudy {
             stencil: None,
             warnings: Vec::new(),
         };
-        let write = |summary: &PoissonSummary| {
-            let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
-            text.push('\n');
-            directory.write("summary.json", text.as_bytes())
-        };
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         let outcome = self.solve().and_then(|solved| {
             let output = Instant::now();
             keep(self, &directory, &solved)?;
@@ -425,7 +420,7 @@ impl PoissonStudy {
             summary.warnings = solved.warnings();
         }
         summary.seconds.wall = begin.elapsed().as_secs_f64();
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         outcome.map(|_| summary)
     }
 }

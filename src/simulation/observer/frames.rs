@@ -34,13 +34,14 @@ impl FramesAt {
         }
     }
 
-    fn due(&self, state: &State, dt: f64) -> bool {
+    /// Whether a frame is due at time `now`, after a step of length `dt`.
+    pub(crate) fn due(&self, step: usize, now: f64, dt: f64) -> bool {
         match self {
-            Self::Every(n) => state.step.is_multiple_of(*n),
+            Self::Every(n) => step.is_multiple_of(*n),
             // due where the time lies in the step that led here, give or take round-off
             Self::Times(times) => times.iter().any(|&t| {
                 let slack = 1e-9 * dt;
-                t <= state.t + slack && t > state.t - dt + slack
+                t <= now + slack && t > now - dt + slack
             }),
         }
     }
@@ -100,7 +101,7 @@ impl Frames {
 
 impl Observer for Frames {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        let due = event != Event::Stepped || self.at.due(snapshot.state, snapshot.dt);
+        let due = event != Event::Stepped || self.at.due(snapshot.state.step, snapshot.state.t, snapshot.dt);
         if due { self.write(snapshot.unknowns, snapshot.state) } else { Ok(()) }
     }
 }

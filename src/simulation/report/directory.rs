@@ -1,5 +1,5 @@
-use super::Summary;
 use crate::error::{Error, Result};
+use serde::Serialize;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub struct RunDirectory {
 const LOCK: &str = "run.lock";
 
 /// Everything that a run may write.
-const OURS: [&str; 10] = [
+const OURS: [&str; 12] = [
     "summary.json",
     "study.toml",
     "history.csv",
@@ -26,6 +26,8 @@ const OURS: [&str; 10] = [
     "final.npz",
     "mesh.png",
     "mesh.svg",
+    "convergence.png",
+    "convergence.svg",
     "front.csv",
     "front.png",
     "front.svg",
@@ -88,11 +90,11 @@ impl RunDirectory {
         write_file(&self.path.join(name), contents)
     }
 
-    /// Writes `summary.json`.
+    /// Writes `summary.json`, of any kind of study.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub fn write_summary(&self, summary: &Summary) -> Result<()> {
+    pub fn write_summary(&self, summary: &impl Serialize) -> Result<()> {
         let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
         text.push('\n');
         self.write("summary.json", text.as_bytes())

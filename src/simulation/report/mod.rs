@@ -3,6 +3,7 @@
 mod arrays;
 mod curves;
 mod directory;
+mod figure;
 mod picture;
 mod summary;
 
@@ -10,6 +11,7 @@ pub use arrays::final_arrays;
 pub use curves::draw_curves;
 pub use directory::RunDirectory;
 pub(super) use directory::write_file;
-pub(crate) use picture::{FONT, png};
+pub use figure::{Curve, Figure, Scale};
+use picture::{FONT, png};
 pub use picture::{Picture, draw};
 pub use summary::{Conserved, ErrorNorms, Failed, Parallel, Report, Seconds, Summary, WorkTotal};
