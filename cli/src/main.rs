@@ -1,6 +1,7 @@
 //! The `driftmesh` program: a thin door to the library.
 
 mod check;
+mod equidistribution;
 mod list;
 mod poisson;
 mod progress;

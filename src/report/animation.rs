@@ -2,6 +2,7 @@ use super::files::RunFiles;
 use crate::error::{Error, Result};
 use crate::simulation::{Sheet, write_file};
 use gif::{Encoder, Repeat};
+use std::collections::HashMap;
 
 /// Frames of an animation at most; more are thinned.
 const MOST: usize = 120;
@@ -10,8 +11,11 @@ const WHOLE: usize = 500;
 const ONE: [usize; 2] = [4, 25];
 /// The last frame stays.
 const LAST: u16 = 150;
-/// Of the search for 256 colours, 1 to 30: slow and best to fast.
-const SPEED: i32 = 20;
+/// Colours of a drawing: the map itself, under light and under dark lines of two strengths, and greys.
+const PURE: usize = 96;
+const BLENDED: usize = 33;
+const STRENGTHS: [f64; 2] = [0.25, 0.5];
+const GREYS: usize = 28;
 
 /// Writes `animation.gif`: the mesh over the first unknown, in colours that mean the same in all frames.
 pub fn write(run: &mut RunFiles) -> Result<()> {
@@ -44,6 +48,7 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
     let each = (WHOLE / frames.len()).clamp(ONE[0], ONE[1]) as u16;
 
     let unwritable = |error: gif::EncodingError| Error::Unwritable { path: path.clone(), reason: error.to_string() };
+    let mut palette = Palette::new();
     let mut encoder: Option<Encoder<Vec<u8>>> = None;
     for (k, frame) in frames.iter().enumerate() {
         let sheet = Sheet {
@@ -57,22 +62,75 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
             u: &frame.fields[0].1,
             range: Some(range),
         };
-        let mut pixels = sheet.pixels();
+        let pixels = sheet.pixels();
         let [width, height] = pixels.size.map(|n| n.min(u32::from(u16::MAX)) as u16);
         let encoder = match &mut encoder {
             Some(encoder) => encoder,
             none => {
-                let mut first = Encoder::new(Vec::new(), width, height, &[]).map_err(unwritable)?;
+                let mut first = Encoder::new(Vec::new(), width, height, palette.colours.as_flattened()).map_err(unwritable)?;
                 first.set_repeat(Repeat::Infinite).map_err(unwritable)?;
                 none.insert(first)
             }
         };
-        let mut image = gif::Frame::from_rgba_speed(width, height, &mut pixels.rgba, SPEED);
-        image.delay = if k + 1 == frames.len() { LAST } else { each };
+        let buffer: Vec<u8> = pixels.rgba.chunks_exact(4).map(|p| palette.nearest([p[0], p[1], p[2]])).collect();
+        let delay = if k + 1 == frames.len() { LAST } else { each };
+        let image = gif::Frame { width, height, delay, buffer: buffer.into(), ..gif::Frame::default() };
         encoder.write_frame(&image).map_err(unwritable)?;
     }
     match encoder {
         Some(encoder) => write_file(&path, &encoder.into_inner().map_err(|error| unwritable(error.into()))?),
         None => Ok(()),
+    }
+}
+
+/// The colours of all frames.
+struct Palette {
+    colours: Vec<[u8; 3]>,
+    found: HashMap<[u8; 3], u8>,
+}
+
+impl Palette {
+    fn new() -> Self {
+        let map = |k: usize, of: usize| colorous::VIRIDIS.eval_rational(k, of).as_array();
+        let mut colours: Vec<[u8; 3]> = (0..PURE).map(|k| map(k, PURE)).collect();
+        for (strength, line) in STRENGTHS.into_iter().flat_map(|s| [(s, 255.0), (s, 0.0)]) {
+            let mix = |c: u8| (f64::from(c) + strength * (line - f64::from(c))).round() as u8;
+            colours.extend((0..BLENDED).map(|k| map(k, BLENDED).map(mix)));
+        }
+        colours.extend((0..GREYS).map(|k| [(k * 255 / (GREYS - 1)) as u8; 3]));
+        Self { colours, found: HashMap::new() }
+    }
+
+    /// The colour that is nearest.
+    fn nearest(&mut self, colour: [u8; 3]) -> u8 {
+        let distance = |other: &[u8; 3]| -> i32 {
+            other.iter().zip(colour).map(|(a, b)| (i32::from(*a) - i32::from(b)).pow(2)).sum()
+        };
+        let place = || self.colours.iter().enumerate().min_by_key(|(_, other)| distance(other)).map_or(0, |(k, _)| k);
+        *self.found.entry(colour).or_insert_with(|| place() as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every colour of the map, bare or under a mesh line, is met within a few levels; black and white exactly.
+    #[test]
+    fn the_palette_meets_the_colours_of_the_drawings() {
+        let mut palette = Palette::new();
+        assert_eq!(palette.colours.len(), 256);
+        for k in 0..500 {
+            let bare = colorous::VIRIDIS.eval_rational(k, 500).as_array();
+            let under = bare.map(|c| ((u16::from(c) + 255) / 2) as u8);
+            for colour in [bare, under] {
+                let met = palette.colours[usize::from(palette.nearest(colour))];
+                let off = met.iter().zip(colour).map(|(a, b)| a.abs_diff(b)).max().unwrap();
+                assert!(off <= 6, "{colour:?} is shown as {met:?}");
+            }
+        }
+        for grey in [[0; 3], [255; 3]] {
+            assert_eq!(palette.colours[usize::from(palette.nearest(grey))], grey);
+        }
     }
 }

@@ -81,6 +81,8 @@ pub enum StudyKind {
     Poisson,
     /// Two phases and the front between them.
     Stefan,
+    /// A mesh on a line, and the Schwarz methods for it.
+    Equidistribution,
 }
 
 /// `[domain]`.

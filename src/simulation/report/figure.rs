@@ -58,6 +58,8 @@ const SIZE: (u32, u32) = (760, 520);
 const FINE: u32 = 8;
 /// More marks than this are small.
 const MANY: usize = 40;
+/// Share of an axis that a legend may take.
+const CORNER: f64 = 0.4;
 /// Room around the points, as a factor.
 const ROOM: f64 = 1.1;
 
@@ -108,6 +110,28 @@ impl Figure {
         }
     }
 
+    /// The corner of the plot in which the fewest points lie.
+    fn free_corner(&self) -> SeriesLabelPosition {
+        let place = |p: &[f64; 2], d: usize| {
+            let on = |x: f64| if self.scales[d] == Scale::Linear { x } else { x.log10() };
+            let [low, high] = self.ends(d).map(on);
+            (on(p[d]) - low) / (high - low)
+        };
+        let inside = |[right, top]: [bool; 2]| {
+            let points = self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
+            let near = |at: f64, end: bool| if end { 1.0 - at } else { at } < CORNER;
+            points.filter(|p| self.shown(p) && near(place(p, 0), right) && near(place(p, 1), top)).count()
+        };
+        let corners = [
+            ([true, true], SeriesLabelPosition::UpperRight),
+            ([false, false], SeriesLabelPosition::LowerLeft),
+            ([true, false], SeriesLabelPosition::LowerRight),
+            ([false, true], SeriesLabelPosition::UpperLeft),
+        ];
+        let free = corners.into_iter().min_by_key(|(corner, _)| inside(*corner));
+        free.map_or(SeriesLabelPosition::UpperRight, |(_, position)| position)
+    }
+
     fn chart<X, Y>(&self, svg: &mut String, x: X, y: Y) -> Result<(), Box<dyn std::error::Error>>
     where
         X: Ranged<ValueType = f64> + ValueFormatter<f64> + 'static,
@@ -124,6 +148,7 @@ impl Figure {
             .margin_right(24 * FINE)
             .x_label_area_size(46 * FINE)
             .y_label_area_size(74 * FINE)
+            .top_x_label_area_size(6 * FINE)
             .build_cartesian_2d(x, y)?;
         let [along, up] = self.scales;
         chart
@@ -133,6 +158,7 @@ impl Figure {
             .label_style(font(14))
             .axis_desc_style(font(15))
             .axis_style(BLACK.stroke_width(FINE))
+            .set_all_tick_mark_size(5 * FINE)
             .bold_line_style(BLACK.mix(0.15).stroke_width(FINE))
             .light_line_style(BLACK.mix(0.04).stroke_width(FINE))
             .x_max_light_lines(between(along))
@@ -168,7 +194,7 @@ impl Figure {
                 .border_style(BLACK.mix(0.4).stroke_width(FINE))
                 .margin(8 * FINE)
                 .legend_area_size(30 * FINE)
-                .position(SeriesLabelPosition::UpperRight)
+                .position(self.free_corner())
                 .draw()?;
         }
         area.present()?;
