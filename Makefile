@@ -28,9 +28,11 @@ bench: $(VENV)/ready
 	$(VENV)/bin/python benches/mesh_solve.py
 	$(VENV)/bin/python benches/stencils.py
 
-# The library's documentation, in target/doc.
+# The library's documentation in target/doc, and the gallery of studies in target/doc/gallery.
 docs:
 	$(CARGO) doc --release --workspace --no-deps
+	$(CARGO) build --release --workspace
+	$(PYTHON) docs/gallery.py target/release/driftmesh target/doc/gallery
 
 $(VENV)/ready: tests/python/requirements.txt
 	$(PYTHON) -m venv $(VENV)

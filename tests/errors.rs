@@ -354,3 +354,10 @@ fn fronts() {
     assert_says(error, &["past the stability limit"], Some("front.stepping"), true);
     assert_eq!(state, before);
 }
+
+#[test]
+fn not_a_run() {
+    let directory = tempfile::tempdir().unwrap();
+    let error = driftmesh::report::build(directory.path()).unwrap_err();
+    assert_says(error, &["is no run directory: it has no summary.json"], Some("driftmesh run"), false);
+}

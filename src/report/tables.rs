@@ -26,7 +26,7 @@ const ELSEWHERE: [&str; 8] = ["schema", "study", "kind", "version", "status", "s
 const MANY: usize = 8;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 34] = [
+const NAMES: [(&str, &str, &str); 36] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -51,6 +51,8 @@ const NAMES: [(&str, &str, &str); 34] = [
     ("comparison.r_mean", "mean Q, reference over this mesh", ""),
     ("comparison.cell_max", "… largest in one cell", ""),
     ("comparison.mesh_rms", "distance of the meshes", "root mean square over the nodes"),
+    ("rate.stride", "iterations that these are for", ""),
+    ("rate.bound", "predicted bound", ""),
     ("front.mean", "mean height of the front", ""),
     ("front.range", "its lowest and highest point", ""),
     ("front.error_linf", "largest error of the front", "against the exact solution"),
@@ -83,6 +85,7 @@ pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
                 let rows = rows.iter().map(|(path, value)| vec![name(path), shown(value)]).collect();
                 tables.push(Table { title: title(key), head: Vec::new(), rows, words });
             }
+            Value::Null => {}
             _ => loose.push((key.clone(), value.clone())),
         }
     }
@@ -221,7 +224,7 @@ mod tests {
     fn a_name_is_found_by_the_longest_end_of_its_path() {
         assert_eq!(name("front.error_linf"), "largest error of the front");
         assert_eq!(name("interface.contraction.observed"), "contraction, observed");
-        assert_eq!(name("rate.bound"), "bound");
+        assert_eq!(name("work.newton_iterations"), "newton iterations");
     }
 
     /// Three reports stand side by side, a hundred iterations below each other; a record may lack a value.

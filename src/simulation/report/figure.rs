@@ -104,7 +104,10 @@ impl Figure {
         let [low, high] = points.filter(|p| self.shown(p)).fold([f64::INFINITY, f64::NEG_INFINITY], around);
         match self.scales[d] {
             _ if low > high => [1.0, 10.0],
-            Scale::Logarithmic => [whole(low / ROOM, f64::floor), whole(high * ROOM, f64::ceil)],
+            // a little more, so that the powers at both ends are marked
+            Scale::Logarithmic => {
+                [whole(low / ROOM, f64::floor) * (1.0 - 1e-9), whole(high * ROOM, f64::ceil) * (1.0 + 1e-9)]
+            }
             Scale::Linear if low == high => [low - 0.5, high + 0.5],
             Scale::Linear => [low, high],
         }
@@ -142,8 +145,9 @@ impl Figure {
         let font = |size: u32| ("DejaVu Sans", size * FINE).into_font();
         let area = SVGBackend::with_string(svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
         area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
-            .caption(&self.title, font(17))
+        // room between the title and the plot
+        let below = area.titled(&self.title, font(17))?.margin(4 * FINE as i32, 0, 0, 0);
+        let mut chart = ChartBuilder::on(&below)
             .margin(14 * FINE)
             .margin_right(24 * FINE)
             .x_label_area_size(46 * FINE)
