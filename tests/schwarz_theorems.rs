@@ -1,7 +1,9 @@
 //! The theorems of Gander and Haynes (2012) over random densities, overlaps and grids: what is observed is what is
 //! predicted, and at most the bound. Cells have exact mean densities, so that the discrete problem is the continuous one.
 
-use driftmesh::equidistribution::{Coarse, FaceDensity, History, Line, LineDensity, Measure, Method, Robin, Stop, Sweep};
+use driftmesh::equidistribution::{
+    Coarse, FaceDensity, History, Line, LineDensity, Measure, Method, Robin, Stop, Sweep,
+};
 use proptest::prelude::*;
 
 /// Densities whose largest value is up to 300 times the smallest, of different shapes.

@@ -16,8 +16,8 @@ const LINES: usize = 10;
 impl Progress {
     pub fn new() -> Self {
         let bar = stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}")
-                .expect("the template is valid");
+            let style =
+                ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}").expect("the template is valid");
             ProgressBar::new(0).with_style(style)
         });
         Self { bar, told: 0 }

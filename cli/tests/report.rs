@@ -142,10 +142,16 @@ fn a_directory_that_is_no_run_is_refused() {
     std::fs::create_dir(sandbox.path().join("empty")).unwrap();
     std::fs::create_dir(sandbox.path().join("other")).unwrap();
     std::fs::write(sandbox.path().join("other/summary.json"), "[1]").unwrap();
-    for (name, reason) in [("empty", "it has no summary.json"), ("other", "names no study"), ("nowhere", "No such file")] {
+    for (name, reason) in
+        [("empty", "it has no summary.json"), ("other", "names no study"), ("nowhere", "No such file")]
+    {
         let output = call(name);
         assert_eq!(output.status.code(), Some(2));
-        assert!(words(&output).contains("is no run directory: ") && words(&output).contains(reason), "{}", words(&output));
+        assert!(
+            words(&output).contains("is no run directory: ") && words(&output).contains(reason),
+            "{}",
+            words(&output)
+        );
         assert!(!sandbox.path().join(name).join("report.html").exists());
     }
 }

@@ -90,7 +90,10 @@ impl Decomposition {
         let number = |d: usize, cell: usize| self.spans[d].iter().position(|span| cell < span[1]).unwrap_or(0);
         let [n, m] = self.lattice.cells();
         let across: Vec<usize> = (0..m).map(|j| number(1, j)).collect();
-        (0..n).flat_map(|i| across.iter().map(move |b| (i, b))).map(|(i, b)| number(0, i) * self.spans[1].len() + b).collect()
+        (0..n)
+            .flat_map(|i| across.iter().map(move |b| (i, b)))
+            .map(|(i, b)| number(0, i) * self.spans[1].len() + b)
+            .collect()
     }
 
     /// True for a node on a bounded side.

@@ -67,7 +67,8 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
         let encoder = match &mut encoder {
             Some(encoder) => encoder,
             none => {
-                let mut first = Encoder::new(Vec::new(), width, height, palette.colours.as_flattened()).map_err(unwritable)?;
+                let mut first =
+                    Encoder::new(Vec::new(), width, height, palette.colours.as_flattened()).map_err(unwritable)?;
                 first.set_repeat(Repeat::Infinite).map_err(unwritable)?;
                 none.insert(first)
             }

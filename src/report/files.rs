@@ -124,8 +124,7 @@ impl Series {
 fn history(path: &Path, notes: &mut Vec<String>) -> Vec<Column> {
     let Ok(mut reader) = csv::Reader::from_path(path) else { return Vec::new() };
     let Ok(heads) = reader.headers().cloned() else { return Vec::new() };
-    let mut columns: Vec<Column> =
-        heads.iter().map(|name| Column { name: name.into(), values: Vec::new() }).collect();
+    let mut columns: Vec<Column> = heads.iter().map(|name| Column { name: name.into(), values: Vec::new() }).collect();
     let mut broken = 0;
     for row in reader.records() {
         match row {

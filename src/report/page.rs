@@ -70,7 +70,9 @@ pub fn render(run: &RunFiles, plots: &[(&str, Figure)], viewer: Option<&Viewer>)
             "completed" => "The run is complete.".into(),
             "failed" => "The run failed; everything up to the last good state is here.".into(),
             "not-converged" => "The iteration did not converge.".into(),
-            "running" => "The run has not ended: it was interrupted, or still goes on. This is what it left so far.".into(),
+            "running" => {
+                "The run has not ended: it was interrupted, or still goes on. This is what it left so far.".into()
+            }
             other => format!("Status: {other}."),
         },
         failure,
@@ -94,11 +96,8 @@ pub fn render(run: &RunFiles, plots: &[(&str, Figure)], viewer: Option<&Viewer>)
 
 /// Pictures that the run drew itself; the mesh only where no viewer shows it.
 fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
-    let candidates = [
-        ("mesh", "The mesh", !viewed),
-        ("convergence", "Convergence", true),
-        ("front", "The front over time", true),
-    ];
+    let candidates =
+        [("mesh", "The mesh", !viewed), ("convergence", "Convergence", true), ("front", "The front over time", true)];
     let formats = [("svg", "image/svg+xml"), ("png", "image/png")];
     let picture = |(name, title, wanted): (&str, &'static str, bool)| {
         formats.iter().filter(|_| wanted).find_map(|(format, mime)| {

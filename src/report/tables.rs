@@ -34,7 +34,11 @@ const NAMES: [(&str, &str, &str); 36] = [
     ("error.l2_integral", "square root of ∫ error²", "grows with the area"),
     ("quality.q_max", "largest Q", "of a cell: 1 for a square, more for one that is stretched or sheared"),
     ("quality.q_mean", "mean Q", ""),
-    ("quality.min_scaled_jacobian", "smallest corner Jacobian", "over that of equal cells; positive as long as no cell is folded"),
+    (
+        "quality.min_scaled_jacobian",
+        "smallest corner Jacobian",
+        "over that of equal cells; positive as long as no cell is folded",
+    ),
     ("quality.equidistribution", "equidistribution", "largest over mean density × area of a cell; 1 is perfect"),
     ("quality.shortest_cell", "shortest cell", "over the mean one"),
     ("quality.error_linf", "largest distance from the exact mesh", ""),
@@ -115,7 +119,8 @@ fn of_records(key: &str, records: &[Value]) -> Table {
         let row = |record: &Vec<(String, Value)>| paths.iter().map(|path| at(record, path)).collect();
         (paths.iter().map(|path| name(path)).collect(), flat.iter().map(row).collect())
     } else {
-        let line = |path: &&String| [name(path)].into_iter().chain(flat.iter().map(|record| at(record, path))).collect();
+        let line =
+            |path: &&String| [name(path)].into_iter().chain(flat.iter().map(|record| at(record, path))).collect();
         let mut lines: Vec<Vec<String>> = paths.iter().map(line).collect();
         if lines.is_empty() { (Vec::new(), lines) } else { (lines.remove(0), lines) }
     };
@@ -214,7 +219,8 @@ mod tests {
 
     #[test]
     fn numbers_keep_five_digits() {
-        for (x, text) in [(1.25, "1.25"), (0.75, "0.75"), (123456.0, "123456"), (-2.13e-5, "−2.130e−5"), (0.0, "0")] {
+        for (x, text) in [(1.25, "1.25"), (0.75, "0.75"), (123456.0, "123456"), (-2.13e-5, "−2.130e−5"), (0.0, "0")]
+        {
             assert_eq!(number(x), text);
         }
         assert_eq!(number(0.0308123), "0.030812");

@@ -62,7 +62,10 @@ impl Viewer {
             left_out.push(format!("one mesh line in {stride}"));
         }
         let thinned = (!left_out.is_empty()).then(|| {
-            format!("Shown here: {}, which keeps this page below 5 MB. run.pvd opens everything in ParaView.", left_out.join(", "))
+            format!(
+                "Shown here: {}, which keeps this page below 5 MB. run.pvd opens everything in ParaView.",
+                left_out.join(", ")
+            )
         });
         run.notes.extend(thinned.clone());
         let data = packed.json(run).to_string().replace('<', "\\u003c");
@@ -113,9 +116,8 @@ impl Packed {
             Some([number(values.first()?)?, number(values.get(1)?)?])
         };
         // a periodic mesh leaves its box, any other fills it
-        let wraps = |d: usize| {
-            run.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false)
-        };
+        let wraps =
+            |d: usize| run.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false);
         let [lower, upper] = match (pair("lower"), pair("upper")) {
             (Some(lower), Some(upper)) => [lower, upper],
             _ => self.ends,
@@ -196,8 +198,9 @@ fn quantised(v: f64, low: f64, high: f64) -> u32 {
 fn pack(levels: impl Iterator<Item = u32>, nodes: usize, bytes: &mut Vec<u8>) {
     let levels: Vec<u32> = levels.collect();
     let since = |k: usize| levels[k].wrapping_sub(if k >= nodes { levels[k - nodes] } else { 0 });
-    let differences: Vec<u32> =
-        (0..levels.len()).map(|k| if k % nodes == 0 { since(k) } else { since(k).wrapping_sub(since(k - 1)) }).collect();
+    let differences: Vec<u32> = (0..levels.len())
+        .map(|k| if k % nodes == 0 { since(k) } else { since(k).wrapping_sub(since(k - 1)) })
+        .collect();
     for byte in 0..3 {
         bytes.extend(differences.iter().map(|d| (d >> (8 * byte)) as u8));
     }
@@ -228,8 +231,9 @@ mod tests {
         let levels = [5_u32, 16_777_215, 0, 70_000, 3, 9];
         let mut bytes = Vec::new();
         pack(levels.into_iter(), 3, &mut bytes);
-        let mut back: Vec<u32> =
-            (0..6).map(|k| u32::from(bytes[k]) | u32::from(bytes[6 + k]) << 8 | u32::from(bytes[12 + k]) << 16).collect();
+        let mut back: Vec<u32> = (0..6)
+            .map(|k| u32::from(bytes[k]) | u32::from(bytes[6 + k]) << 8 | u32::from(bytes[12 + k]) << 16)
+            .collect();
         for k in 0..6 {
             let before = if k % 3 == 0 { 0 } else { back[k - 1].wrapping_sub(if k > 3 { back[k - 4] } else { 0 }) };
             back[k] = back[k].wrapping_add(before).wrapping_add(if k >= 3 { back[k - 3] } else { 0 }) & 0xff_ffff;

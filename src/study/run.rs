@@ -130,12 +130,7 @@ impl Observer for Meshes {
 }
 
 /// As [`compare_with_reference`], which leaves its frames beside those of the run.
-fn reference_into(
-    directory: &RunDirectory,
-    study: &MovingMesh,
-    meshes: &Meshes,
-    record: &mut Record,
-) -> Result<()> {
+fn reference_into(directory: &RunDirectory, study: &MovingMesh, meshes: &Meshes, record: &mut Record) -> Result<()> {
     let Some(compare) = &study.compare else { return Ok(()) };
     let mut frames = Frames::of_reference(directory.path(), study.frames(), compare.generator.subdomains())?;
     compare_with_reference(study, meshes, record, &mut [&mut frames])

@@ -7,6 +7,8 @@ use crate::simulation::State;
 use crate::simulation::report::write_file;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::JoinHandle;
 
 /// When frames are written; the first and the last state are always among them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,10 +61,12 @@ pub struct Frames {
     subdomains: [usize; 2],
     /// Folder of the frames, and the file that puts them in time.
     names: [&'static str; 2],
-    grid: Option<vtu::Grid>,
+    grid: Option<Arc<vtu::Grid>>,
     /// The last mesh and the one before, with their times.
     meshes: [Option<(f64, Mesh<2>)>; 2],
     written: Vec<(f64, String)>,
+    /// A frame that is being compressed and written while the run goes on.
+    writing: Option<JoinHandle<Result<()>>>,
 }
 
 impl Frames {
@@ -87,7 +91,16 @@ impl Frames {
         std::fs::create_dir_all(&frames)
             .map_err(|error| Error::Unwritable { path: frames, reason: error.to_string() })?;
         let directory = directory.to_path_buf();
-        Ok(Self { directory, at, subdomains, names, grid: None, meshes: [None, None], written: Vec::new() })
+        Ok(Self {
+            directory,
+            at,
+            subdomains,
+            names,
+            grid: None,
+            meshes: [None, None],
+            written: Vec::new(),
+            writing: None,
+        })
     }
 
     /// Writes one frame, unless the state has one already. The series is complete after every call.
@@ -95,36 +108,55 @@ impl Frames {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn write(&mut self, unknowns: &[String], state: &State) -> Result<()> {
+        self.start(unknowns, state)?;
+        self.wait()
+    }
+
+    /// The same, with compressing and writing left to a thread beside the run.
+    fn start(&mut self, unknowns: &[String], state: &State) -> Result<()> {
+        self.wait()?;
         let name = format!("{}/step-{:06}.vtu", self.names[0], state.step);
         if self.written.iter().any(|(_, written)| *written == name) {
             return Ok(());
         }
         let lattice = state.mesh.lattice();
         let scalars = |values: &[f64]| Values::Scalars(lattice.closed(values).into_owned());
-        let mut nodes: Vec<(&str, Values)> = (unknowns.iter().enumerate())
-            .map(|(c, unknown)| (unknown.as_str(), scalars(&state.u.component(c).collect::<Vec<f64>>())))
+        let mut nodes: Vec<(String, Values)> = (unknowns.iter().enumerate())
+            .map(|(c, unknown)| (unknown.clone(), scalars(&state.u.component(c).collect::<Vec<f64>>())))
             .collect();
         // an unknown may have that name
         let density = if unknowns.iter().any(|unknown| unknown == "rho") { "mesh density" } else { "rho" };
-        nodes.push((density, scalars(&state.rho)));
-        nodes.push(("mesh velocity", Values::Vectors(lattice.closed(&self.velocity(state)).into_owned())));
+        nodes.push((density.into(), scalars(&state.rho)));
+        nodes.push(("mesh velocity".into(), Values::Vectors(lattice.closed(&self.velocity(state)).into_owned())));
         let subdomains = Decomposition::new(lattice, self.subdomains)?.of_cells();
         let cells = [
-            ("Q", Values::Scalars(cell_qualities(&state.mesh))),
-            ("jacobian", Values::Scalars(cell_jacobians(&state.mesh))),
-            ("subdomain", Values::Numbers(subdomains)),
+            ("Q".into(), Values::Scalars(cell_qualities(&state.mesh))),
+            ("jacobian".into(), Values::Scalars(cell_jacobians(&state.mesh))),
+            ("subdomain".into(), Values::Numbers(subdomains)),
         ];
-        let grid = self.grid.get_or_insert_with(|| vtu::Grid::new(lattice.cells()));
-        let document = grid.document(&state.mesh.closed(), &nodes, &cells);
-        write_file(&self.directory.join(&name), document.as_bytes())?;
-        self.written.push((state.t, name));
+        let points = state.mesh.closed().into_owned();
+        self.written.push((state.t, name.clone()));
         let entries: String =
             (self.written.iter()).map(|(t, name)| format!("<DataSet timestep=\"{t}\" file=\"{name}\"/>\n")).collect();
         let series = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
              <Collection>\n{entries}</Collection>\n</VTKFile>\n"
         );
-        write_file(&self.directory.join(self.names[1]), series.as_bytes())
+        let grid = self.grid.get_or_insert_with(|| Arc::new(vtu::Grid::new(lattice.cells()))).clone();
+        let [frame, index] = [self.directory.join(name), self.directory.join(self.names[1])];
+        self.writing = Some(std::thread::spawn(move || {
+            write_file(&frame, grid.document(&points, &nodes, &cells).as_bytes())?;
+            write_file(&index, series.as_bytes())
+        }));
+        Ok(())
+    }
+
+    fn wait(&mut self) -> Result<()> {
+        match self.writing.take().map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(written)) => written,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+        }
     }
 
     /// How fast the nodes moved in the step that led to a state; they rest at the start.
@@ -146,7 +178,17 @@ impl Observer for Frames {
             self.meshes.swap(0, 1);
             self.meshes[0] = Some((state.t, state.mesh.clone()));
         }
-        let due = event != Event::Stepped || self.at.due(state.step, state.t, snapshot.dt);
-        if due { self.write(snapshot.unknowns, state) } else { Ok(()) }
+        match event {
+            Event::Stepped if !self.at.due(state.step, state.t, snapshot.dt) => Ok(()),
+            Event::Finished => self.write(snapshot.unknowns, state),
+            _ => self.start(snapshot.unknowns, state),
+        }
+    }
+}
+
+impl Drop for Frames {
+    /// A run that ends early leaves no thread behind.
+    fn drop(&mut self) {
+        let _ = self.wait();
     }
 }

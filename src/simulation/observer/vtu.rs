@@ -36,7 +36,7 @@ impl Grid {
     }
 
     /// One document: `points` and `nodes` have shape cells + 1 in lattice order, `cells` one value a cell.
-    pub fn document(&self, points: &[[f64; 2]], nodes: &[(&str, Values)], cells: &[(&str, Values)]) -> String {
+    pub fn document(&self, points: &[[f64; 2]], nodes: &[(String, Values)], cells: &[(String, Values)]) -> String {
         let count = self.cells[0] * self.cells[1];
         let mut xml = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
@@ -53,7 +53,9 @@ impl Grid {
                 match values {
                     Values::Scalars(v) => array(&mut xml, "Float64", name, 1, v.iter().map(|v| v.to_le_bytes())),
                     Values::Vectors(v) => vectors(&mut xml, name, v),
-                    Values::Numbers(v) => array(&mut xml, "Int32", name, 1, v.iter().map(|n| (*n as i32).to_le_bytes())),
+                    Values::Numbers(v) => {
+                        array(&mut xml, "Int32", name, 1, v.iter().map(|n| (*n as i32).to_le_bytes()))
+                    }
                 }
             }
             let _ = writeln!(xml, "</{tag}>");

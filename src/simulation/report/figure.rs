@@ -1,5 +1,5 @@
-use super::picture::{FONT, picture};
 use super::Picture;
+use super::picture::{FONT, picture};
 use plotters::coord::combinators::LogCoord;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
@@ -115,11 +115,9 @@ impl Figure {
 
     /// The corner of the plot in which the fewest points lie.
     fn free_corner(&self) -> SeriesLabelPosition {
-        let place = |p: &[f64; 2], d: usize| {
-            let on = |x: f64| if self.scales[d] == Scale::Linear { x } else { x.log10() };
-            let [low, high] = self.ends(d).map(on);
-            (on(p[d]) - low) / (high - low)
-        };
+        let on = |x: f64, d: usize| if self.scales[d] == Scale::Linear { x } else { x.log10() };
+        let ends = [0, 1].map(|d| self.ends(d).map(|end| on(end, d)));
+        let place = |p: &[f64; 2], d: usize| (on(p[d], d) - ends[d][0]) / (ends[d][1] - ends[d][0]);
         let inside = |[right, top]: [bool; 2]| {
             let points = self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
             let near = |at: f64, end: bool| if end { 1.0 - at } else { at } < CORNER;
@@ -152,7 +150,6 @@ impl Figure {
             .margin_right(24 * FINE)
             .x_label_area_size(46 * FINE)
             .y_label_area_size(74 * FINE)
-            .top_x_label_area_size(6 * FINE)
             .build_cartesian_2d(x, y)?;
         let [along, up] = self.scales;
         chart
