@@ -79,7 +79,7 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
         encoder.write_frame(&image).map_err(unwritable)?;
     }
     match encoder {
-        Some(encoder) => write_file(&path, &encoder.into_inner().map_err(|error| unwritable(error.into()))?),
+        Some(encoder) => write_file(&path, &encoder.into_inner().map_err(unwritable)?),
         None => Ok(()),
     }
 }
@@ -125,13 +125,15 @@ mod tests {
             let bare = colorous::VIRIDIS.eval_rational(k, 500).as_array();
             let under = bare.map(|c| ((u16::from(c) + 255) / 2) as u8);
             for colour in [bare, under] {
-                let met = palette.colours[usize::from(palette.nearest(colour))];
+                let place = palette.nearest(colour);
+                let met = palette.colours[usize::from(place)];
                 let off = met.iter().zip(colour).map(|(a, b)| a.abs_diff(b)).max().unwrap();
                 assert!(off <= 6, "{colour:?} is shown as {met:?}");
             }
         }
         for grey in [[0; 3], [255; 3]] {
-            assert_eq!(palette.colours[usize::from(palette.nearest(grey))], grey);
+            let place = palette.nearest(grey);
+            assert_eq!(palette.colours[usize::from(place)], grey);
         }
     }
 }

@@ -93,8 +93,8 @@ impl Packed {
         let mut first = None;
         let mut ends = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         let mut meshes = Vec::new();
-        for series in 0..2 {
-            let frames = run.frames(series, &spread(counts[series], share));
+        for (series, count) in counts.into_iter().enumerate() {
+            let frames = run.frames(series, &spread(count, share));
             for x in frames.iter().flat_map(|frame| &frame.x) {
                 ends = [[0, 1].map(|d| ends[0][d].min(x[d])), [0, 1].map(|d| ends[1][d].max(x[d]))];
             }
