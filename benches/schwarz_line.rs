@@ -9,8 +9,9 @@ use std::time::Instant;
 const LAYER: &str = "(1 - exp(20*x)) / (1 - exp(20))";
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    if let [layer, cells] = &arguments[1..]
+    // cargo adds one of its own
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    if let [layer, cells] = &arguments[..]
         && layer == "layer"
     {
         return boundary_layer(cells.parse().expect("a number of cells"));
@@ -29,8 +30,9 @@ fn million() {
         let history = line.iterate(0.0, &ranges, method, &line.uniform(), None, stop).expect("solvable");
         let seconds = clock.elapsed().as_secs_f64();
         println!(
-            "{name:8} {cells} cells, 64 subdomains: {} iterations to {:.1e} in {seconds:.2} s, {} threads",
+            "{name:8} {cells} cells, 64 subdomains: {} iterations, {} linear solves, to {:.1e} in {seconds:.2} s, {} threads",
             history.count(),
+            history.iterates[history.count()].linear_solves,
             history.iterates[history.count()].error,
             rayon::current_num_threads()
         );
@@ -39,7 +41,8 @@ fn million() {
 }
 
 fn boundary_layer(cells: usize) {
-    let line = Line { face: FaceDensity::Trapezoid, ..Line::new(LineDensity::arclength(LAYER).expect("a formula"), cells) };
+    let line =
+        Line { face: FaceDensity::Trapezoid, ..Line::new(LineDensity::arclength(LAYER).expect("a formula"), cells) };
     let xi: Vec<f64> = (0..=cells).map(|i| i as f64 / cells as f64).collect();
     let exact = line.exact(0.0, &xi).expect("solvable");
     let mut best = f64::INFINITY;
