@@ -20,7 +20,7 @@ fn main() {
 }
 
 fn million() {
-    let cells = 64 * 15_626 - 63 * 1; // about a million: 64 subdomains that overlap by one cell
+    let cells = 64 * 15_626 - 63; // about a million: 64 subdomains that overlap by one cell
     for (name, density) in [("x² + 1", LineDensity::formula("x^2 + 1")), ("layer", LineDensity::arclength(LAYER))] {
         let line = Line::new(density.expect("a formula"), cells);
         let ranges = pieces::equal(cells, 64, 1).expect("they fit");
