@@ -27,6 +27,7 @@ bench: $(VENV)/ready
 	$(CARGO) bench -p driftmesh --bench formula_pde
 	$(VENV)/bin/python benches/mesh_solve.py
 	$(VENV)/bin/python benches/stencils.py
+	$(VENV)/bin/python benches/schwarz_line.py
 
 # The library's documentation in target/doc, and the gallery of studies in target/doc/gallery.
 docs:

@@ -9,8 +9,9 @@ use std::time::Instant;
 const LAYER: &str = "(1 - exp(20*x)) / (1 - exp(20))";
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    if let [layer, cells] = &arguments[1..]
+    // cargo adds one of its own
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    if let [layer, cells] = &arguments[..]
         && layer == "layer"
     {
         return boundary_layer(cells.parse().expect("a number of cells"));
@@ -19,7 +20,7 @@ fn main() {
 }
 
 fn million() {
-    let cells = 64 * 15_626 - 63 * 1; // about a million: 64 subdomains that overlap by one cell
+    let cells = 64 * 15_626 - 63; // about a million: 64 subdomains that overlap by one cell
     for (name, density) in [("x² + 1", LineDensity::formula("x^2 + 1")), ("layer", LineDensity::arclength(LAYER))] {
         let line = Line::new(density.expect("a formula"), cells);
         let ranges = pieces::equal(cells, 64, 1).expect("they fit");
@@ -29,8 +30,9 @@ fn million() {
         let history = line.iterate(0.0, &ranges, method, &line.uniform(), None, stop).expect("solvable");
         let seconds = clock.elapsed().as_secs_f64();
         println!(
-            "{name:8} {cells} cells, 64 subdomains: {} iterations to {:.1e} in {seconds:.2} s, {} threads",
+            "{name:8} {cells} cells, 64 subdomains: {} iterations, {} linear solves, to {:.1e} in {seconds:.2} s, {} threads",
             history.count(),
+            history.iterates[history.count()].linear_solves,
             history.iterates[history.count()].error,
             rayon::current_num_threads()
         );

@@ -33,11 +33,12 @@
 //! # Ok::<(), driftmesh::Error>(())
 //! ```
 //!
-//! Laplacians on any structured mesh are in [`laplacian`], moving phase boundaries in [`stefan`].
+//! Laplacians on any structured mesh are in [`laplacian`], moving phase boundaries in [`stefan`], meshes on a line in
+//! [`equidistribution`].
 //!
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
-//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`laplacian`], [`meshing`] and
+//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`equidistribution`], [`laplacian`], [`meshing`] and
 //! [`physics`], then [`stefan`], then [`simulation`], then [`report`], then [`study`].
 
 pub mod error;

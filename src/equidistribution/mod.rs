@@ -11,6 +11,7 @@
 mod chain;
 mod coarse;
 mod density;
+mod path;
 pub mod pieces;
 mod predict;
 mod schwarz;
@@ -158,9 +159,14 @@ const CONTRACTS: f64 = 0.9999;
 const ROUNDING: f64 = 1e-11;
 /// Contractions that count for the observed rate.
 const LAST: usize = 10;
-/// Places in a cell at which an interpolant is compared, and cells that are compared at a time.
-const SAMPLES: usize = 64;
-const CELLS_AT_ONCE: usize = 256;
+/// More cells than this begin with the mesh of so many times fewer.
+const NESTED: usize = 2000;
+const COARSER: usize = 8;
+/// Parts of a cell between which an interpolant is compared: of all cells, and of the worst.
+const FEW_PARTS: usize = 4;
+const PARTS: usize = 64;
+const CELLS_AT_ONCE: usize = 4096;
+const MOST: usize = 1000;
 
 impl Line {
     /// M on \[0, 1\], averaged by trapezoids.
@@ -185,7 +191,8 @@ impl Line {
         x
     }
 
-    /// The discrete mesh of the whole line, and the linear solves that it took.
+    /// The discrete mesh of the whole line, and the linear solves that it took on this line: many cells begin with the
+    /// mesh of fewer.
     ///
     /// # Errors
     /// As [`iterate`](Self::iterate).
@@ -193,6 +200,11 @@ impl Line {
         self.check_mesh("guess", guess)?;
         before.map_or(Ok(()), |(old, _)| self.check_mesh("before", old))?;
         let step = before.map(|(old, ratio)| Step { old, ratio });
+        if before.is_none() && self.cells > NESTED {
+            let coarse = Self { cells: self.cells / COARSER, ..self.clone() };
+            let near = coarse.solve(t, &interpolated(guess, coarse.cells), None)?.0;
+            return Ok(self.chain(t).solve(&interpolated(&near, self.cells), self.ends.map(End::Value), None)?);
+        }
         Ok(self.chain(t).solve(guess, self.ends.map(End::Value), step)?)
     }
 
@@ -313,21 +325,39 @@ impl Line {
 
     /// The largest error of the piecewise linear interpolant of u on a mesh, where M is the arc length of u.
     pub fn interpolation_error(&self, t: f64, mesh: &[f64]) -> Option<f64> {
-        let place = |x: &[f64], k: usize| x[0] + k as f64 / SAMPLES as f64 * (x[1] - x[0]);
-        let largest = |first: &usize| {
-            let cells = mesh[*first..].windows(2).take(CELLS_AT_ONCE);
-            let places: Vec<f64> = cells.flat_map(|x| (0..=SAMPLES).map(move |k| place(x, k))).collect();
+        // of each cell, at so many places inside
+        let errors = |cells: &[[f64; 2]], parts: usize| -> Option<Vec<f64>> {
+            let place = |x: &[f64; 2], k: usize| x[0] + k as f64 / parts as f64 * (x[1] - x[0]);
+            let places: Vec<f64> = cells.iter().flat_map(|x| (0..=parts).map(move |k| place(x, k))).collect();
             let u = self.density.followed(t, &places)?;
             let off = |u: &[f64]| {
-                let linear = |k: usize| u[0] + k as f64 / SAMPLES as f64 * (u[SAMPLES] - u[0]);
-                (1..SAMPLES).map(|k| (u[k] - linear(k)).abs()).fold(0.0, f64::max)
+                let linear = |k: usize| u[0] + k as f64 / parts as f64 * (u[parts] - u[0]);
+                (1..parts).map(|k| (u[k] - linear(k)).abs()).fold(0.0, f64::max)
             };
-            Some(u.chunks_exact(SAMPLES + 1).map(off).fold(0.0, f64::max))
+            Some(u.chunks_exact(parts + 1).map(off).collect())
         };
-        let firsts: Vec<usize> = (0..self.cells).step_by(CELLS_AT_ONCE).collect();
-        let all = parallel::map_large(SAMPLES * self.cells, &firsts, largest);
-        all.into_iter().collect::<Option<Vec<f64>>>()?.into_iter().reduce(f64::max)
+        let cells: Vec<[f64; 2]> = mesh.windows(2).map(|x| [x[0], x[1]]).collect();
+        let batches: Vec<&[[f64; 2]]> = cells.chunks(CELLS_AT_ONCE).collect();
+        let rough = parallel::map_large(cells.len(), &batches, |cells| errors(cells, FEW_PARTS));
+        let rough: Vec<f64> = rough.into_iter().collect::<Option<Vec<_>>>()?.concat();
+        let largest = rough.iter().copied().fold(0.0, f64::max);
+        // then closely where the largest may be
+        let worst: Vec<[f64; 2]> =
+            cells.into_iter().zip(rough).filter(|(_, off)| *off >= 0.9 * largest).map(|(x, _)| x).take(MOST).collect();
+        errors(&worst, PARTS)?.into_iter().reduce(f64::max)
     }
+}
+
+/// A mesh with another number of cells.
+fn interpolated(mesh: &[f64], cells: usize) -> Vec<f64> {
+    let last = mesh.len() - 1;
+    let at = |i: usize| {
+        let place = i as f64 / cells as f64 * last as f64;
+        let cell = (place as usize).min(last - 1);
+        mesh[cell] + (place - cell as f64) * (mesh[cell + 1] - mesh[cell])
+    };
+    // the end to the last bit
+    (0..cells).map(at).chain([mesh[last]]).collect()
 }
 
 fn distance(a: &Pieces, b: &Pieces) -> f64 {

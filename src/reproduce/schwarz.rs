@@ -95,7 +95,9 @@ pub fn table_8_1(_: Options) -> Result<Rerun> {
     let robin = Method::Optimized { robin: Robin::Value(3.70) };
     let cut = [[0, 50], [50, 100]];
     let overlap = two([48, 52], 100);
-    let rows: [(&str, Method, &[[usize; 2]], f64, [f64; 7], [f64; 7]); 4] = [
+    // method, subdomains, tolerance, the paper's row and the one measured elsewhere
+    type Row<'a> = (&'static str, Method, &'a [[usize; 2]], f64, [f64; 7], [f64; 7]);
+    let rows: [Row<'_>; 4] = [
         (
             "nonlinear",
             NONLINEAR,
@@ -213,7 +215,9 @@ pub fn figure_8_2(_: Options) -> Result<Rerun> {
     let robin = |p: f64| Method::Optimized { robin: Robin::Value(p) };
     let lagged = Method::Optimized { robin: Robin::Lagged };
     let exact = |line: Line| Line { face: FaceDensity::Exact, ..line };
-    let sides: [(&str, &str, Line, Vec<(&str, Method, Option<usize>)>); 2] = [
+    // methods with the iterations counted elsewhere
+    type Side = (&'static str, &'static str, Line, Vec<(&'static str, Method, Option<usize>)>);
+    let sides: [Side; 2] = [
         (
             "left",
             "x² + 1",
