@@ -72,8 +72,23 @@ fn a_run_leaves_its_directory() {
     for part in ["l_inf", "0.2600", "0.2700", "20 steps", "out/mesh.png", "run      out"] {
         assert!(said.contains(part), "{part:?} is not in\n{said}");
     }
-    let expected =
-        ["final.npz", "frames", "history.csv", "mesh.png", "mesh.svg", "run.pvd", "study.toml", "summary.json"];
+    let expected = [
+        "compare",
+        "compare.pvd",
+        "error.png",
+        "error.svg",
+        "final.npz",
+        "frames",
+        "history.csv",
+        "mesh.png",
+        "mesh.svg",
+        "quality.png",
+        "quality.svg",
+        "report.html",
+        "run.pvd",
+        "study.toml",
+        "summary.json",
+    ];
     assert_eq!(entries(&sandbox.path("out")), expected);
     // the first state, steps 8 and 16, and the last
     assert_eq!(entries(&sandbox.path("out/frames")).len(), 4);
