@@ -69,7 +69,7 @@ fn a_run_leaves_its_directory() {
     let output = sandbox.run(&[]);
     assert!(output.status.success(), "{}", words(&output));
     let said = String::from_utf8(output.stdout).unwrap();
-    for part in ["l_inf", "0.2600", "0.2700", "20 steps", "out/mesh.png", "run      out"] {
+    for part in ["l_inf", "0.2600", "0.2700", "20 steps", "out/mesh.png", "out/report.html", "run      out"] {
         assert!(said.contains(part), "{part:?} is not in\n{said}");
     }
     let expected = [
