@@ -188,6 +188,14 @@ pub enum Failure {
         /// When.
         t: f64,
     },
+    /// Newton's method found no nodes of a line, or of a subdomain of it.
+    #[error("Newton's method stalled on the line: residual {residual:.1e} after {iterations} iterations")]
+    LineStalled {
+        /// Largest difference of neighbouring fluxes.
+        residual: f64,
+        /// Iterations done.
+        iterations: usize,
+    },
     /// An iteration between subdomains of a line did not converge.
     #[error(
         "not converged: the {measure} is {last:.2e} after {iterations} iterations, {tolerance:.0e} asked for{advice}"
@@ -300,6 +308,7 @@ impl Failure {
             Self::SchwarzStalled { .. } => "schwarz-stalled",
             Self::Subdomains { .. } => "subdomains",
             Self::LineDensity { .. } => "line-density",
+            Self::LineStalled { .. } => "line-stalled",
             Self::NotConverged { .. } => "not-converged",
             Self::SelfTouching { .. } => "self-touching",
             Self::DegenerateStencil { .. } => "degenerate-stencil",
@@ -353,6 +362,9 @@ impl Failure {
             Self::Subdomains { .. } => "give every axis between one subdomain and one a cell",
             Self::LineDensity { .. } => {
                 "mend density.value or density.of: iterates of Robin conditions may leave the domain"
+            }
+            Self::LineStalled { .. } => {
+                "refine grid.cells, smooth the density where it jumps or peaks within a cell, or begin nearer with start.mesh"
             }
             Self::NotConverged { .. } => {
                 "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"galerkin\""

@@ -70,6 +70,24 @@ fn one_domain() {
     assert!(summary["work"]["linear_solves"].as_u64().unwrap() <= 6, "{}", summary["work"]);
 }
 
+/// A line of any length and place converges alike; what the cells do not see is told.
+#[test]
+fn other_lines() {
+    let count = |set: &[&str]| {
+        let begin = ["stop.tolerance=1e-10", "stop.iterations=500", "density.kind=formula"];
+        run("table-8-1-nonlinear", &[&begin, set].concat()).1["iterations_to_tolerance"].as_u64().unwrap()
+    };
+    let unit = count(&["density.value=\"x^2 + 1\""]);
+    assert_eq!(unit, 259);
+    let long = ["domain.lower=[-1e6]", "domain.upper=[1e6]", "density.value=\"((x + 1e6)/2e6)^2 + 1\""];
+    let short = ["domain.upper=[1e-6]", "density.value=\"(1e6*x)^2 + 1\""];
+    assert!(count(&long).abs_diff(unit) <= 1 && count(&short).abs_diff(unit) <= 1);
+    let (_, summary) = run("boundary-layer", &["density.of=\"tanh(2000*(x - 0.3125))\""]);
+    let warning = summary["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("the cells see another density"), "{warning}");
+    assert!(run("boundary-layer", &[]).1["warnings"].is_null());
+}
+
 #[test]
 fn subdomains() {
     let (_, summary) = run("schwarz-coarse", &[]);

@@ -371,6 +371,13 @@ fn line_density() {
 }
 
 #[test]
+fn line_stalled() {
+    let line = Line::new(LineDensity::formula("if(x < 0.3, 1, 50)").unwrap(), 100);
+    let error = line.solve(0.0, &line.uniform(), None).unwrap_err();
+    assert_says(error, &["stalled on the line", "residual"], Some("grid.cells"), true);
+}
+
+#[test]
 fn not_converged() {
     let line = Line::new(LineDensity::formula("x^2 + 1").unwrap(), 20);
     let method = Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse: Coarse::None };

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 /// Runs a study of kind `equidistribution`.
 pub fn run(study: &EquidistributionStudy, out: &Path, quiet: bool) -> driftmesh::Result<ExitCode> {
     let finished = study.run(out)?;
+    finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {
         terminal::say(table(&finished.summary));
         terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));

@@ -208,7 +208,7 @@ impl Chain<'_> {
     /// linear solves.
     ///
     /// # Errors
-    /// [`Failure::LineDensity`], [`Failure::NewtonStalled`].
+    /// [`Failure::LineDensity`], [`Failure::LineStalled`].
     pub fn solve(&self, guess: &[f64], ends: [End; 2], step: Option<Step<'_>>) -> Result<(Vec<f64>, usize), Failure> {
         let mut x = stretched(guess, ends);
         let size = x.iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
@@ -242,7 +242,7 @@ impl Chain<'_> {
                 }
             }
             let Some((tried, r, m, share)) = found else {
-                return Err(Failure::NewtonStalled { residual: before, tolerance: 0.0, iterations: solves });
+                return Err(Failure::LineStalled { residual: before, iterations: solves });
             };
             (x, residual, rows) = (tried, r, m);
             // quadratic until rounding: then steps no longer shrink
@@ -254,7 +254,7 @@ impl Chain<'_> {
             }
             last = largest;
         }
-        Err(Failure::NewtonStalled { residual: norm(&residual), tolerance: 0.0, iterations: MAX_NEWTON })
+        Err(Failure::LineStalled { residual: norm(&residual), iterations: MAX_NEWTON })
     }
 
     /// One linear solve with the face densities of given nodes frozen.

@@ -61,7 +61,7 @@ pub type Before<'a> = Option<(&'a [f64], f64)>;
 pub struct Stop {
     /// After so many iterations at the latest.
     pub iterations: usize,
-    /// As soon as the measure is at most this.
+    /// As soon as the measure is at most this share of the line's length.
     pub tolerance: Option<f64>,
     /// What is measured.
     pub measure: Measure,
@@ -135,7 +135,7 @@ impl History {
 
     /// What to say where the tolerance was missed.
     pub fn missed(&self, method: Method, stop: Stop) -> Option<Failure> {
-        let tolerance = stop.tolerance.filter(|_| !self.converged)?;
+        let tolerance = stop.tolerance.filter(|_| !self.converged)? * (self.mesh[self.mesh.len() - 1] - self.mesh[0]);
         let last = stop.measure.of(&self.iterates[self.count()]);
         let linearized = matches!(method, Method::Classical { linearized: true, .. });
         let advice = match self.observed {
@@ -155,7 +155,7 @@ impl History {
 
 /// A contraction nearer to 1 is none.
 const CONTRACTS: f64 = 0.9999;
-/// Iterates with errors below this are rounding.
+/// Iterates with errors below this share of the line's length are rounding.
 const ROUNDING: f64 = 1e-11;
 /// Contractions that count for the observed rate.
 const LAST: usize = 10;
@@ -244,7 +244,7 @@ impl Line {
     ///
     /// # Errors
     /// [`Error::Invalid`] for ranges that do not fit ([`pieces::check`]) or a start that is no mesh; [`Error::Failed`] with
-    /// [`Failure::LineDensity`] or [`Failure::NewtonStalled`].
+    /// [`Failure::LineDensity`] or [`Failure::LineStalled`].
     pub fn iterate(
         &self,
         t: f64,
@@ -261,9 +261,10 @@ impl Line {
         let exact = iteration.cut(&reference);
         let mut pieces = iteration.cut(start);
         let mut iterates = vec![self.measured(t, &iteration, &pieces, &exact, 0.0, 0)];
+        let length = self.ends[1] - self.ends[0];
         let met = |iterate: &Iterate, n: usize| {
             let known = n > 0 || stop.measure == Measure::Error;
-            known && stop.tolerance.is_some_and(|tolerance| stop.measure.of(iterate) <= tolerance)
+            known && stop.tolerance.is_some_and(|tolerance| stop.measure.of(iterate) <= tolerance * length)
         };
         let mut converged = met(&iterates[0], 0);
         let mut solves = 0;
@@ -276,7 +277,7 @@ impl Line {
             iterates.push(iterate);
             converged = met(&iterate, iterates.len() - 1);
         }
-        let observed = observed(&iterates);
+        let observed = observed(&iterates, ROUNDING * length);
         let prediction = Prediction::of(self, t, ranges, method, &reference, before.map(|b| b.1))?;
         let converged = converged || stop.tolerance.is_none();
         Ok(History { mesh: iteration.glue(&pieces), iterates, reference, observed, prediction, converged })
@@ -366,8 +367,8 @@ fn distance(a: &Pieces, b: &Pieces) -> f64 {
 }
 
 /// The geometric mean of E_{n+2}/E_n over the last n with E_{n+2} above rounding.
-fn observed(iterates: &[Iterate]) -> Option<f64> {
-    let above: Vec<f64> = iterates.iter().map(|i| i.error).take_while(|error| *error > ROUNDING).collect();
+fn observed(iterates: &[Iterate], rounding: f64) -> Option<f64> {
+    let above: Vec<f64> = iterates.iter().map(|i| i.error).take_while(|error| *error > rounding).collect();
     // the first half of a fast iteration is not yet asymptotic
     let pairs = above.len().saturating_sub(2);
     let pairs = LAST.min(pairs.div_ceil(2));

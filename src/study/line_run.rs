@@ -50,6 +50,9 @@ pub struct EquidistributionSummary {
     pub iterations_per_step: Option<PerStep>,
     /// The last mesh, glued from the subdomains.
     pub mesh: Vec<f64>,
+    /// What the user should know although nothing failed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// Seconds by part.
@@ -170,6 +173,9 @@ pub struct StepRow {
 
 /// Nodes compared with the continuous mesh.
 const COMPARED: usize = 1000;
+/// Places at which the density is looked at, and a share of ∫M that tells of a layer unseen.
+const PLACES: usize = 20_000;
+const NOTICEABLE: f64 = 0.2;
 /// Points of a curve.
 const DRAWN: usize = 400;
 /// Paths of nodes drawn in time.
@@ -280,6 +286,7 @@ impl EquidistributionStudy {
             iterations_to_tolerance: None,
             iterations_per_step: None,
             mesh: Vec::new(),
+            warnings: Vec::new(),
         }
     }
 }
@@ -314,6 +321,7 @@ impl EquidistributionSummary {
         let t = evolution.steps.last().map_or_else(|| *evolution.times.last().unwrap_or(&0.0), |step| step.t);
         // a mesh of which nothing can be told is one of a failed run, which says so
         self.quality = LineQuality::of(line, t, &self.mesh, study.time.is_none()).ok();
+        self.warnings = unseen(line, t, &self.mesh).into_iter().collect();
         let tolerance = study.until().tolerance;
         let Some(history) = &evolution.last else { return };
         self.iterations = history.iterates.iter().enumerate().map(|(n, it)| NumberedIterate::new(n, it)).collect();
@@ -360,6 +368,23 @@ impl LineQuality {
             error_linf: steady.then(|| compared(line.cells)).transpose()?,
         })
     }
+}
+
+/// Says so where the cells see another density than there is: a layer between two nodes is none to them.
+fn unseen(line: &Line, t: f64, mesh: &[f64]) -> Option<String> {
+    let [a, b] = line.ends;
+    let sum = |x: &[f64]| -> Option<f64> {
+        let m = line.density.at_each(t, x).ok()?;
+        Some((1..x.len()).map(|i| 0.5 * (m[i - 1][0] + m[i][0]) * (x[i] - x[i - 1])).sum())
+    };
+    let places: Vec<f64> = (0..=PLACES).map(|k| a + (b - a) * k as f64 / PLACES as f64).collect();
+    let [seen, there] = [sum(mesh)?, sum(&places)?];
+    ((seen - there).abs() > NOTICEABLE * there).then(|| {
+        format!(
+            "the cells see another density than there is: ∫M is {seen:.3} over them and {there:.3} in truth; refine grid.cells, \
+             or begin with a start.mesh that has nodes where M is large"
+        )
+    })
 }
 
 /// Writes the history, the arrays and the pictures.
