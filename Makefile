@@ -27,10 +27,13 @@ bench: $(VENV)/ready
 	$(CARGO) bench -p driftmesh --bench formula_pde
 	$(VENV)/bin/python benches/mesh_solve.py
 	$(VENV)/bin/python benches/stencils.py
+	$(VENV)/bin/python benches/schwarz_line.py
 
-# The library's documentation, in target/doc.
+# The library's documentation in target/doc, and the gallery of studies in target/doc/gallery.
 docs:
 	$(CARGO) doc --release --workspace --no-deps
+	$(CARGO) build --release --workspace
+	$(PYTHON) docs/gallery.py target/release/driftmesh target/doc/gallery
 
 $(VENV)/ready: tests/python/requirements.txt
 	$(PYTHON) -m venv $(VENV)

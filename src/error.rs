@@ -443,6 +443,14 @@ pub enum Error {
         /// The directory.
         path: PathBuf,
     },
+    /// A directory that holds no run.
+    #[error("{} is no run directory: {reason}", path.display())]
+    NotARun {
+        /// The directory.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// The output directory holds something that no run of ours wrote.
     #[error("{} is not empty and was not written by driftmesh (it holds {found})", path.display())]
     ForeignDirectory {
@@ -527,6 +535,7 @@ impl Error {
             Self::Formula { help, .. } => help.clone(),
             Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
             Self::ForeignDirectory { .. } => Some("name another directory with --out, or empty this one".into()),
+            Self::NotARun { .. } => Some("name the directory that `driftmesh run` printed behind `run`".into()),
             Self::Invalid { .. } | Self::Unreadable { .. } | Self::Unwritable { .. } => None,
         }
     }

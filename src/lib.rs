@@ -33,12 +33,13 @@
 //! # Ok::<(), driftmesh::Error>(())
 //! ```
 //!
-//! Laplacians on any structured mesh are in [`laplacian`], moving phase boundaries in [`stefan`].
+//! Laplacians on any structured mesh are in [`laplacian`], moving phase boundaries in [`stefan`], meshes on a line in
+//! [`equidistribution`].
 //!
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
-//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`laplacian`], [`meshing`] and
-//! [`physics`], then [`stefan`], then [`simulation`], then [`study`].
+//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`equidistribution`], [`laplacian`], [`meshing`] and
+//! [`physics`], then [`stefan`], then [`simulation`], then [`report`], then [`study`].
 
 pub mod error;
 pub mod formula;
@@ -61,6 +62,8 @@ pub mod physics;
 pub mod stefan;
 
 pub mod simulation;
+
+pub mod report;
 
 pub mod study;
 

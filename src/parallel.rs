@@ -43,6 +43,16 @@ pub(crate) fn for_each_piece<T: Send>(array: &mut [T], f: impl Fn(usize, &mut [T
     }
 }
 
+/// Two pieces of work that know nothing of each other.
+pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    rayon::join(a, b)
+}
+
+/// `f` of every item, in order, for items that have so many elements in all.
+pub(crate) fn map_large<T: Sync, R: Send>(elements: usize, items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    if elements < WORTHWHILE { items.iter().map(f).collect() } else { map(items, f) }
+}
+
 /// `f` of every item, in order; for work that is worth handing out item by item.
 pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     items.par_iter().map(f).collect()

@@ -1,6 +1,7 @@
 //! Every variant of the library's errors, triggered once and read.
 
 use driftmesh::density::{Arclength, Given, Monitor};
+use driftmesh::equidistribution::{Coarse, Line, LineDensity, Measure, Method, Stop, Sweep};
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
@@ -353,4 +354,34 @@ fn fronts() {
     let error = front.step(&problem, &mut state, 1.0).unwrap_err();
     assert_says(error, &["past the stability limit"], Some("front.stepping"), true);
     assert_eq!(state, before);
+}
+
+#[test]
+fn not_a_run() {
+    let directory = tempfile::tempdir().unwrap();
+    let error = driftmesh::report::build(directory.path()).unwrap_err();
+    assert_says(error, &["is no run directory: it has no summary.json"], Some("driftmesh run"), false);
+}
+
+#[test]
+fn line_density() {
+    let line = Line::new(LineDensity::formula("sqrt(0.5 - x)").unwrap(), 10);
+    let error = line.solve(0.0, &line.uniform(), None).unwrap_err();
+    assert_says(error, &["M is 0e0 at x = 0.5", "finite and above 0"], Some("density.value"), true);
+}
+
+#[test]
+fn not_converged() {
+    let line = Line::new(LineDensity::formula("x^2 + 1").unwrap(), 20);
+    let method = Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse: Coarse::None };
+    let stop = Stop { iterations: 3, tolerance: Some(1e-10), measure: Measure::Increment };
+    let history = line.iterate(0.0, &[[0, 11], [9, 20]], method, &line.uniform(), None, stop).unwrap();
+    let failure = history.missed(method, stop).unwrap();
+    assert_eq!(failure.name(), "not-converged");
+    assert_says(failure, &["the increment is", "after 3 iterations", "more would do"], Some("stop.iterations"), true);
+    // what cannot be iterated at all is a mistake
+    let alone = line.iterate(0.0, &[[0, 10], [10, 20]], method, &line.uniform(), None, stop).unwrap_err();
+    assert_says(alone, &["do not overlap"], None, false);
+    let short = line.solve(0.0, &[0.0, 1.0], None).unwrap_err();
+    assert_says(short, &["`guess` is 2 nodes, but 20 cells have 21"], None, false);
 }

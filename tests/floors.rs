@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Lowest floor first; modules on one floor are siblings that do not know each other.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     &["error"],
     &["formula", "kind", "parallel", "random", "setting", "work"],
     &["geometry"],
@@ -11,6 +11,7 @@ const FLOORS: [&[&str]; 9] = [
     &["density", "equidistribution", "laplacian", "meshing", "physics"],
     &["stefan"],
     &["simulation"],
+    &["report"],
     &["study"],
     &["reproduce"],
 ];

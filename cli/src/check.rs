@@ -16,6 +16,7 @@ impl Check {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
         let study = match self.study.read()? {
             Study::MovingMesh(study) => study,
+            Study::Equidistribution(study) => return Ok(valid(&study.to_toml(), study.memory())),
             Study::Poisson(study) => return Ok(valid(&study.to_toml(), study.memory())),
             Study::Stefan(study) => {
                 study.warnings()?.iter().for_each(|warning| warn(warning));

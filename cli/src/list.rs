@@ -5,6 +5,7 @@ use driftmesh::{
     laplacian::Laplacian,
     meshing::{EstimatorKind, GeneratorKind},
     physics::PdeKind,
+    study::{LineDensityKind, MethodName},
 };
 use std::process::ExitCode;
 
@@ -21,6 +22,8 @@ enum Topic {
     Generators,
     Estimators,
     Laplacians,
+    Densities,
+    Methods,
 }
 
 impl List {
@@ -31,6 +34,8 @@ impl List {
             (Topic::Generators, "generators", "mesh.generator.kind", GeneratorKind::KINDS),
             (Topic::Estimators, "estimators", "mesh.generator.estimator.kind", EstimatorKind::KINDS),
             (Topic::Laplacians, "laplacians", "laplacian.kind", Laplacian::KINDS),
+            (Topic::Densities, "densities of a line", "density.kind", LineDensityKind::KINDS),
+            (Topic::Methods, "Schwarz methods of a line", "schwarz.method", MethodName::KINDS),
         ];
         for (topic, title, key, kinds) in topics {
             if self.topic.is_none_or(|only| only == topic) {

@@ -1,9 +1,11 @@
 //! The `driftmesh` program: a thin door to the library.
 
 mod check;
+mod equidistribution;
 mod list;
 mod poisson;
 mod progress;
+mod report;
 mod reproduce;
 mod run;
 mod stefan;
@@ -36,6 +38,9 @@ enum Verb {
     /// Rerun published tables and figures: ours beside theirs.
     #[command(after_help = "Example:\n  driftmesh reproduce interface-study --quick")]
     Reproduce(reproduce::Reproduce),
+    /// (Re)build the HTML report of a finished or interrupted run.
+    #[command(after_help = "Example:\n  driftmesh report out/burgers")]
+    Report(report::Report),
 }
 
 /// A study file and what is set on top of it.
@@ -63,6 +68,7 @@ fn main() -> ExitCode {
         Verb::Check(check) => check.execute(),
         Verb::List(list) => list.execute(),
         Verb::Reproduce(reproduce) => reproduce.execute(),
+        Verb::Report(report) => report.execute(),
     };
     match outcome {
         Ok(code) => code,

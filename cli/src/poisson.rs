@@ -10,6 +10,9 @@ pub fn run(study: &PoissonStudy, out: &Path, quiet: bool) -> driftmesh::Result<E
     if !quiet {
         terminal::say(table(&summary));
         terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
+        if study.output.report {
+            terminal::say(format_args!("report   {}", out.join("report.html").display()));
+        }
         terminal::say(format_args!("run      {}", out.display()));
     }
     Ok(ExitCode::SUCCESS)

@@ -2,7 +2,7 @@ use driftmesh::simulation::{Event, Observer, Snapshot};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write, stderr};
 
-/// A live bar on a terminal, ten plain lines elsewhere.
+/// A live bar on a terminal, ten plain lines elsewhere: time, step, rate, smallest corner Jacobian, time that remains.
 pub struct Progress {
     bar: Option<ProgressBar>,
     /// Pieces of the run that were told of.
@@ -16,8 +16,8 @@ const LINES: usize = 10;
 impl Progress {
     pub fn new() -> Self {
         let bar = stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left")
-                .expect("the template is valid");
+            let style =
+                ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}").expect("the template is valid");
             ProgressBar::new(0).with_style(style)
         });
         Self { bar, told: 0 }
@@ -33,11 +33,7 @@ impl Progress {
 
 impl Observer for Progress {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let words = || {
-            let (state, jacobian) = (snapshot.state, snapshot.quality.min_scaled_jacobian);
-            let of = snapshot.steps.map_or(String::new(), |steps| format!(" of {steps}"));
-            format!("t = {:.4}  step {}{of}  min J {jacobian:.3}", state.t, state.step)
-        };
+        let words = || words(snapshot);
         let pieces = if self.bar.is_some() { OF_THE_BAR } else { LINES };
         // a share that is a whole number of pieces up to round-off is one
         let done = (snapshot.share * pieces as f64 + 1e-9) as usize;
@@ -51,11 +47,57 @@ impl Observer for Progress {
                 bar.set_position(done as u64);
                 bar.set_message(words());
             }
+            Some(bar) if event == Event::Finished => bar.set_message("comparing, drawing and writing the report"),
             None if event == Event::Stepped && news => {
                 let _ = writeln!(stderr(), "{}", words());
             }
             _ => {}
         }
         Ok(())
+    }
+}
+
+/// Where a run is, how fast, and for how long still, as far as the time simulated so far tells.
+fn words(snapshot: &Snapshot<'_>) -> String {
+    let (state, jacobian) = (snapshot.state, snapshot.quality.min_scaled_jacobian);
+    let mut text = format!("t = {:.4}  step {}", state.t, state.step);
+    if let Some(steps) = snapshot.steps {
+        text += &format!(" of {steps}");
+    }
+    if state.step > 0 && snapshot.seconds > 0.0 {
+        text += &format!("  {} steps/s", rate(state.step as f64 / snapshot.seconds));
+    }
+    text += &format!("  min J {jacobian:.3}");
+    if snapshot.share > 0.0 && snapshot.share < 1.0 {
+        text += &format!("  {} left", duration(snapshot.seconds * (1.0 - snapshot.share) / snapshot.share));
+    }
+    text
+}
+
+/// Two digits of a number of steps a second.
+fn rate(rate: f64) -> String {
+    if rate < 10.0 { format!("{rate:.1}") } else { format!("{rate:.0}") }
+}
+
+/// A time in seconds, minutes or hours.
+fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0 => format!("{seconds:.1} s"),
+        1..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_remains_is_told_in_the_unit_that_fits() {
+        let words = [0.34, 12.0, 61.0, 3599.7, 7260.0].map(duration);
+        assert_eq!(words, ["0.3 s", "12 s", "1 min 01 s", "1 h 00 min", "2 h 01 min"]);
+        assert_eq!([0.25, 9.96, 520.4].map(rate), ["0.2", "10.0", "520"]);
     }
 }

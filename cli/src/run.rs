@@ -1,4 +1,4 @@
-use crate::{StudyArgs, poisson, progress::Progress, stefan, terminal};
+use crate::{StudyArgs, equidistribution, poisson, progress::Progress, stefan, terminal};
 use clap::Args;
 use driftmesh::meshing::Interface;
 use driftmesh::simulation::{Observer, RunDirectory, Summary};
@@ -31,6 +31,7 @@ impl Run {
             Study::MovingMesh(study) => self.moving_mesh(&study, &out),
             Study::Poisson(study) => poisson::run(&study, &out, self.quiet),
             Study::Stefan(study) => stefan::run(&study, &out, self.quiet),
+            Study::Equidistribution(study) => equidistribution::run(&study, &out, self.quiet),
         }
     }
 
@@ -54,6 +55,9 @@ impl Run {
                 terminal::say(line);
             }
             terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
+            if study.output.report {
+                terminal::say(format_args!("report   {}", out.join("report.html").display()));
+            }
             terminal::say(format_args!("run      {}", out.display()));
         }
         match finished.failure {

@@ -21,6 +21,9 @@ pub fn run(study: &StefanStudy, out: &Path, quiet: bool) -> driftmesh::Result<Ex
         terminal::say(table(&finished.summary));
         terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
         terminal::say(format_args!("front    {}", out.join("front.png").display()));
+        if study.output.report {
+            terminal::say(format_args!("report   {}", out.join("report.html").display()));
+        }
         terminal::say(format_args!("run      {}", out.display()));
     }
     match finished.failure {

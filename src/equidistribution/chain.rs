@@ -1,4 +1,5 @@
 use super::LineDensity;
+use super::path::Path;
 use crate::error::Failure;
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +63,29 @@ pub(super) struct Chain<'a> {
 }
 
 const MAX_NEWTON: usize = 200;
-const HALVINGS: usize = 40;
+const HALVINGS: i32 = 40;
+const FEW_HALVINGS: i32 = 8;
+
+/// How a share of a Newton step is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Way {
+    Straight,
+    Curved,
+}
+
+/// The whole step; shorter and shorter ones along the path of even ∫M; then straight ones. With nodes in order or, where
+/// they are free, after few tries in any.
+fn ways(free: bool) -> impl Iterator<Item = (bool, Way, f64)> {
+    let halved = |ordered: bool, way: Way, halvings: std::ops::Range<i32>| {
+        halvings.map(move |n| (ordered, way, 0.5_f64.powi(n)))
+    };
+    let tries = if free { FEW_HALVINGS } else { HALVINGS };
+    halved(true, Way::Straight, 0..1)
+        .chain(halved(true, Way::Curved, 0..tries / 2))
+        .chain(halved(true, Way::Straight, 1..tries))
+        .chain(halved(false, Way::Curved, 0..if free { tries } else { 0 }))
+        .chain(halved(false, Way::Straight, 0..if free { HALVINGS } else { 0 }))
+}
 
 impl Law {
     /// φ and φ′.
@@ -89,6 +112,15 @@ impl Law {
 }
 
 impl Chain<'_> {
+    /// The path of a step over all places that it may touch, and M x′ of the step; none where M has no value on the way.
+    fn path(&self, x: &[f64], change: &[f64]) -> Option<(Path, Vec<f64>)> {
+        let ends = x.iter().zip(change).flat_map(|(x, c)| [*x, x - c]);
+        let [a, b] = ends.fold(self.ends, |[a, b], x| [a.min(x), b.max(x)]);
+        let m = self.density.at_each(self.t, x).ok()?;
+        let changes = m.iter().zip(change).map(|([m, _], c)| m * c).collect();
+        Some((Path::new(self.density, self.t, [a, b]).ok()?, changes))
+    }
+
     fn faces(&self, x: &[f64]) -> Result<Vec<Face>, Failure> {
         let cells = x.windows(2);
         match self.face {
@@ -186,22 +218,30 @@ impl Chain<'_> {
             let change = thomas(&rows, &residual);
             let largest = change.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
             let before = norm(&residual);
-            let mut share = 1.0;
-            let mut found = None;
-            for _ in 0..HALVINGS {
-                let tried: Vec<f64> = x.iter().zip(&change).map(|(x, c)| x - share * c).collect();
-                let ordered = tried.windows(2).all(|x| x[1] > x[0]);
-                // where no whole step is left to take, residuals are rounding
-                if ordered {
+            // residuals of nodes that are right to the last bit
+            let rounding = 4.0 * f64::EPSILON * size * rows.iter().fold(0.0, |m: f64, row| m.max(row[1].abs()));
+            let (mut found, mut path) = (None, None);
+            // an iterate of conditions on the flux may run backwards, and pass through no order on its way
+            let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
+            for (ordered, way, share) in ways(free) {
+                let tried: Vec<f64> = match way {
+                    Way::Straight => x.iter().zip(&change).map(|(x, c)| x - share * c).collect(),
+                    Way::Curved => match path.get_or_insert_with(|| self.path(&x, &change)) {
+                        Some((path, changes)) => {
+                            x.iter().zip(changes).map(|(x, c)| path.along(*x, -share * *c)).collect()
+                        }
+                        None => continue,
+                    },
+                };
+                if !ordered || tried.windows(2).all(|x| x[1] > x[0]) || free && tried.windows(2).all(|x| x[1] < x[0]) {
                     let (r, m) = self.linearised(&tried, ends, step)?;
-                    if norm(&r) < before || largest <= 1e-9 * size {
-                        found = Some((tried, r, m));
+                    if norm(&r) < before.max(rounding) || largest <= 1e-9 * size {
+                        found = Some((tried, r, m, share));
                         break;
                     }
                 }
-                share *= 0.5;
             }
-            let Some((tried, r, m)) = found else {
+            let Some((tried, r, m, share)) = found else {
                 return Err(Failure::NewtonStalled { residual: before, tolerance: 0.0, iterations: solves });
             };
             (x, residual, rows) = (tried, r, m);

@@ -9,7 +9,7 @@ use crate::formula::{Formula, Mistake, Program};
 pub struct LineDensity {
     kind: Kind,
     /// u of an arc length.
-    followed: Option<Formula>,
+    followed: Option<Program<1, 1>>,
 }
 
 #[derive(Debug, Clone)]
@@ -37,6 +37,14 @@ const KRONROD: [[f64; 3]; 8] = [
 ];
 /// Halvings beyond which what is left is taken as rounding.
 const DEEPEST: usize = 12;
+/// Places at which extremes are looked for first, and then around the best of them, so many times.
+const PLACES: usize = 2000;
+const PLACES_AROUND: usize = 20;
+const LOOKS: usize = 9;
+/// A slope that still grows by so much over the last looks, which narrow 10⁴ times, has no bound.
+const UNBOUNDED: f64 = 1.5;
+/// A smallest M below this share of the largest is rounding.
+const VANISHING: f64 = 1e-14;
 
 impl LineDensity {
     /// M by a formula of x and t.
@@ -57,12 +65,15 @@ impl LineDensity {
         let u = parsed("of", text)?;
         let slope = differentiated("of", text, &u)?;
         let curvature = differentiated("of", text, &slope)?;
-        Ok(Self { kind: Kind::Arclength(Program::new([&slope, &curvature])), followed: Some(u) })
+        Ok(Self { kind: Kind::Arclength(Program::new([&slope, &curvature])), followed: Some(Program::new([&u])) })
     }
 
-    /// u where M is an arc length.
-    pub fn followed(&self) -> Option<&Formula> {
-        self.followed.as_ref()
+    /// u at each place, where M is an arc length.
+    pub fn followed(&self, t: f64, x: &[f64]) -> Option<Vec<f64>> {
+        let mut out = vec![[0.0]; x.len()];
+        let points: Vec<[f64; 1]> = x.iter().map(|x| [*x]).collect();
+        self.followed.as_ref()?.eval_each(&points, &[t], &mut out);
+        Some(out.into_iter().map(|[u]| u).collect())
     }
 
     /// M and M_x at each place.
@@ -98,6 +109,40 @@ impl LineDensity {
     /// As [`at_each`](Self::at_each).
     pub fn at(&self, t: f64, x: f64) -> Result<[f64; 2], Failure> {
         self.at_each(t, &[x]).map(|m| m[0])
+    }
+
+    /// The smallest and the largest M from a to b, found by looking ever closer.
+    ///
+    /// # Errors
+    /// As [`at_each`](Self::at_each), also where M only comes near to 0, or M_x to no bound, between the places looked at.
+    pub fn extremes(&self, t: f64, [a, b]: [f64; 2]) -> Result<[f64; 2], Failure> {
+        let last = |looks: &[[f64; 2]]| looks[looks.len() - 1];
+        let high = last(&self.looked(t, [a, b], |[m, _]| m)?)[1];
+        let [x, below] = last(&self.looked(t, [a, b], |[m, _]| -m)?);
+        let low = -below;
+        if low <= VANISHING * high {
+            return Err(Failure::LineDensity { what: "M", value: low, x, t });
+        }
+        let slopes = self.looked(t, [a, b], |[_, slope]| slope.abs())?;
+        let [x, value] = last(&slopes);
+        if value > UNBOUNDED * slopes[LOOKS - 5][1] {
+            return Err(Failure::LineDensity { what: "dM/dx", value: f64::INFINITY, x, t });
+        }
+        Ok([low, high])
+    }
+
+    /// Where something is largest, and how large, look by look.
+    fn looked(&self, t: f64, ends: [f64; 2], of: impl Fn([f64; 2]) -> f64) -> Result<Vec<[f64; 2]>, Failure> {
+        let ([mut a, mut b], mut looks) = (ends, Vec::with_capacity(LOOKS));
+        for look in 0..LOOKS {
+            let cells = if look == 0 { PLACES } else { PLACES_AROUND };
+            let places: Vec<f64> = (0..=cells).map(|k| a + (b - a) * k as f64 / cells as f64).collect();
+            let values: Vec<f64> = self.at_each(t, &places)?.into_iter().map(&of).collect();
+            let best = (0..=cells).fold(0, |best, k| if values[k] > values[best] { k } else { best });
+            looks.push([places[best], values[best]]);
+            (a, b) = (places[best.saturating_sub(1)], places[(best + 1).min(cells)]);
+        }
+        Ok(looks)
     }
 
     /// ∫ M from a to b, to round-off: the rule of Gauss and Kronrod, halved where its error estimate asks for it.

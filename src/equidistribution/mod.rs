@@ -11,6 +11,8 @@
 mod chain;
 mod coarse;
 mod density;
+mod path;
+pub mod pieces;
 mod predict;
 mod schwarz;
 
@@ -22,10 +24,11 @@ pub use density::LineDensity;
 pub use predict::Prediction;
 pub use schwarz::{Coarse, Method, Robin, Sweep};
 
-use crate::error::Failure;
+use crate::error::{Error, Failure, Result};
+use crate::parallel;
 use chain::{Chain, End, Step};
 use schwarz::{Iteration, Pieces};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The equidistribution of a density over a line of equal ξ-cells.
 ///
@@ -65,7 +68,8 @@ pub struct Stop {
 }
 
 /// What tells that an iteration has converged.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Measure {
     /// The distance to the discrete single-domain mesh.
     #[default]
@@ -106,12 +110,63 @@ pub struct History {
     pub converged: bool,
 }
 
+impl Measure {
+    /// Of an iterate.
+    pub fn of(self, iterate: &Iterate) -> f64 {
+        match self {
+            Self::Error => iterate.error,
+            Self::Increment => iterate.increment,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Increment => "increment",
+        }
+    }
+}
+
+impl History {
+    /// Iterations done.
+    pub fn count(&self) -> usize {
+        self.iterates.len() - 1
+    }
+
+    /// What to say where the tolerance was missed.
+    pub fn missed(&self, method: Method, stop: Stop) -> Option<Failure> {
+        let tolerance = stop.tolerance.filter(|_| !self.converged)?;
+        let last = stop.measure.of(&self.iterates[self.count()]);
+        let linearized = matches!(method, Method::Classical { linearized: true, .. });
+        let advice = match self.observed {
+            Some(rate) if rate < CONTRACTS => {
+                let more = 2.0 * (tolerance / last).ln() / rate.ln();
+                format!("; it contracts by {rate:.4} in two iterations: about {more:.0} more would do")
+            }
+            _ if linearized => {
+                "; the linearised iteration need not converge where M varies much over the overlap".into()
+            }
+            _ => "; it does not contract".into(),
+        };
+        let measure = stop.measure.name();
+        Some(Failure::NotConverged { measure, last, iterations: self.count(), tolerance, advice })
+    }
+}
+
+/// A contraction nearer to 1 is none.
+const CONTRACTS: f64 = 0.9999;
 /// Iterates with errors below this are rounding.
 const ROUNDING: f64 = 1e-11;
 /// Contractions that count for the observed rate.
 const LAST: usize = 10;
-/// Places in a cell at which an interpolant is compared.
-const SAMPLES: usize = 64;
+/// More cells than this begin with the mesh of so many times fewer.
+const NESTED: usize = 2000;
+const COARSER: usize = 8;
+/// Parts of a cell between which an interpolant is compared: of all cells, and of the worst.
+const FEW_PARTS: usize = 4;
+const PARTS: usize = 64;
+const CELLS_AT_ONCE: usize = 4096;
+const MOST: usize = 1000;
 
 impl Line {
     /// M on \[0, 1\], averaged by trapezoids.
@@ -136,13 +191,21 @@ impl Line {
         x
     }
 
-    /// The discrete mesh of the whole line, and the linear solves that it took.
+    /// The discrete mesh of the whole line, and the linear solves that it took on this line: many cells begin with the
+    /// mesh of fewer.
     ///
     /// # Errors
-    /// [`Failure::LineDensity`], [`Failure::NewtonStalled`].
-    pub fn solve(&self, t: f64, guess: &[f64], before: Before<'_>) -> Result<(Vec<f64>, usize), Failure> {
+    /// As [`iterate`](Self::iterate).
+    pub fn solve(&self, t: f64, guess: &[f64], before: Before<'_>) -> Result<(Vec<f64>, usize)> {
+        self.check_mesh("guess", guess)?;
+        before.map_or(Ok(()), |(old, _)| self.check_mesh("before", old))?;
         let step = before.map(|(old, ratio)| Step { old, ratio });
-        self.chain(t).solve(guess, self.ends.map(End::Value), step)
+        if before.is_none() && self.cells > NESTED {
+            let coarse = Self { cells: self.cells / COARSER, ..self.clone() };
+            let near = coarse.solve(t, &interpolated(guess, coarse.cells), None)?.0;
+            return Ok(self.chain(t).solve(&interpolated(&near, self.cells), self.ends.map(End::Value), None)?);
+        }
+        Ok(self.chain(t).solve(guess, self.ends.map(End::Value), step)?)
     }
 
     /// The continuous mesh at some ξ: ∫ M up to x(ξ) is ξ times that over the line.
@@ -180,7 +243,8 @@ impl Line {
     /// method, and meet in a node for the others. No convergence is no error: see [`History::converged`].
     ///
     /// # Errors
-    /// [`Failure::LineDensity`], [`Failure::NewtonStalled`].
+    /// [`Error::Invalid`] for ranges that do not fit ([`pieces::check`]) or a start that is no mesh; [`Error::Failed`] with
+    /// [`Failure::LineDensity`] or [`Failure::NewtonStalled`].
     pub fn iterate(
         &self,
         t: f64,
@@ -189,18 +253,17 @@ impl Line {
         start: &[f64],
         before: Before<'_>,
         stop: Stop,
-    ) -> Result<History, Failure> {
+    ) -> Result<History> {
+        pieces::check("ranges", ranges, self.cells, method)?;
+        self.check_mesh("start", start)?;
         let reference = self.solve(t, start, before)?.0;
         let iteration = Iteration { chain: self.chain(t), ranges, method, old: before, cells: self.cells };
         let exact = iteration.cut(&reference);
         let mut pieces = iteration.cut(start);
-        let mut iterates = vec![self.measured(t, &iteration, &pieces, &exact, 0.0, 0)?];
+        let mut iterates = vec![self.measured(t, &iteration, &pieces, &exact, 0.0, 0)];
         let met = |iterate: &Iterate, n: usize| {
-            let value = match stop.measure {
-                Measure::Error => iterate.error,
-                Measure::Increment => iterate.increment,
-            };
-            stop.tolerance.is_some_and(|tolerance| value <= tolerance && (n > 0 || stop.measure == Measure::Error))
+            let known = n > 0 || stop.measure == Measure::Error;
+            known && stop.tolerance.is_some_and(|tolerance| stop.measure.of(iterate) <= tolerance)
         };
         let mut converged = met(&iterates[0], 0);
         let mut solves = 0;
@@ -209,7 +272,7 @@ impl Line {
             solves += cost;
             let increment = distance(&next, &pieces);
             pieces = next;
-            let iterate = self.measured(t, &iteration, &pieces, &exact, increment, solves)?;
+            let iterate = self.measured(t, &iteration, &pieces, &exact, increment, solves);
             iterates.push(iterate);
             converged = met(&iterate, iterates.len() - 1);
         }
@@ -217,6 +280,27 @@ impl Line {
         let prediction = Prediction::of(self, t, ranges, method, &reference, before.map(|b| b.1))?;
         let converged = converged || stop.tolerance.is_none();
         Ok(History { mesh: iteration.glue(&pieces), iterates, reference, observed, prediction, converged })
+    }
+
+    /// Refuses what is no mesh of the line: as many nodes as it has, from end to end, in order.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the key.
+    pub fn check_mesh(&self, key: &str, mesh: &[f64]) -> Result<()> {
+        let nodes = self.cells + 1;
+        if mesh.len() != nodes {
+            let rule = format!("{} cells have {nodes}; give one value a node", self.cells);
+            return Err(Error::invalid(key, format!("{} nodes", mesh.len()), rule));
+        }
+        if let Some(i) = (1..nodes).find(|&i| !(mesh[i] > mesh[i - 1] && mesh[i].is_finite())) {
+            let rule = format!("nodes must grow from left to right; node {} is at {}", i - 1, mesh[i - 1]);
+            return Err(Error::invalid(key, format!("{} at node {i}", mesh[i]), rule));
+        }
+        if [mesh[0], mesh[self.cells]] != self.ends {
+            let rule = format!("must go from {} to {}", self.ends[0], self.ends[1]);
+            return Err(Error::invalid(key, format!("from {} to {}", mesh[0], mesh[self.cells]), rule));
+        }
+        Ok(())
     }
 
     fn measured(
@@ -227,27 +311,53 @@ impl Line {
         exact: &Pieces,
         increment: f64,
         linear_solves: usize,
-    ) -> Result<Iterate, Failure> {
+    ) -> Iterate {
         let error = distance(pieces, exact);
-        let Some(u) = self.density.followed() else {
-            return Ok(Iterate { error, increment, largest_jump: None, interpolation_error: None, linear_solves });
-        };
-        let u = |x: f64| u.eval(&[x, t]);
-        let jump = |x: &[f64]| 2.0 * (u(x[1]) - u(x[0])).abs();
-        let largest_jump = pieces.iter().flat_map(|piece| piece.windows(2).map(jump)).fold(0.0, f64::max);
-        let mesh = iteration.glue(pieces);
-        let mut interpolation_error = 0.0_f64;
-        for x in mesh.windows(2) {
-            let ends = [u(x[0]), u(x[1])];
-            for k in 1..SAMPLES {
-                let s = k as f64 / SAMPLES as f64;
-                let linear = ends[0] + s * (ends[1] - ends[0]);
-                interpolation_error = interpolation_error.max((u(x[0] + s * (x[1] - x[0])) - linear).abs());
-            }
+        let mut jumps = Vec::with_capacity(pieces.len());
+        for piece in pieces {
+            let u = self.density.followed(t, piece);
+            jumps.extend(u.map(|u| u.windows(2).map(|u| 2.0 * (u[1] - u[0]).abs()).fold(0.0, f64::max)));
         }
-        let (largest_jump, interpolation_error) = (Some(largest_jump), Some(interpolation_error));
-        Ok(Iterate { error, increment, largest_jump, interpolation_error, linear_solves })
+        let largest_jump = jumps.into_iter().reduce(f64::max);
+        let interpolation_error = self.interpolation_error(t, &iteration.glue(pieces));
+        Iterate { error, increment, largest_jump, interpolation_error, linear_solves }
     }
+
+    /// The largest error of the piecewise linear interpolant of u on a mesh, where M is the arc length of u.
+    pub fn interpolation_error(&self, t: f64, mesh: &[f64]) -> Option<f64> {
+        // of each cell, at so many places inside
+        let errors = |cells: &[[f64; 2]], parts: usize| -> Option<Vec<f64>> {
+            let place = |x: &[f64; 2], k: usize| x[0] + k as f64 / parts as f64 * (x[1] - x[0]);
+            let places: Vec<f64> = cells.iter().flat_map(|x| (0..=parts).map(move |k| place(x, k))).collect();
+            let u = self.density.followed(t, &places)?;
+            let off = |u: &[f64]| {
+                let linear = |k: usize| u[0] + k as f64 / parts as f64 * (u[parts] - u[0]);
+                (1..parts).map(|k| (u[k] - linear(k)).abs()).fold(0.0, f64::max)
+            };
+            Some(u.chunks_exact(parts + 1).map(off).collect())
+        };
+        let cells: Vec<[f64; 2]> = mesh.windows(2).map(|x| [x[0], x[1]]).collect();
+        let batches: Vec<&[[f64; 2]]> = cells.chunks(CELLS_AT_ONCE).collect();
+        let rough = parallel::map_large(cells.len(), &batches, |cells| errors(cells, FEW_PARTS));
+        let rough: Vec<f64> = rough.into_iter().collect::<Option<Vec<_>>>()?.concat();
+        let largest = rough.iter().copied().fold(0.0, f64::max);
+        // then closely where the largest may be
+        let worst: Vec<[f64; 2]> =
+            cells.into_iter().zip(rough).filter(|(_, off)| *off >= 0.9 * largest).map(|(x, _)| x).take(MOST).collect();
+        errors(&worst, PARTS)?.into_iter().reduce(f64::max)
+    }
+}
+
+/// A mesh with another number of cells.
+fn interpolated(mesh: &[f64], cells: usize) -> Vec<f64> {
+    let last = mesh.len() - 1;
+    let at = |i: usize| {
+        let place = i as f64 / cells as f64 * last as f64;
+        let cell = (place as usize).min(last - 1);
+        mesh[cell] + (place - cell as f64) * (mesh[cell + 1] - mesh[cell])
+    };
+    // the end to the last bit
+    (0..cells).map(at).chain([mesh[last]]).collect()
 }
 
 fn distance(a: &Pieces, b: &Pieces) -> f64 {

@@ -21,9 +21,6 @@ pub struct Prediction {
     pub bound: Option<f64>,
 }
 
-/// Places at which the extremes of M are looked for.
-const PLACES: usize = 2000;
-
 impl Prediction {
     pub(super) fn of(
         line: &Line,
@@ -35,21 +32,17 @@ impl Prediction {
     ) -> Result<Self, Failure> {
         let count = ranges.len();
         let xi = |node: usize| node as f64 / line.cells as f64;
-        let extremes = || {
-            let [a, b] = line.ends;
-            let places: Vec<f64> = (0..=PLACES).map(|k| a + (b - a) * k as f64 / PLACES as f64).collect();
-            let m = line.density.at_each(t, &places)?;
-            Ok::<_, Failure>(m.iter().fold([f64::INFINITY, 0.0], |[low, high], m| [low.min(m[0]), high.max(m[0])]))
-        };
+        let extremes = || line.density.extremes(t, line.ends);
         Ok(match (method, ratio) {
             (Method::Classical { linearized: true, .. }, _) => Self::default(),
             (Method::Classical { coarse: super::Coarse::Galerkin, .. }, _) => Self::default(),
             (Method::Classical { .. }, Some(ratio)) if count == 2 => {
                 let (alpha, beta) = (xi(ranges[1][0]), xi(ranges[0][1]));
                 let root = (ratio / extremes()?[1]).sqrt();
-                let sinh = |s: f64| (root * s).sinh();
-                let bound = sinh(alpha) * sinh(1.0 - beta) / (sinh(beta) * sinh(1.0 - alpha));
-                Self { predicted: None, bound: Some(bound) }
+                // as logarithms: a small step makes them too large for numbers
+                let sinh = |s: f64| root * s + (0.5 * -(-2.0 * root * s).exp_m1()).ln();
+                let bound = sinh(alpha) + sinh(1.0 - beta) - sinh(beta) - sinh(1.0 - alpha);
+                Self { predicted: None, bound: Some(bound.exp()) }
             }
             (_, Some(_)) => Self::default(),
             (Method::Classical { sweep, .. }, None) => {

@@ -2,7 +2,8 @@ use super::chain::{Chain, End, Law, Step};
 use super::coarse;
 use crate::error::Failure;
 use crate::parallel;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::fmt;
 
 /// How subdomains of a line exchange what they know.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,6 +60,50 @@ pub enum Robin {
     Auto,
     /// M̃/(1 − ξ) at the right end of a piece, M̃/ξ at the left end.
     Lagged,
+}
+
+impl Serialize for Robin {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Value(p) => serializer.serialize_f64(*p),
+            Self::Auto => serializer.serialize_str("auto"),
+            Self::Lagged => serializer.serialize_str("lagged"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Robin {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl de::Visitor<'_> for Visitor {
+            type Value = Robin;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, \"auto\" or \"lagged\"")
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<Robin, E> {
+                match text {
+                    "auto" => Ok(Robin::Auto),
+                    "lagged" => Ok(Robin::Lagged),
+                    _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+                }
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Robin, E> {
+                Ok(Robin::Value(value as f64))
+            }
+
+            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Robin, E> {
+                Ok(Robin::Value(value as f64))
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Robin, E> {
+                Ok(Robin::Value(value))
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
 }
 
 /// Nodes of each piece.
@@ -120,7 +165,7 @@ impl Iteration<'_> {
 
     fn sweep(&self, pieces: &[Vec<f64>]) -> Result<(Pieces, usize), Failure> {
         let numbers: Vec<usize> = (0..pieces.len()).collect();
-        let solved = parallel::map(&numbers, |&s| self.solve(pieces, s));
+        let solved = parallel::map_large(self.cells, &numbers, |&s| self.solve(pieces, s));
         let mut next = Vec::with_capacity(pieces.len());
         let mut solves = 0;
         for piece in solved {

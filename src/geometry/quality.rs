@@ -76,10 +76,15 @@ pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
     let lattice = mesh.lattice();
     let nodes = lattice.nodes();
     let mut areas = vec![0.0; lattice.len()];
-    for_each_cell(mesh, |[i, j], _, corners| {
+    let bounded = lattice.periodic() == [false; 2];
+    for_each_cell(mesh, |[i, j], closed, corners| {
         let share = 0.25 * area(corners);
-        for (di, dj) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
-            areas[lattice.index([(i + di) % nodes[0], (j + dj) % nodes[1]])] += share;
+        if bounded {
+            closed.into_iter().for_each(|k| areas[k] += share);
+        } else {
+            for (di, dj) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+                areas[lattice.index([(i + di) % nodes[0], (j + dj) % nodes[1]])] += share;
+            }
         }
     });
     areas
@@ -155,8 +160,18 @@ pub fn compare(mesh: &Mesh<2>, reference: &Mesh<2>) -> Comparison {
     }
 }
 
+/// Smallest corner Jacobian of every cell over that of the uniform mesh, in lattice order.
+pub fn cell_jacobians(mesh: &Mesh<2>) -> Vec<f64> {
+    let uniform = uniform_jacobian(mesh);
+    let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
+    for_each_cell(mesh, |_, _, corners| {
+        all.push(corner_jacobians(corners).into_iter().fold(f64::INFINITY, f64::min) / uniform);
+    });
+    all
+}
+
 /// Q of every cell, in lattice order.
-fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
+pub fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
     let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
     for_each_cell(mesh, |_, _, corners| all.push(shape(corners)));
     all

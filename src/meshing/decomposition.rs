@@ -85,6 +85,17 @@ impl Decomposition {
         points
     }
 
+    /// The number of the subdomain of every cell, in lattice order; they are counted along η first.
+    pub fn of_cells(&self) -> Vec<usize> {
+        let number = |d: usize, cell: usize| self.spans[d].iter().position(|span| cell < span[1]).unwrap_or(0);
+        let [n, m] = self.lattice.cells();
+        let across: Vec<usize> = (0..m).map(|j| number(1, j)).collect();
+        (0..n)
+            .flat_map(|i| across.iter().map(move |b| (i, b)))
+            .map(|(i, b)| number(0, i) * self.spans[1].len() + b)
+            .collect()
+    }
+
     /// True for a node on a bounded side.
     pub fn on_side(&self, index: usize) -> bool {
         let (node, nodes, periodic) = (self.lattice.node(index), self.lattice.nodes(), self.lattice.periodic());

@@ -109,6 +109,15 @@ impl GeneratorKind {
         }
     }
 
+    /// Subdomains along each axis.
+    pub fn subdomains(&self) -> [usize; 2] {
+        match self {
+            Self::Whole(_) | Self::Fixed(_) => [1, 1],
+            Self::Stochastic(stochastic) => stochastic.subdomains,
+            Self::Schwarz(schwarz) => schwarz.subdomains,
+        }
+    }
+
     /// The generator, ready to step.
     pub fn into_generator(self) -> Box<dyn MeshGenerator> {
         match self {

@@ -1,19 +1,19 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
-mod figure;
 mod fronts;
 mod interface_study;
 mod laplacian;
 mod payoff;
+mod schwarz;
 mod table;
 mod tables;
 
-pub use figure::{Curve, Figure};
 pub use interface_study::{InterfaceStep, Measured};
 pub use laplacian::slides_error;
 pub use table::Table;
 
 use crate::error::Result;
+use crate::simulation::Figure;
 
 /// Something published, or measured for this project, that can be rerun.
 pub struct Item {
@@ -94,6 +94,22 @@ pub const ITEMS: &[Item] = &[
         line: "fronts against three exact solutions, by every method",
         run: |options| fronts::exact(options).map(Rerun::from),
     },
+    Item { name: "table-8-1", line: "the boundary layer by four Schwarz methods", run: schwarz::table_8_1 },
+    Item {
+        name: "figure-8-1",
+        line: "classical Schwarz in one dimension against the overlap",
+        run: schwarz::figure_8_1,
+    },
+    Item { name: "figure-8-2", line: "classical, optimised and optimal Schwarz", run: schwarz::figure_8_2 },
+    Item { name: "figure-8-3", line: "meshes of the first iterations", run: schwarz::figure_8_3 },
+    Item { name: "figure-8-4", line: "parallel and alternating, nonlinear and linearised", run: schwarz::figure_8_4 },
+    Item {
+        name: "figure-8-5",
+        line: "densities that vary ever more, and where the linearised iteration never converges",
+        run: schwarz::figure_8_5,
+    },
+    Item { name: "figure-8-6", line: "subdomains that move", run: schwarz::figure_8_6 },
+    Item { name: "coarse", line: "a coarse correction for any number of subdomains", run: schwarz::coarse },
 ];
 
 impl Item {

@@ -1,5 +1,6 @@
-use super::{Curve, Figure, Options, Rerun, Table};
+use super::{Options, Rerun, Table};
 use crate::error::Result;
+use crate::simulation::{Curve, Figure};
 use crate::study::{MovingMesh, Source, compute};
 
 /// How a run came out.
@@ -179,6 +180,7 @@ fn payoff(options: Options) -> Result<Rerun> {
         title: "Time to an error of 1e-2, Burgers' front".into(),
         labels: ["viscosity ν (open marks: extrapolated)".into(), "seconds on one core".into()],
         curves: curves.into(),
+        ..Figure::default()
     };
     Ok(Rerun { tables, figures: vec![("payoff".into(), figure)] })
 }

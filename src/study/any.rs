@@ -1,4 +1,4 @@
-use super::{MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
+use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
 use crate::error::Result;
 use serde::Deserialize;
 
@@ -12,6 +12,8 @@ pub enum Study {
     Poisson(PoissonStudy),
     /// Of kind `stefan`.
     Stefan(StefanStudy),
+    /// Of kind `equidistribution`.
+    Equidistribution(EquidistributionStudy),
 }
 
 impl Study {
@@ -32,6 +34,7 @@ impl Study {
         match source.parse::<Peek>().map(|peek| peek.study.kind) {
             Ok(StudyKind::Poisson) => PoissonStudy::from_source(source).map(Self::Poisson),
             Ok(StudyKind::Stefan) => StefanStudy::from_source(source).map(Self::Stefan),
+            Ok(StudyKind::Equidistribution) => EquidistributionStudy::from_source(source).map(Self::Equidistribution),
             _ => MovingMesh::from_source(source).map(Self::MovingMesh),
         }
     }
@@ -42,6 +45,7 @@ impl Study {
             Self::MovingMesh(study) => &study.study.name,
             Self::Poisson(study) => &study.study.name,
             Self::Stefan(study) => &study.study.name,
+            Self::Equidistribution(study) => &study.study.name,
         }
     }
 }

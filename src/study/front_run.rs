@@ -4,6 +4,7 @@ use super::StefanStudy;
 use super::stefan::Prepared;
 use crate::error::{Error, Moment, Result};
 use crate::geometry::{Field, quality};
+use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, Observer, Parallel, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw, draw_curves,
     final_arrays,
@@ -180,14 +181,9 @@ impl StefanStudy {
         directory.write("study.toml", self.to_toml().as_bytes())?;
         let mut summary = self.summary();
         summary.warnings = self.warnings()?;
-        let write = |summary: &StefanSummary| {
-            let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
-            text.push('\n');
-            directory.write("summary.json", text.as_bytes())
-        };
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         let mut tables = Tables::create(directory.path(), prepared.front.columns.x())?;
-        let mut frames = Frames::create(directory.path(), prepared.frames.clone())?;
+        let mut frames = Frames::create(directory.path(), prepared.frames.clone(), [1, 1])?;
         let mut curves: Vec<(f64, Vec<f64>)> = Vec::new();
         let failure = {
             let mut leave = |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState| {
@@ -210,8 +206,13 @@ impl StefanStudy {
         summary.seconds.wall = begin.elapsed().as_secs_f64();
         summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
         summary.error = failure.as_ref().map(Failed::from);
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         kept?;
+        let output = Instant::now();
+        report::finish(directory.path(), self.output.report, self.output.animation)?;
+        summary.seconds.output += output.elapsed().as_secs_f64();
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        directory.write_summary(&summary)?;
         let columns = prepared.front.columns.x().to_vec();
         Ok(FrontFinished { summary, state: prepared.state, columns, failure })
     }
@@ -296,7 +297,7 @@ fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leav
         let output = Instant::now();
         let picture = pictured(front, state)?;
         let quality = quality(&picture.mesh, &picture.rho);
-        let report = report(front, given, state);
+        let report = reported(front, given, state);
         let seconds = begin.elapsed().as_secs_f64();
         let row = (event != Event::Finished).then(|| Row {
             t: state.t,
@@ -366,7 +367,7 @@ fn next(front: &Front, state: &FrontState, schedule: &Schedule) -> Option<f64> {
     schedule.after(state.t, dt)
 }
 
-fn report(front: &Front, given: &dyn Problem, state: &FrontState) -> FrontReport {
+fn reported(front: &Front, given: &dyn Problem, state: &FrontState) -> FrontReport {
     let (h, last) = (&state.front, state.front.len() - 1);
     let inner: f64 = h[1..last].iter().sum();
     let errors = front.errors(given, state);

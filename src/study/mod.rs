@@ -1,7 +1,9 @@
 //! From a study file to a run: text → checked parts → simulation → run directory.
 
 mod any;
+mod equidistribution;
 mod front_run;
+mod line_run;
 mod mapped;
 mod memory;
 mod moving_mesh;
@@ -12,7 +14,15 @@ mod stefan;
 mod uniform;
 
 pub use any::Study;
+pub use equidistribution::{
+    Discretization, EquidistributionStudy, FirstMesh, Integral, Interval, LineArclength, LineDensityKind, LineDomain,
+    LineFormula, LineGrid, LineTime, MethodName, SchwarzTable, Start, StopTable,
+};
 pub use front_run::{FrontError, FrontFigures, FrontFinished, FrontReport, FrontSeconds, StefanSummary};
+pub use line_run::{
+    EquidistributionSummary, Evolution, LineFinished, LineQuality, LineSeconds, LineWork, NumberedIterate, PerStep,
+    Rate, StepRow,
+};
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
 pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
 pub use poisson::{

@@ -81,6 +81,8 @@ pub enum StudyKind {
     Poisson,
     /// Two phases and the front between them.
     Stefan,
+    /// A mesh on a line, and the Schwarz methods for it.
+    Equidistribution,
 }
 
 /// `[domain]`.
@@ -193,11 +195,21 @@ pub enum StartMesh {
 }
 
 /// `[output]`.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
     /// When frames are written; about twenty of them where nothing is said.
     pub frames: Option<FramesAt>,
+    /// Whether the frames become `animation.gif`.
+    pub animation: bool,
+    /// Whether the run ends with `report.html` and its plots.
+    pub report: bool,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { frames: None, animation: false, report: true }
+    }
 }
 
 /// Memory that a run needs for each node: 2250 bytes measured at 600 × 600 cells with subdomains and a reference, and a

@@ -5,6 +5,7 @@ use crate::formula::{Formula, Program};
 use crate::geometry::{Field, Mesh, node_areas};
 use crate::laplacian::{Laplacian, Poisson, Polynomials, Scaling, Stencils, outward, unchecked};
 use crate::numerics::{larger, sum};
+use crate::report;
 use crate::setting::pair;
 use crate::simulation::{Failed, Frames, FramesAt, Parallel, RunDirectory, State, draw, final_arrays};
 use crate::study::Source;
@@ -404,12 +405,7 @@ impl PoissonStudy {
             stencil: None,
             warnings: Vec::new(),
         };
-        let write = |summary: &PoissonSummary| {
-            let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
-            text.push('\n');
-            directory.write("summary.json", text.as_bytes())
-        };
-        write(&summary)?;
+        directory.write_summary(&summary)?;
         let outcome = self.solve().and_then(|solved| {
             let output = Instant::now();
             keep(self, &directory, &solved)?;
@@ -425,8 +421,14 @@ impl PoissonStudy {
             summary.warnings = solved.warnings();
         }
         summary.seconds.wall = begin.elapsed().as_secs_f64();
-        write(&summary)?;
-        outcome.map(|_| summary)
+        directory.write_summary(&summary)?;
+        outcome?;
+        let output = Instant::now();
+        report::finish(directory.path(), self.output.report, self.output.animation)?;
+        summary.seconds.output += output.elapsed().as_secs_f64();
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        directory.write_summary(&summary)?;
+        Ok(summary)
     }
 }
 
@@ -489,7 +491,7 @@ fn keep(study: &PoissonStudy, directory: &RunDirectory, solved: &Solved) -> Resu
     let rho = vec![1.0; solved.u.len()];
     let velocity = vec![[0.0; 2]; rho.len()];
     let state = State { t: 0.0, step: 0, mesh: solved.mesh.clone(), u: Field::joined(&fields), rho, velocity };
-    Frames::create(directory.path(), FramesAt::Every(1))?.write(&names, &state)?;
+    Frames::create(directory.path(), FramesAt::Every(1), [1, 1])?.write(&names, &state)?;
     directory.write("final.npz", &final_arrays(&names, &state))?;
     let title = format!("{}, {}", study.study.name, study.laplacian.kind);
     let picture = draw(&title, "u", &state);

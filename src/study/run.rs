@@ -1,6 +1,7 @@
 use super::MovingMesh;
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, compare};
+use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw,
     final_arrays,
@@ -52,12 +53,12 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     let mut record = Record { warnings: study.warnings()?, ..Record::default() };
     let outcome = study.start(&simulation, &mut record).and_then(|mut state| {
         let mut history = History::create(&directory.path().join("history.csv"))?;
-        let mut frames = Frames::create(directory.path(), study.frames())?;
+        let mut frames = Frames::create(directory.path(), study.frames(), study.mesh.generator.subdomains())?;
         let mut meshes = Meshes::of(&study);
         let mut observers: Vec<&mut dyn Observer> = vec![&mut history, &mut frames, &mut meshes];
         watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
         let failure = simulation.run(&mut state, &mut record, &mut observers).err();
-        let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record).err(), Some);
+        let failure = failure.map_or_else(|| reference_into(&directory, &study, &meshes, &mut record).err(), Some);
         let output = Instant::now();
         let kept = keep(&study, &directory, &unknowns, &state, &mut frames);
         let spent = output.elapsed().as_secs_f64();
@@ -80,6 +81,13 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     let written = directory.write_summary(&summary);
     let (state, failure) = outcome?;
     written?;
+    // the report shows the summary; what it took itself is added afterwards
+    let output = Instant::now();
+    report::finish(directory.path(), study.output.report, study.output.animation)?;
+    let spent = output.elapsed().as_secs_f64();
+    summary.seconds.output += spent;
+    summary.seconds.wall += spent;
+    directory.write_summary(&summary)?;
     Ok(Finished { summary, state, failure })
 }
 
@@ -95,7 +103,7 @@ pub fn compute(study: &MovingMesh) -> Result<(Record, Option<Error>)> {
     let mut state = study.start(&simulation, &mut record)?;
     let mut meshes = Meshes::of(&study);
     let failure = simulation.run(&mut state, &mut record, &mut [&mut meshes]).err();
-    let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record).err(), Some);
+    let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record, &mut []).err(), Some);
     Ok((record, failure))
 }
 
@@ -121,13 +129,27 @@ impl Observer for Meshes {
     }
 }
 
+/// As [`compare_with_reference`], which leaves its frames beside those of the run.
+fn reference_into(directory: &RunDirectory, study: &MovingMesh, meshes: &Meshes, record: &mut Record) -> Result<()> {
+    let Some(compare) = &study.compare else { return Ok(()) };
+    let mut frames = Frames::of_reference(directory.path(), study.frames(), compare.generator.subdomains())?;
+    compare_with_reference(study, meshes, record, &mut [&mut frames])
+}
+
 /// Runs the study with the generator of `[compare]` and adds to each report how the meshes compare.
-fn compare_with_reference(study: &MovingMesh, meshes: &Meshes, record: &mut Record) -> Result<()> {
+fn compare_with_reference(
+    study: &MovingMesh,
+    meshes: &Meshes,
+    record: &mut Record,
+    watchers: &mut [&mut dyn Observer],
+) -> Result<()> {
     let Some(reference) = study.reference() else { return Ok(()) };
     let mut simulation = reference.simulation()?;
     let mut state = reference.start(&simulation, &mut Record::default())?;
     let mut theirs = Meshes::of(study);
-    simulation.run(&mut state, &mut Record::default(), &mut [&mut theirs])?;
+    let mut observers: Vec<&mut dyn Observer> = vec![&mut theirs];
+    watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
+    simulation.run(&mut state, &mut Record::default(), &mut observers)?;
     for report in &mut record.reports {
         let at = |meshes: &Meshes| meshes.found.iter().find(|(t, _)| *t == report.t).map(|(_, mesh)| mesh.clone());
         report.comparison = at(meshes).zip(at(&theirs)).map(|(ours, theirs)| compare(&ours, &theirs));

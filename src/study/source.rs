@@ -26,8 +26,9 @@ struct Piece {
 }
 
 /// Tables in which `kind` names one of several structures, inner ones first.
-const KINDED: [&str; 6] = [
+const KINDED: [&str; 7] = [
     "pde",
+    "density",
     "monitor",
     "mesh.generator.estimator",
     "mesh.generator",

@@ -1,9 +1,14 @@
-use super::{Event, Observer, Snapshot, vtu};
+use super::vtu::{self, Values};
+use super::{Event, Observer, Snapshot};
 use crate::error::{Error, Result};
+use crate::geometry::{Mesh, cell_jacobians, cell_qualities};
+use crate::meshing::Decomposition;
 use crate::simulation::State;
 use crate::simulation::report::write_file;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::JoinHandle;
 
 /// When frames are written; the first and the last state are always among them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,24 +39,34 @@ impl FramesAt {
         }
     }
 
-    fn due(&self, state: &State, dt: f64) -> bool {
+    /// Whether a frame is due at time `now`, after a step of length `dt`.
+    pub(crate) fn due(&self, step: usize, now: f64, dt: f64) -> bool {
         match self {
-            Self::Every(n) => state.step.is_multiple_of(*n),
+            Self::Every(n) => step.is_multiple_of(*n),
             // due where the time lies in the step that led here, give or take round-off
             Self::Times(times) => times.iter().any(|&t| {
                 let slack = 1e-9 * dt;
-                t <= state.t + slack && t > state.t - dt + slack
+                t <= now + slack && t > now - dt + slack
             }),
         }
     }
 }
 
-/// `frames/*.vtu` and the `run.pvd` that puts them in time, for ParaView, PyVista and meshio.
+/// `frames/*.vtu` and the `run.pvd` that puts them in time, for ParaView, PyVista and meshio: the unknowns, ρ and the mesh
+/// velocity at the nodes; Q, the smallest corner Jacobian and the number of the subdomain in the cells.
 #[derive(Debug)]
 pub struct Frames {
     directory: PathBuf,
     at: FramesAt,
+    subdomains: [usize; 2],
+    /// Folder of the frames, and the file that puts them in time.
+    names: [&'static str; 2],
+    grid: Option<Arc<vtu::Grid>>,
+    /// The last mesh and the one before, with their times.
+    meshes: [Option<(f64, Mesh<2>)>; 2],
     written: Vec<(f64, String)>,
+    /// A frame that is being compressed and written while the run goes on.
+    writing: Option<JoinHandle<Result<()>>>,
 }
 
 impl Frames {
@@ -59,11 +74,33 @@ impl Frames {
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub fn create(directory: &Path, at: FramesAt) -> Result<Self> {
-        let frames = directory.join("frames");
+    pub fn create(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Result<Self> {
+        Self::named(directory, at, subdomains, ["frames", "run.pvd"])
+    }
+
+    /// Starts the series of the run that this one is compared with: `compare/*.vtu` and `compare.pvd`.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn of_reference(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Result<Self> {
+        Self::named(directory, at, subdomains, ["compare", "compare.pvd"])
+    }
+
+    fn named(directory: &Path, at: FramesAt, subdomains: [usize; 2], names: [&'static str; 2]) -> Result<Self> {
+        let frames = directory.join(names[0]);
         std::fs::create_dir_all(&frames)
             .map_err(|error| Error::Unwritable { path: frames, reason: error.to_string() })?;
-        Ok(Self { directory: directory.to_path_buf(), at, written: Vec::new() })
+        let directory = directory.to_path_buf();
+        Ok(Self {
+            directory,
+            at,
+            subdomains,
+            names,
+            grid: None,
+            meshes: [None, None],
+            written: Vec::new(),
+            writing: None,
+        })
     }
 
     /// Writes one frame, unless the state has one already. The series is complete after every call.
@@ -71,36 +108,87 @@ impl Frames {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn write(&mut self, unknowns: &[String], state: &State) -> Result<()> {
-        let name = format!("frames/step-{:06}.vtu", state.step);
+        self.start(unknowns, state)?;
+        self.wait()
+    }
+
+    /// The same, with compressing and writing left to a thread beside the run.
+    fn start(&mut self, unknowns: &[String], state: &State) -> Result<()> {
+        self.wait()?;
+        let name = format!("{}/step-{:06}.vtu", self.names[0], state.step);
         if self.written.iter().any(|(_, written)| *written == name) {
             return Ok(());
         }
         let lattice = state.mesh.lattice();
-        let mut fields: Vec<(&str, Vec<f64>)> = (unknowns.iter().enumerate())
-            .map(|(c, unknown)| {
-                let values: Vec<f64> = state.u.component(c).collect();
-                (unknown.as_str(), lattice.closed(&values).into_owned())
-            })
+        let scalars = |values: &[f64]| Values::Scalars(lattice.closed(values).into_owned());
+        let mut nodes: Vec<(String, Values)> = (unknowns.iter().enumerate())
+            .map(|(c, unknown)| (unknown.clone(), scalars(&state.u.component(c).collect::<Vec<f64>>())))
             .collect();
         // an unknown may have that name
         let density = if unknowns.iter().any(|unknown| unknown == "rho") { "mesh density" } else { "rho" };
-        fields.push((density, lattice.closed(&state.rho).into_owned()));
-        let document = vtu::document(lattice.cells(), &state.mesh.closed(), &fields);
-        write_file(&self.directory.join(&name), document.as_bytes())?;
-        self.written.push((state.t, name));
+        nodes.push((density.into(), scalars(&state.rho)));
+        nodes.push(("mesh velocity".into(), Values::Vectors(lattice.closed(&self.velocity(state)).into_owned())));
+        let subdomains = Decomposition::new(lattice, self.subdomains)?.of_cells();
+        let cells = [
+            ("Q".into(), Values::Scalars(cell_qualities(&state.mesh))),
+            ("jacobian".into(), Values::Scalars(cell_jacobians(&state.mesh))),
+            ("subdomain".into(), Values::Numbers(subdomains)),
+        ];
+        let points = state.mesh.closed().into_owned();
+        self.written.push((state.t, name.clone()));
         let entries: String =
             (self.written.iter()).map(|(t, name)| format!("<DataSet timestep=\"{t}\" file=\"{name}\"/>\n")).collect();
         let series = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
              <Collection>\n{entries}</Collection>\n</VTKFile>\n"
         );
-        write_file(&self.directory.join("run.pvd"), series.as_bytes())
+        let grid = self.grid.get_or_insert_with(|| Arc::new(vtu::Grid::new(lattice.cells()))).clone();
+        let [frame, index] = [self.directory.join(name), self.directory.join(self.names[1])];
+        self.writing = Some(std::thread::spawn(move || {
+            write_file(&frame, grid.document(&points, &nodes, &cells).as_bytes())?;
+            write_file(&index, series.as_bytes())
+        }));
+        Ok(())
+    }
+
+    fn wait(&mut self) -> Result<()> {
+        match self.writing.take().map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(written)) => written,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+        }
+    }
+
+    /// How fast the nodes moved in the step that led to a state; they rest at the start.
+    fn velocity(&self, state: &State) -> Vec<[f64; 2]> {
+        match &self.meshes {
+            [Some((t, mesh)), Some((before, old))] if *t == state.t && t > before => {
+                let per = 1.0 / (t - before);
+                mesh.x().iter().zip(old.x()).map(|(x, old)| [0, 1].map(|d| (x[d] - old[d]) * per)).collect()
+            }
+            _ => vec![[0.0; 2]; state.rho.len()],
+        }
     }
 }
 
 impl Observer for Frames {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        let due = event != Event::Stepped || self.at.due(snapshot.state, snapshot.dt);
-        if due { self.write(snapshot.unknowns, snapshot.state) } else { Ok(()) }
+        let state = snapshot.state;
+        if event != Event::Finished {
+            self.meshes.swap(0, 1);
+            self.meshes[0] = Some((state.t, state.mesh.clone()));
+        }
+        match event {
+            Event::Stepped if !self.at.due(state.step, state.t, snapshot.dt) => Ok(()),
+            Event::Finished => self.write(snapshot.unknowns, state),
+            _ => self.start(snapshot.unknowns, state),
+        }
+    }
+}
+
+impl Drop for Frames {
+    /// A run that ends early leaves no thread behind.
+    fn drop(&mut self) {
+        let _ = self.wait();
     }
 }

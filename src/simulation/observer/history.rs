@@ -24,6 +24,8 @@ struct Row {
     newton_iterations: usize,
     interface_standard_error: Option<f64>,
     interface_noise: Option<f64>,
+    contraction_observed: Option<f64>,
+    contraction_predicted: Option<f64>,
     seconds: f64,
 }
 
@@ -47,6 +49,7 @@ impl Observer for History {
             return Ok(());
         }
         let work = snapshot.work.work;
+        let contraction = snapshot.interface.and_then(|i| i.contraction);
         let row = Row {
             t: snapshot.state.t,
             dt: snapshot.dt,
@@ -59,6 +62,8 @@ impl Observer for History {
             newton_iterations: work.newton_iterations,
             interface_standard_error: snapshot.interface.and_then(|i| i.standard_error),
             interface_noise: snapshot.interface.and_then(|i| i.noise),
+            contraction_observed: contraction.map(|c| c.observed),
+            contraction_predicted: contraction.map(|c| c.predicted),
             seconds: snapshot.seconds,
         };
         // row by row, so that a run that is killed leaves whole rows

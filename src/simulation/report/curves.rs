@@ -1,5 +1,5 @@
 use super::picture::{
-    BOTTOM, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, escape, png,
+    BOTTOM, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, escape, picture,
 };
 use std::fmt::Write;
 
@@ -45,6 +45,5 @@ pub fn draw_curves(
     axes(&mut s, lower, extent, [width, height]);
     colour_bar(&mut s, parameter, ends.0, ends.1, LEFT + width + 24.0, height);
     s.push_str("</svg>\n");
-    let png = png(&s);
-    Picture { svg: s, png }
+    picture(s)
 }

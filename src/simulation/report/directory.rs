@@ -1,5 +1,5 @@
-use super::Summary;
 use crate::error::{Error, Result};
+use serde::Serialize;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -17,19 +17,40 @@ pub struct RunDirectory {
 /// Present and locked while a run writes.
 const LOCK: &str = "run.lock";
 
-/// Everything that a run may write.
-const OURS: [&str; 10] = [
+/// Everything that a run may write, beside its frames.
+const OURS: [&str; 29] = [
     "summary.json",
     "study.toml",
     "history.csv",
     "run.pvd",
+    "compare.pvd",
     "final.npz",
+    "report.html",
+    "animation.gif",
     "mesh.png",
     "mesh.svg",
+    "convergence.png",
+    "convergence.svg",
     "front.csv",
     "front.png",
     "front.svg",
+    "error.png",
+    "error.svg",
+    "quality.png",
+    "quality.svg",
+    "contraction.png",
+    "contraction.svg",
+    "energy.png",
+    "energy.svg",
+    "front-error.png",
+    "front-error.svg",
+    "front-position.png",
+    "front-position.svg",
+    "steps.png",
+    "steps.svg",
 ];
+/// Folders of frames: of the run, and of the one that it is compared with.
+const FRAMES: [&str; 2] = ["frames", "compare"];
 
 impl RunDirectory {
     /// Refuses a directory that [`RunDirectory::claim`] would refuse, touching nothing.
@@ -64,7 +85,8 @@ impl RunDirectory {
         std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))?;
         let lock = File::create(path.join(LOCK)).map_err(|error| unwritable(path, error))?;
         lock.try_lock().map_err(|_| Error::Busy { path: path.into() })?;
-        let frames = std::fs::read_dir(path.join("frames")).into_iter().flatten().flatten().map(|entry| entry.path());
+        let folders = FRAMES.into_iter().map(|folder| std::fs::read_dir(path.join(folder)));
+        let frames = folders.flatten().flatten().flatten().map(|entry| entry.path());
         let old_frames = frames.filter(|frame| is_frame(frame));
         for old in OURS.into_iter().map(|name| path.join(name)).chain(old_frames) {
             match std::fs::remove_file(&old) {
@@ -72,6 +94,8 @@ impl RunDirectory {
                 _ => {}
             }
         }
+        // only an empty folder goes; what is not ours keeps it
+        let _ = std::fs::remove_dir(path.join(FRAMES[1]));
         Ok(Self { path: path.into(), lock })
     }
 
@@ -88,11 +112,11 @@ impl RunDirectory {
         write_file(&self.path.join(name), contents)
     }
 
-    /// Writes `summary.json`.
+    /// Writes `summary.json`, of any kind of study.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub fn write_summary(&self, summary: &Summary) -> Result<()> {
+    pub fn write_summary(&self, summary: &impl Serialize) -> Result<()> {
         let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
         text.push('\n');
         self.write("summary.json", text.as_bytes())
@@ -122,7 +146,7 @@ fn wrote(path: &Path) -> bool {
 }
 
 /// Writes a file under another name and renames it when it is complete.
-pub(in crate::simulation) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
+pub(crate) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);

@@ -3,13 +3,14 @@
 mod arrays;
 mod curves;
 mod directory;
+mod figure;
 mod picture;
 mod summary;
 
 pub use arrays::final_arrays;
 pub use curves::draw_curves;
 pub use directory::RunDirectory;
-pub(super) use directory::write_file;
-pub(crate) use picture::{FONT, png};
-pub use picture::{Picture, draw};
+pub(crate) use directory::write_file;
+pub use figure::{Curve, Figure, Scale};
+pub use picture::{Picture, Pixels, Sheet, draw};
 pub use summary::{Conserved, ErrorNorms, Failed, Parallel, Report, Seconds, Summary, WorkTotal};

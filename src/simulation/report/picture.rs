@@ -1,9 +1,10 @@
 use crate::simulation::State;
+use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::{tiny_skia, usvg};
 use std::fmt::Write;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
-/// The last mesh over the solution, as SVG and PNG.
+/// A drawing as SVG and PNG.
 pub struct Picture {
     /// The drawing.
     pub svg: String,
@@ -12,7 +13,7 @@ pub struct Picture {
 }
 
 /// The font of all drawings.
-pub(crate) const FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
+pub(super) const FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
 /// Longer edge of the box in the drawing.
 pub(super) const LONGER: f64 = 640.0;
 pub(super) const SHORTER_AT_LEAST: f64 = 160.0;
@@ -23,20 +24,69 @@ pub(super) const BOTTOM: f64 = 64.0;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
 const MAX_CELLS: usize = 240;
 
-/// Draws the mesh of a state over its first unknown, with axes and a colour bar.
-pub fn draw(title: &str, unknown: &str, state: &State) -> Picture {
-    let svg = svg(title, unknown, state);
-    let png = png(&svg);
-    Picture { svg, png }
+/// What a picture of a mesh shows.
+#[derive(Debug, Clone)]
+pub struct Sheet<'a> {
+    /// Above it.
+    pub title: &'a str,
+    /// Above the colour bar.
+    pub unknown: &'a str,
+    /// Cells along ξ and η.
+    pub cells: [usize; 2],
+    /// Axes that wrap around.
+    pub periodic: [bool; 2],
+    /// Lower corner of the box that is shown.
+    pub lower: [f64; 2],
+    /// Its width and height.
+    pub extent: [f64; 2],
+    /// Nodes, of shape cells + 1.
+    pub x: &'a [[f64; 2]],
+    /// Values there.
+    pub u: &'a [f64],
+    /// Values of the first and the last colour; those that occur where nothing is said.
+    pub range: Option<[f64; 2]>,
 }
 
-fn svg(title: &str, unknown: &str, state: &State) -> String {
+/// Draws the mesh of a state over its first unknown, with axes and a colour bar.
+pub fn draw(title: &str, unknown: &str, state: &State) -> Picture {
     let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
     let values: Vec<f64> = state.u.component(0).collect();
-    let (x, u) = (mesh.closed(), lattice.closed(&values));
-    let cells = lattice.cells();
-    let (low, high) = u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-    let ([lx, ly], [wx, wy]) = (mesh.lower(), mesh.extent());
+    let sheet = Sheet {
+        title,
+        unknown,
+        cells: lattice.cells(),
+        periodic: lattice.periodic(),
+        lower: mesh.lower(),
+        extent: mesh.extent(),
+        x: &mesh.closed(),
+        u: &lattice.closed(&values),
+        range: None,
+    };
+    picture(svg(&sheet))
+}
+
+impl Sheet<'_> {
+    /// Its pixels, in the size of the drawing.
+    pub fn pixels(&self) -> Pixels {
+        let pixels = pixels(&svg(self), 1);
+        let size = [pixels.width(), pixels.height()];
+        Pixels { size, rgba: pixels.take() }
+    }
+}
+
+/// Colours of an image, row by row.
+#[derive(Debug, Clone)]
+pub struct Pixels {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Four bytes a pixel, all opaque.
+    pub rgba: Vec<u8>,
+}
+
+fn svg(sheet: &Sheet<'_>) -> String {
+    let Sheet { title, unknown, cells, periodic, lower: [lx, ly], extent: [wx, wy], x, u, range } = *sheet;
+    let ends = || u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
+    let [low, high] = range.unwrap_or_else(ends);
     let scale = LONGER / wx.max(wy);
     let (width, height) = ((wx * scale).max(SHORTER_AT_LEAST), (wy * scale).max(SHORTER_AT_LEAST));
     let to = |p: [f64; 2]| [LEFT + (p[0] - lx) / wx * width, TOP + height - (p[1] - ly) / wy * height];
@@ -56,14 +106,13 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
         escape(title)
     );
 
-    // cells, each outlined in its own colour so that no gap shines through
     let lines = cells.map(|n| {
         let stride = n.div_ceil(MAX_CELLS);
         (0..n).step_by(stride).chain([n]).collect::<Vec<usize>>()
     });
     let at = |i: usize, j: usize| i * (cells[1] + 1) + j;
     // a periodic mesh leaves the box on one side and enters on the other: it is drawn as often as it shows, cut to size
-    let reach = lattice.periodic().map(|periodic| if periodic { vec![-1.0, 0.0, 1.0] } else { vec![0.0] });
+    let reach = periodic.map(|periodic| if periodic { vec![-1.0, 0.0, 1.0] } else { vec![0.0] });
     let shifts: Vec<[f64; 2]> =
         reach[0].iter().flat_map(|&i| reach[1].iter().map(move |&j| [i * wx, j * wy])).collect();
     let shown = |corners: &[usize], shift: [f64; 2]| {
@@ -74,12 +123,17 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
         !(outside(0, lx, wx) || outside(1, ly, wy))
     };
     let place = |k: usize, shift: [f64; 2]| point(to([x[k][0] + shift[0], x[k][1] + shift[1]]));
-    let _ = writeln!(
-        s,
-        "<clipPath id=\"box\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\n\
-         <g clip-path=\"url(#box)\">"
-    );
-    s.push_str("<g stroke-width=\"0.6\" stroke-linejoin=\"round\">\n");
+    if periodic.contains(&true) {
+        let _ = writeln!(
+            s,
+            "<clipPath id=\"box\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\n\
+             <g clip-path=\"url(#box)\">"
+        );
+    } else {
+        s.push_str("<g>\n");
+    }
+    // cells, without soft edges, so that no gap shines through
+    s.push_str("<g shape-rendering=\"crispEdges\">\n");
     for i in lines[0].windows(2) {
         for j in lines[1].windows(2) {
             let corners = [at(i[0], j[0]), at(i[1], j[0]), at(i[1], j[1]), at(i[0], j[1])];
@@ -87,7 +141,7 @@ fn svg(title: &str, unknown: &str, state: &State) -> String {
             let fill = colour((mean - low) / (high - low));
             for &shift in shifts.iter().filter(|&&shift| shown(&corners, shift)) {
                 let points: Vec<String> = corners.iter().map(|&k| place(k, shift)).collect();
-                let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\" stroke=\"{fill}\"/>", points.join(" "));
+                let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{fill}\"/>", points.join(" "));
             }
         }
     }
@@ -210,14 +264,42 @@ pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// A drawing as pixels, twice its size.
-pub(crate) fn png(svg: &str) -> Vec<u8> {
-    let mut fonts = usvg::fontdb::Database::new();
-    fonts.load_font_data(FONT.to_vec());
-    let options = usvg::Options { fontdb: Arc::new(fonts), font_family: "DejaVu Sans".into(), ..Default::default() };
+/// A drawing in both formats: SVG with its font inside, and PNG.
+pub(super) fn picture(svg: String) -> Picture {
+    let png = encoded(&pixels(&svg, 2)).expect("writing to memory cannot fail");
+    let font = format!(
+        "<style>@font-face{{font-family:\"DejaVu Sans\";src:url(data:font/ttf;base64,{})}}</style>\n",
+        STANDARD.encode(FONT)
+    );
+    let open = svg.find('>').map_or(0, |end| end + 1);
+    Picture { svg: [&svg[..open], "\n", &font, &svg[open..]].concat(), png }
+}
+
+/// Pixels without their opacity, which is full, compressed fast: writing must not take longer than computing.
+fn encoded(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, png::EncodingError> {
+    let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// A drawing as pixels, so many times its size.
+fn pixels(svg: &str, times: u32) -> tiny_skia::Pixmap {
+    static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
+        let mut fonts = usvg::fontdb::Database::new();
+        fonts.load_font_data(FONT.to_vec());
+        Arc::new(fonts)
+    });
+    let options = usvg::Options { fontdb: FONTS.clone(), font_family: "DejaVu Sans".into(), ..Default::default() };
     let tree = usvg::Tree::from_str(svg, &options).expect("the drawing is well-formed");
     let size = tree.size().to_int_size();
-    let mut pixels = tiny_skia::Pixmap::new(2 * size.width(), 2 * size.height()).expect("the drawing has a size");
-    resvg::render(&tree, tiny_skia::Transform::from_scale(2.0, 2.0), &mut pixels.as_mut());
-    pixels.encode_png().expect("writing to memory cannot fail")
+    let mut pixels =
+        tiny_skia::Pixmap::new(times * size.width(), times * size.height()).expect("the drawing has a size");
+    resvg::render(&tree, tiny_skia::Transform::from_scale(times as f32, times as f32), &mut pixels.as_mut());
+    pixels
 }

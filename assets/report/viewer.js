@@ -1,0 +1,563 @@
+"use strict";
+// Light, dark, or as the system says.
+document.getElementById("theme").addEventListener("click", () => {
+  const root = document.documentElement;
+  const dark = root.style.colorScheme ? root.style.colorScheme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  root.style.colorScheme = dark ? "light" : "dark";
+  window.viewer?.draw();
+});
+
+// ---- data -------------------------------------------------------------------------------------------------------------
+
+/** Bytes of zlib data in base64. */
+async function inflate(text) {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Arrays of a mesh by name, one Float64Array a frame: differences of 24-bit levels, added up again. */
+function unpack(mesh, bytes) {
+  const nodes = mesh.lines[0] * mesh.lines[1], all = nodes * mesh.times.length, levels = new Int32Array(all);
+  const found = {};
+  mesh.arrays.forEach(({ name, low, high }, a) => {
+    const start = 3 * all * a;
+    for (let k = 0; k < all; k++) {
+      const difference = bytes[start + k] | bytes[start + all + k] << 8 | bytes[start + 2 * all + k] << 16;
+      const left = k % nodes ? levels[k - 1] - (k >= nodes ? levels[k - nodes - 1] : 0) : 0;
+      levels[k] = (difference + left + (k >= nodes ? levels[k - nodes] : 0)) & 0xffffff;
+    }
+    const value = (n) => low + (high / 0xffffff - low / 0xffffff) * n;
+    found[name] = mesh.times.map((_, f) => Float64Array.from(levels.subarray(f * nodes, (f + 1) * nodes), value));
+  });
+  return found;
+}
+
+/** Q and the smallest corner Jacobian of the cell between nodes a and c, from positions. */
+function shape(x, y, a, row, uniform) {
+  const b = a + row, c = b + 1, d = a + 1;
+  const ex = (x[b] - x[a] + x[c] - x[d]) / 2, ey = (y[b] - y[a] + y[c] - y[d]) / 2;
+  const fx = (x[d] - x[a] + x[c] - x[b]) / 2, fy = (y[d] - y[a] + y[c] - y[b]) / 2;
+  const q = (ex * ex + ey * ey + fx * fx + fy * fy) / 2 / Math.abs(ex * fy - ey * fx);
+  const corner = (p, r, s) => (x[r] - x[p]) * (y[s] - y[p]) - (y[r] - y[p]) * (x[s] - x[p]);
+  const j = Math.min(corner(a, b, d), corner(b, c, a), corner(c, d, b), corner(d, a, c));
+  return [q, j / uniform];
+}
+
+// ---- pixels -----------------------------------------------------------------------------------------------------------
+
+/** Fills a quadrilateral, between its leftmost and rightmost point in every row, with colours between the values (0 to 255) there. */
+function quadrilateral(out, w, h, colours, ax, ay, av, bx, by, bv, cx, cy, cv, dx, dy, dv) {
+  const low = ay < by ? (ay < cy ? ay : cy) : by < cy ? by : cy, high = ay > by ? (ay > cy ? ay : cy) : by > cy ? by : cy;
+  const top = Math.max(0, Math.ceil((low < dy ? low : dy) - 0.5)), bottom = Math.min(h - 1, Math.floor((high > dy ? high : dy) - 0.5));
+  if (top > bottom) return;
+  const ab = 1 / (by - ay), bc = 1 / (cy - by), cd = 1 / (dy - cy), da = 1 / (ay - dy);
+  for (let j = top; j <= bottom; j++) {
+    const y = j + 0.5, a = ay <= y, b = by <= y, c = cy <= y, d = dy <= y;
+    let from = Infinity, to = -Infinity, v0 = 0, v1 = 0, s, x;
+    if (a !== b) { s = (y - ay) * ab; x = ax + s * (bx - ax); if (x < from) { from = x; v0 = av + s * (bv - av); } if (x > to) { to = x; v1 = av + s * (bv - av); } }
+    if (b !== c) { s = (y - by) * bc; x = bx + s * (cx - bx); if (x < from) { from = x; v0 = bv + s * (cv - bv); } if (x > to) { to = x; v1 = bv + s * (cv - bv); } }
+    if (c !== d) { s = (y - cy) * cd; x = cx + s * (dx - cx); if (x < from) { from = x; v0 = cv + s * (dv - cv); } if (x > to) { to = x; v1 = cv + s * (dv - cv); } }
+    if (d !== a) { s = (y - dy) * da; x = dx + s * (ax - dx); if (x < from) { from = x; v0 = dv + s * (av - dv); } if (x > to) { to = x; v1 = dv + s * (av - dv); } }
+    if (to < 0 || from > w) continue;
+    const first = Math.max(0, Math.ceil(from - 0.5)), last = j * w + Math.min(w - 1, Math.ceil(to - 0.5) - 1);
+    const slope = to > from ? (v1 - v0) / (to - from) : 0;
+    let v = v0 + slope * (first + 0.5 - from);
+    for (let k = j * w + first; k <= last; k++, v += slope) out[k] = colours[v < 0 ? 0 : v > 255 ? 255 : v | 0];
+  }
+}
+
+/** Mixes a share (of 256) of black or white (0 or 255) into a pixel. */
+function mix(pixel, shade, share) {
+  const r = pixel & 255, g = pixel >> 8 & 255, b = pixel >> 16 & 255;
+  return -16777216 | b + ((shade - b) * share >> 8) << 16 | g + ((shade - g) * share >> 8) << 8 | r + ((shade - r) * share >> 8);
+}
+
+/** Mixes black or white (0 or 255) into a line of pixels, after Wu. */
+function line(out, w, h, x0, y0, x1, y1, shade, strength) {
+  if (Math.abs(y1 - y0) > Math.abs(x1 - x0)) along(out, h, w, w, 1, y0, x0, y1, x1, shade, strength);
+  else along(out, w, h, 1, w, x0, y0, x1, y1, shade, strength);
+}
+
+/** A line that goes farther along the first of its axes, which has so many pixels, `step` apart, than along the second. */
+function along(out, count, across, step, other, x0, y0, x1, y1, shade, strength) {
+  const slope = x1 === x0 ? 0 : (y1 - y0) / (x1 - x0), from = x0 < x1 ? x0 : x1, to = x0 < x1 ? x1 : x0;
+  const first = Math.max(0, Math.round(from)), last = Math.min(count - 1, Math.round(to) - 1);
+  let y = y0 - 0.5 + slope * (first + 0.5 - x0);
+  for (let i = first; i <= last; i++, y += slope) {
+    const low = Math.floor(y), part = (y - low) * strength * 256, k = i * step + low * other;
+    if (low >= 0 && low < across) out[k] = mix(out[k], shade, strength * 256 - part | 0);
+    if (low + 1 >= 0 && low + 1 < across) out[k + other] = mix(out[k + other], shade, part | 0);
+  }
+}
+
+// ---- words ------------------------------------------------------------------------------------------------------------
+
+const SYMBOLS = { rho: "ρ", "mesh density": "mesh density ρ" };
+/** What is positive and may span much. */
+const SKEWED = ["rho", "mesh density", "Q", "Jacobian"];
+const symbol = (name) => SYMBOLS[name] ?? name;
+
+/** Six digits, as a power of ten where that is shorter. */
+function number(v) {
+  const size = Math.abs(v);
+  return (v === 0 ? "0" : size >= 1e-3 && size < 1e6 ? String(+v.toPrecision(6)) : v.toExponential(4)).replace(/-/g, "−");
+}
+
+/** Round values between two ends with their labels. */
+function ticks(low, high, most) {
+  const span = high - low;
+  if (!(span > 1e-12 * Math.max(Math.abs(low), Math.abs(high)))) return [[low, number(low)]];
+  const power = 10 ** Math.floor(Math.log10(span / most)), step = [1, 2, 5, 10].map((m) => m * power).find((s) => span / s <= most);
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push([k * step, number(+(k * step).toPrecision(10))]);
+  return found;
+}
+
+// ---- the viewer -------------------------------------------------------------------------------------------------------
+
+class Viewer {
+  constructor(data, arrays) {
+    Object.assign(this, { data, arrays, at: data.meshes[0].times.length - 1, playing: false, zoom: 1, node: null });
+    const byId = (id) => document.getElementById(id);
+    this.controls = Object.fromEntries(["play", "time", "now", "field", "map", "lines", "cuts"].map((id) => [id, byId(id)]));
+    this.whole();
+    this.maps = data.maps.map(({ name, colours }) => ({
+      name,
+      colours: Int32Array.from({ length: 256 }, (_, k) => {
+        const c = parseInt(colours.slice(6 * k, 6 * k + 6), 16);
+        return -16777216 | (c & 255) << 16 | c & 0xff00 | c >> 16;
+      }),
+    }));
+    this.maps.forEach(({ name }) => this.controls.map.add(new Option(name, name)));
+    this.fields = data.meshes[0].arrays.map((array) => array.name).filter((name) => name !== "x" && name !== "y");
+    for (const name of [...this.fields, "Q", "Jacobian", "nothing"]) this.controls.field.add(new Option(symbol(name), name));
+    this.stages = data.meshes.map((mesh, m) => this.stage(mesh, m));
+    document.querySelector(".stages").classList.toggle("pair", this.stages.length > 1);
+    byId("cuts-label").hidden = !data.meshes.some((mesh) => mesh.cuts.flat().length);
+
+    const draw = () => this.draw();
+    for (const id of ["field", "map", "lines", "cuts"]) this.controls[id].addEventListener("change", draw);
+    byId("in").addEventListener("click", () => this.scale(1.5));
+    byId("out").addEventListener("click", () => this.scale(1 / 1.5));
+    byId("reset").addEventListener("click", () => { this.whole(); draw(); });
+    const { play, time } = this.controls;
+    if (time) {
+      time.max = this.last;
+      play.addEventListener("click", () => this.play(!this.playing));
+      time.addEventListener("input", () => { this.play(false); this.show(Math.round(time.value)); });
+      time.addEventListener("keydown", (event) => {
+        const to = { ArrowLeft: this.at - 1, ArrowDown: this.at - 1, ArrowRight: this.at + 1, ArrowUp: this.at + 1, Home: 0, End: this.last }[event.key];
+        if (to === undefined) return;
+        event.preventDefault();
+        this.play(false);
+        this.show(Math.round(to));
+      });
+    }
+    new ResizeObserver(draw).observe(document.querySelector(".stages"));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+    this.show(this.at);
+  }
+
+  get last() { return this.data.meshes[0].times.length - 1; }
+
+  /** One canvas with what happens on it. */
+  stage(mesh, m) {
+    const figure = document.createElement("figure"), caption = document.createElement("figcaption"), canvas = document.createElement("canvas");
+    canvas.tabIndex = 0;
+    canvas.setAttribute("role", "img");
+    figure.append(caption, canvas);
+    document.querySelector(".stages").append(figure);
+    const stage = { mesh, m, caption, canvas, context: canvas.getContext("2d"), values: null };
+    const place = (event) => {
+      const box = canvas.getBoundingClientRect();
+      return [(event.clientX - box.left) * canvas.width / box.width, (event.clientY - box.top) * canvas.height / box.height];
+    };
+    const fingers = new Map();
+    canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); fingers.set(event.pointerId, place(event)); });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      const before = fingers.get(event.pointerId), now = place(event);
+      if (!before) return this.point(stage, now);
+      const others = [...fingers].filter(([id]) => id !== event.pointerId).map(([, p]) => p);
+      if (others.length) {
+        const [o] = others, distance = (p) => Math.hypot(p[0] - o[0], p[1] - o[1]);
+        this.scale(distance(now) / Math.max(1, distance(before)), this.physical(stage, o));
+      } else {
+        this.pan(stage, now[0] - before[0], now[1] - before[1]);
+      }
+      fingers.set(event.pointerId, now);
+    });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.scale(Math.exp(-0.0015 * event.deltaY * (event.deltaMode ? 30 : 1)), this.physical(stage, place(event)));
+    }, { passive: false });
+    canvas.addEventListener("keydown", (event) => this.key(stage, event));
+    return stage;
+  }
+
+  key(stage, event) {
+    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (way && event.shiftKey) this.pan(stage, -0.1 * way[0] * stage.canvas.width, 0.1 * way[1] * stage.canvas.width);
+    else if (way) {
+      const [n, m] = stage.mesh.lines, [i, j] = this.node ?? [n >> 1, m >> 1];
+      this.choose(Math.min(n - 1, Math.max(0, i + way[0])), Math.min(m - 1, Math.max(0, j + way[1])));
+    } else if (event.key === "+" || event.key === "=") this.scale(1.5);
+    else if (event.key === "-") this.scale(1 / 1.5);
+    else if (event.key === "0") { this.whole(); this.draw(); }
+    else if (event.key === " ") this.play(!this.playing);
+    else return;
+    event.preventDefault();
+  }
+
+  // time
+
+  /** Shows a place between frames; whole numbers are frames of the run. */
+  show(at) {
+    this.at = Math.min(this.last, Math.max(0, at));
+    this.draw();
+  }
+
+  play(on) {
+    const { play } = this.controls;
+    if (!play || on === this.playing) return;
+    this.playing = on;
+    play.textContent = on ? "Pause" : "Play";
+    play.setAttribute("aria-pressed", String(on));
+    if (!on) return this.show(Math.round(this.at));
+    if (this.at >= this.last) this.at = 0;
+    const speed = this.last / Math.min(20, Math.max(4, this.last / 5)); // frames a second
+    let before = null;
+    const tick = (now) => {
+      if (!this.playing) return;
+      this.show(this.at + (before === null ? 0 : speed * (now - before) / 1000));
+      before = now;
+      if (this.at >= this.last) this.play(false);
+      else requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
+  }
+
+  /** Time of the place shown, and the place of that time among the frames of another mesh: while nothing plays, a frame. */
+  placeOf(mesh) {
+    const ours = this.data.meshes[0].times, from = Math.floor(this.at), to = Math.min(this.last, from + 1);
+    const t = ours[from] + (ours[to] - ours[from]) * (this.at - from);
+    if (mesh === this.data.meshes[0]) return [t, this.at];
+    const times = mesh.times, after = times.findIndex((other) => other >= t), next = after < 0 ? times.length - 1 : after;
+    if (next === 0) return [t, 0];
+    const place = Math.min(next, next - 1 + (t - times[next - 1]) / (times[next] - times[next - 1]));
+    return [t, this.playing ? place : Math.round(place)];
+  }
+
+  /** An array of a mesh at a place, between two frames if need be. */
+  values(stage, name, place) {
+    const frames = this.arrays[stage.m][name], from = Math.floor(place), part = place - from;
+    if (!part) return frames[from];
+    const [a, b] = [frames[from], frames[from + 1]];
+    const mixed = new Float64Array(a.length);
+    for (let k = 0; k < a.length; k++) mixed[k] = a[k] + (b[k] - a[k]) * part;
+    return mixed;
+  }
+
+  // space
+
+  whole() {
+    const { lower, extent } = this.data;
+    this.zoom = 1;
+    this.centre = [0, 1].map((d) => lower[d] + extent[d] / 2);
+  }
+
+  scale(factor, fixed = this.centre) {
+    const zoom = Math.min(1e6, Math.max(0.5, this.zoom * factor)), real = zoom / this.zoom;
+    this.zoom = zoom;
+    this.centre = this.centre.map((c, d) => fixed[d] + (c - fixed[d]) / real);
+    this.draw();
+  }
+
+  pan(stage, dx, dy) {
+    this.centre = [this.centre[0] - dx / stage.scale, this.centre[1] + dy / stage.scale];
+    this.draw();
+  }
+
+  physical(stage, [px, py]) {
+    const { scale, w, h, left, top } = stage;
+    return [this.centre[0] + (px - left - w / 2) / scale, this.centre[1] - (py - top - h / 2) / scale];
+  }
+
+  /** Copies of a periodic mesh that may be seen. */
+  shifts() {
+    const { periodic, extent } = this.data, reach = periodic.map((wraps) => (wraps ? [-1, 0, 1] : [0]));
+    return reach[0].flatMap((i) => reach[1].map((j) => [i * extent[0], j * extent[1]]));
+  }
+
+  // drawing
+
+  draw() {
+    const began = performance.now(), { field, now, time } = this.controls;
+    const range = this.range(field.value);
+    this.stages.forEach((stage) => this.drawStage(stage, range));
+    this.drawBar(range);
+    const [t] = this.placeOf(this.data.meshes[0]);
+    if (now) {
+      now.textContent = `t = ${number(t)}`;
+      time.value = this.at;
+      time.setAttribute("aria-valuetext", now.textContent);
+    }
+    this.read();
+    this.milliseconds = performance.now() - began;
+    this.drawn = (this.drawn ?? 0) + 1;
+  }
+
+  /** Smallest and largest value over all frames of all meshes; logarithmic where what is positive spans much. */
+  range(field) {
+    this.ranges ??= {};
+    return this.ranges[field] ??= (() => {
+      if (field === "nothing") return { low: 0, high: 1, log: false };
+      let low = Infinity, high = -Infinity;
+      const take = (v) => { if (v < low) low = v; if (v > high) high = v; };
+      this.stages.forEach((stage) => stage.mesh.times.forEach((_, f) => {
+        if (this.fields.includes(field)) this.arrays[stage.m][field][f].forEach(take);
+        else this.cellValues(stage, field, f).forEach(take);
+      }));
+      return { low, high, log: SKEWED.includes(field) && low > 0 && high > 30 * low };
+    })();
+  }
+
+  cellValues(stage, field, place) {
+    const [n, m] = stage.mesh.lines, x = this.values(stage, "x", place), y = this.values(stage, "y", place);
+    const uniform = this.uniform(stage), out = new Float64Array((n - 1) * (m - 1));
+    for (let i = 0, c = 0; i < n - 1; i++) {
+      for (let j = 0; j < m - 1; j++, c++) out[c] = shape(x, y, i * m + j, m, uniform)[field === "Q" ? 0 : 1];
+    }
+    return out;
+  }
+
+  /** Area of an equal cell. */
+  uniform(stage) {
+    const [n, m] = stage.mesh.lines, { extent } = this.data;
+    return extent[0] * extent[1] / ((n - 1) * (m - 1));
+  }
+
+  drawStage(stage, { low, high, log }) {
+    const { canvas, context, mesh } = stage, { extent, lower, stride } = this.data, ratio = Math.min(2, window.devicePixelRatio || 1);
+    const style = getComputedStyle(document.body), ink = style.color, paper = style.backgroundColor;
+    const [left, right, top, bottom] = [62, 14, 8, 44].map((p) => Math.round(p * ratio));
+    const width = Math.max(160, Math.round(canvas.clientWidth * ratio)), w = width - left - right;
+    const h = Math.round(w * Math.min(1.25, Math.max(0.3, extent[1] / extent[0]))), height = top + h + bottom;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    canvas.style.height = `${height / ratio}px`;
+    const scale = this.zoom * Math.min(w / extent[0], h / extent[1]);
+    Object.assign(stage, { w, h, left, top, scale });
+    const [t, place] = this.placeOf(mesh);
+    stage.place = place;
+    const theirs = Number.isInteger(place) ? mesh.times[place] : t;
+    const pair = this.stages.length > 1, role = stage.m ? "compared with: " : "generator: ";
+    stage.caption.textContent = (mesh.name && role + mesh.name) + (pair ? `, t = ${number(theirs)}` : "");
+    stage.caption.hidden = !stage.caption.textContent;
+
+    const field = this.controls.field.value, [n, m] = mesh.lines, nodes = n * m;
+    const x = this.values(stage, "x", place), y = this.values(stage, "y", place);
+    const level = log ? (v) => 255.99 * Math.log(v / low) / Math.log(high / low) : (v) => high > low ? 255.99 * (v - low) / (high - low) : 128;
+    const nodal = this.fields.includes(field), cell = !nodal && field !== "nothing";
+    const levels = nodal || cell ? (nodal ? this.values(stage, field, place) : this.cellValues(stage, field, place)).map(level) : null;
+    Object.assign(stage, { x, y });
+
+    const image = (stage.image?.width === w && stage.image?.height === h) ? stage.image : (stage.image = context.createImageData(w, h));
+    const out = new Int32Array(image.data.buffer), [r, g, b] = paper.match(/\d+/g).map(Number);
+    out.fill(-16777216 | b << 16 | g << 8 | r);
+    const colours = (this.maps.find((map) => map.name === this.controls.map.value) ?? this.maps[0]).colours;
+    const px = new Float64Array(nodes), py = new Float64Array(nodes);
+    const dark = r + g + b < 384, lines = this.controls.lines.checked || field === "nothing";
+    const cuts = [];
+    for (const shift of this.shifts()) {
+      for (let k = 0; k < nodes; k++) {
+        px[k] = w / 2 + (x[k] + shift[0] - this.centre[0]) * scale;
+        py[k] = h / 2 - (y[k] + shift[1] - this.centre[1]) * scale;
+      }
+      if (levels) {
+        for (let i = 0, cellAt = 0; i < n - 1; i++) {
+          for (let j = 0; j < m - 1; j++, cellAt++) {
+            const a = i * m + j, b = a + m, c = b + 1, d = a + 1;
+            const va = levels[cell ? cellAt : a], vb = cell ? va : levels[b], vc = cell ? va : levels[c], vd = cell ? va : levels[d];
+            quadrilateral(out, w, h, colours, px[a], py[a], va, px[b], py[b], vb, px[c], py[c], vc, px[d], py[d], vd);
+          }
+        }
+      }
+      if (lines) {
+        // c is a node of the cell beside: lines fade where that is few pixels wide
+        const segment = (a, b, c, v) => {
+          const shade = levels ? (v < 153 ? 255 : 0) : dark ? 255 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
+          const wide = Math.abs(dx * (py[c] - py[a]) - dy * (px[c] - px[a])) / Math.sqrt(dx * dx + dy * dy);
+          const strength = Math.min(levels ? 0.55 : 0.8, (levels ? 0.1 : 0.25) * wide);
+          if (strength > 0.02) line(out, w, h, px[a], py[a], px[b], py[b], shade, strength);
+        };
+        const value = (k, i, j) => !levels ? 0 : cell ? levels[Math.min(i, n - 2) * (m - 1) + Math.min(j, m - 2)] : levels[k];
+        for (let i = 0, k = 0; i < n; i++) {
+          for (let j = 0; j < m; j++, k++) {
+            if (j + 1 < m) segment(k, k + 1, i + 1 < n ? k + m : k - m, value(k, i, j));
+            if (i + 1 < n) segment(k, k + m, j + 1 < m ? k + 1 : k - 1, value(k, i, j));
+          }
+        }
+      }
+      if (this.controls.cuts.checked) {
+        const path = (count, at) => Array.from({ length: count }, (_, k) => [left + px[at(k)], top + py[at(k)]]);
+        mesh.cuts[0].forEach((i) => cuts.push(path(m, (k) => i * m + k)));
+        mesh.cuts[1].forEach((j) => cuts.push(path(n, (k) => k * m + j)));
+      }
+    }
+    context.fillStyle = paper;
+    context.clearRect(0, 0, width, height);
+    context.putImageData(image, left, top);
+
+    context.save();
+    context.beginPath();
+    context.rect(left, top, w, h);
+    context.clip();
+    context.lineJoin = "round";
+    for (const [colour, thick] of [["rgba(0,0,0,.8)", 3.6], ["#fff", 1.6]]) {
+      Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
+      for (const cut of cuts) {
+        context.beginPath();
+        cut.forEach(([a, b], k) => (k ? context.lineTo(a, b) : context.moveTo(a, b)));
+        context.stroke();
+      }
+    }
+    if (this.node) {
+      const k = this.node[0] * m + this.node[1];
+      for (const [colour, thick] of [["#000", 4.5], ["#fff", 2]]) {
+        Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
+        for (const [sx, sy] of this.shifts()) {
+          context.beginPath();
+          context.arc(left + w / 2 + (x[k] + sx - this.centre[0]) * scale, top + h / 2 - (y[k] + sy - this.centre[1]) * scale, 6 * ratio, 0, 7);
+          context.stroke();
+        }
+      }
+    }
+    context.restore();
+
+    // the frame with its ticks
+    Object.assign(context, { strokeStyle: ink, fillStyle: ink, lineWidth: ratio, font: `${12 * ratio}px system-ui, sans-serif` });
+    context.strokeRect(left + 0.5, top + 0.5, w - 1, h - 1);
+    const [from, to] = [this.physical(stage, [left, top + h]), this.physical(stage, [left + w, top])];
+    context.textAlign = "center";
+    context.textBaseline = "top";
+    for (const [v, text] of ticks(from[0], to[0], Math.max(2, w / ratio / 90))) {
+      const p = left + w / 2 + (v - this.centre[0]) * scale;
+      context.fillRect(p - ratio / 2, top + h, ratio, 4 * ratio);
+      // a label that would be cut stays inside
+      const half = context.measureText(text).width / 2;
+      context.fillText(text, Math.min(width - half - 1, Math.max(half + 1, p)), top + h + 7 * ratio);
+    }
+    context.textAlign = "right";
+    context.textBaseline = "middle";
+    for (const [v, text] of ticks(from[1], to[1], Math.max(2, h / ratio / 60))) {
+      const p = top + h / 2 - (v - this.centre[1]) * scale;
+      context.fillRect(left - 4 * ratio, p - ratio / 2, 4 * ratio, ratio);
+      context.fillText(text, left - 7 * ratio, Math.max(7 * ratio, p), left - 22 * ratio);
+    }
+    context.textAlign = "center";
+    context.fillText("x", left + w / 2, height - 8 * ratio);
+    context.fillText("y", 7 * ratio, top + h / 2);
+    const what = field === "nothing" ? "the mesh" : `the mesh over ${symbol(field)}`;
+    const lattice = `${(n - 1) * stride} by ${(m - 1) * stride} cells`;
+    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, at t = ${number(theirs)}, from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
+  }
+
+  drawBar({ low, high, log }) {
+    const bar = document.querySelector(".bar"), canvas = bar.querySelector("canvas"), field = this.controls.field.value;
+    bar.hidden = field === "nothing";
+    bar.style.display = bar.hidden ? "none" : "";
+    bar.querySelector(".name").textContent = symbol(field) + (log ? " (log)" : "");
+    canvas.width = 256;
+    const context = canvas.getContext("2d"), image = context.createImageData(256, 14), out = new Int32Array(image.data.buffer);
+    const { colours } = this.maps.find((map) => map.name === this.controls.map.value) ?? this.maps[0];
+    for (let k = 0; k < out.length; k++) out[k] = colours[k % 256];
+    context.putImageData(image, 0, 0);
+    const place = (v) => (log ? Math.log(v / low) / Math.log(high / low) : high > low ? (v - low) / (high - low) : 0.5);
+    let labels = ticks(low, high, 6);
+    if (log) {
+      const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9), every = Math.ceil((to - from + 1) / 6);
+      labels = [];
+      for (let k = from; k <= to; k += every) labels.push([10 ** k, number(+(10 ** k).toPrecision(3))]);
+    }
+    bar.querySelector(".ticks").replaceChildren(...labels.map(([v, text]) => {
+      const label = document.createElement("span");
+      label.textContent = text;
+      label.style.left = `${100 * place(v)}%`;
+      return label;
+    }));
+  }
+
+  // reading
+
+  /** The cell under a place on the canvas, if there is one. */
+  cellAt(stage, place) {
+    const [px, py] = this.physical(stage, place), { x, y, mesh } = stage, [n, m] = mesh.lines;
+    for (const shift of this.shifts()) {
+      const u = px - shift[0], v = py - shift[1];
+      for (let i = 0; i < n - 1; i++) {
+        for (let j = 0; j < m - 1; j++) {
+          const a = i * m + j, corners = [a, a + m, a + m + 1, a + 1];
+          if (corners.every((k) => x[k] < u) || corners.every((k) => x[k] > u) || corners.every((k) => y[k] < v) || corners.every((k) => y[k] > v)) continue;
+          const inside = corners.every((k, c) => {
+            const next = corners[(c + 1) % 4];
+            return (x[next] - x[k]) * (v - y[k]) - (y[next] - y[k]) * (u - x[k]) >= 0;
+          });
+          if (inside) {
+            const distance = (k) => Math.hypot(x[k] - u, y[k] - v);
+            return { cell: [i, j], node: corners.reduce((best, k) => (distance(k) < distance(best) ? k : best)) };
+          }
+        }
+      }
+    }
+    return null;
+  }
+
+  point(stage, place) {
+    const found = this.cellAt(stage, place);
+    if (!found) return;
+    const m = stage.mesh.lines[1];
+    this.choose(Math.floor(found.node / m), found.node % m, found.cell);
+  }
+
+  /** Chooses a node, and a cell at it. */
+  choose(i, j, cell) {
+    const [n, m] = this.stages[0].mesh.lines;
+    this.node = [i, j];
+    this.cell = cell ?? [Math.min(i, n - 2), Math.min(j, m - 2)];
+    this.draw();
+  }
+
+  /** Writes what is known at the chosen node, a line a mesh. */
+  read() {
+    document.querySelector(".readout").replaceChildren(...this.stages.map((stage) => {
+      const line = document.createElement("dl"), m = stage.mesh.lines[1], { stride, cells } = this.data;
+      const entry = (name, text) => {
+        const [pair, dt, dd] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
+        dt.textContent = name;
+        dd.textContent = text;
+        pair.append(dt, dd);
+        line.append(pair);
+      };
+      if (this.stages.length > 1) entry("mesh", stage.mesh.name.split(",")[0]);
+      const k = this.node && this.node[0] * m + this.node[1], known = (value) => (this.node ? number(value()) : "–");
+      entry("node", this.node ? `(${this.node.map((index, d) => Math.min(index * stride, cells[d])).join(", ")})` : "–");
+      for (const name of ["x", "y"]) entry(name, known(() => stage[name][k]));
+      for (const name of this.fields) entry(symbol(name), known(() => this.values(stage, name, stage.place)[k]));
+      const figures = this.node && shape(stage.x, stage.y, this.cell[0] * m + this.cell[1], m, this.uniform(stage));
+      entry("Q of the cell", known(() => figures[0]));
+      entry("its Jacobian", known(() => figures[1]));
+      return line;
+    }));
+  }
+}
+
+(async () => {
+  const source = document.getElementById("viewer-data");
+  if (!source) return;
+  const data = JSON.parse(source.textContent);
+  const arrays = await Promise.all(data.meshes.map(async (mesh) => unpack(mesh, await inflate(mesh.data))));
+  window.viewer = new Viewer(data, arrays);
+})().catch((error) => {
+  document.querySelector(".stages").textContent = `The viewer does not work in this browser: ${error.message}`;
+});

@@ -1,0 +1,116 @@
+use base64::{Engine, engine::general_purpose::STANDARD};
+use flate2::read::ZlibDecoder;
+use std::io::Read;
+use std::path::Path;
+
+/// A frame of ours: a mesh and what is known at its nodes.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    pub t: f64,
+    pub cells: [usize; 2],
+    /// Nodes, of shape cells + 1.
+    pub x: Vec<[f64; 2]>,
+    /// Values at the nodes, by name.
+    pub fields: Vec<(String, Vec<f64>)>,
+    /// Between which nodes along each axis another subdomain begins.
+    pub cuts: [Vec<usize>; 2],
+}
+
+impl Frame {
+    /// Reads a `.vtu` file as runs of ours write it.
+    pub fn read(path: &Path, t: f64) -> Result<Self, String> {
+        let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
+        let arrays: Vec<Array<'_>> = arrays(&text);
+        let array = |section: &str, name: &str| {
+            let found = arrays.iter().find(|array| array.section == section && array.name == name);
+            found.ok_or(format!("it has no array {name:?}"))
+        };
+        let points = doubles(array("Points", "Points")?)?;
+        let x: Vec<[f64; 2]> = points.chunks_exact(3).map(|p| [p[0], p[1]]).collect();
+        // the first cell names node (1, 0), which begins the second row
+        let row = integers::<8>(array("Cells", "connectivity")?)?.get(1).copied().unwrap_or(0);
+        if row < 2 || x.len() < 2 * row || !x.len().is_multiple_of(row) {
+            return Err("its nodes are not those of a structured mesh".into());
+        }
+        let cells = [x.len() / row - 1, row - 1];
+        let mut fields = Vec::new();
+        for array in arrays.iter().filter(|array| array.section == "PointData" && array.scalar) {
+            let values = doubles(array)?;
+            if values.len() != x.len() {
+                return Err(format!("{:?} has {} values for {} nodes", array.name, values.len(), x.len()));
+            }
+            fields.push((array.name.clone(), values));
+        }
+        if !x.as_flattened().iter().chain(fields.iter().flat_map(|(_, values)| values)).all(|v| v.is_finite()) {
+            return Err("it holds a value that is not finite".into());
+        }
+        let subdomains = array("CellData", "subdomain").and_then(integers::<4>).unwrap_or_default();
+        let cuts = if subdomains.len() == cells[0] * cells[1] { cuts(cells, &subdomains) } else { Default::default() };
+        Ok(Self { t, cells, x, fields, cuts })
+    }
+
+    /// Whether both are of one series.
+    pub fn fits(&self, other: &Self) -> bool {
+        let names = |frame: &Self| frame.fields.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+        self.cells == other.cells && names(self) == names(other)
+    }
+}
+
+/// Where the subdomain changes along the first row and the first column; 0 where it does around a periodic axis.
+fn cuts([n, m]: [usize; 2], subdomains: &[usize]) -> [Vec<usize>; 2] {
+    let changes = |count: usize, at: &dyn Fn(usize) -> usize| {
+        (0..count).filter(|&k| at(k) != at((k + count - 1) % count)).collect::<Vec<_>>()
+    };
+    [changes(n, &|i| subdomains[i * m]), changes(m, &|j| subdomains[j])]
+}
+
+/// An array as it stands in a file.
+struct Array<'a> {
+    section: &'a str,
+    name: String,
+    scalar: bool,
+    text: &'a str,
+}
+
+/// The arrays of a file that a run of ours wrote: each a line, between the lines of its section.
+fn arrays(text: &str) -> Vec<Array<'_>> {
+    let mut section = "";
+    let mut arrays = Vec::new();
+    for line in text.lines() {
+        match line.strip_prefix("<DataArray ").and_then(|line| line.strip_suffix("</DataArray>")?.split_once('>')) {
+            Some((head, text)) => {
+                let name = attribute(head, "Name").unwrap_or_default();
+                arrays.push(Array { section, name, scalar: attribute(head, "NumberOfComponents").is_none(), text });
+            }
+            None => section = line.trim_start_matches('<').trim_end_matches('>'),
+        }
+    }
+    arrays
+}
+
+/// An attribute of a tag.
+pub fn attribute(tag: &str, name: &str) -> Option<String> {
+    let (_, rest) = tag.split_once(&format!("{name}=\""))?;
+    let (value, _) = rest.split_once('"')?;
+    Some(value.replace("&quot;", "\"").replace("&lt;", "<").replace("&amp;", "&"))
+}
+
+fn doubles(array: &Array<'_>) -> Result<Vec<f64>, String> {
+    Ok(bytes(array)?.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect())
+}
+
+fn integers<const N: usize>(array: &Array<'_>) -> Result<Vec<usize>, String> {
+    let number = |b: &[u8]| b.iter().rev().fold(0, |n, &byte| n << 8 | usize::from(byte));
+    Ok(bytes(array)?.chunks_exact(N).map(number).collect())
+}
+
+/// One block behind a header of four numbers.
+fn bytes(array: &Array<'_>) -> Result<Vec<u8>, String> {
+    const HEADER: usize = 44;
+    let damaged = |what: &str| format!("its array {:?} is damaged ({what})", array.name);
+    let compressed = array.text.get(HEADER..).ok_or_else(|| damaged("too short"))?;
+    let compressed = STANDARD.decode(compressed).map_err(|error| damaged(&error.to_string()))?;
+    let mut bytes = Vec::new();
+    ZlibDecoder::new(compressed.as_slice()).read_to_end(&mut bytes).map_err(|error| damaged(&error.to_string()))?;
+    Ok(bytes)
+}

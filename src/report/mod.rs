@@ -1,0 +1,62 @@
+//! The report of a run, from its directory alone: `report.html` with a viewer of the moving mesh, plots, the animation.
+
+mod animation;
+mod files;
+mod frame;
+mod page;
+mod plots;
+mod tables;
+mod viewer;
+
+use crate::error::Result;
+use crate::parallel::join;
+use crate::simulation::write_file;
+use files::RunFiles;
+use std::path::{Path, PathBuf};
+
+/// A report that was written.
+#[derive(Debug, Clone)]
+pub struct Built {
+    /// The page.
+    pub path: PathBuf,
+    /// Its size.
+    pub bytes: usize,
+    /// What was damaged or left out.
+    pub notes: Vec<String>,
+}
+
+/// (Re)builds `report.html`, the plots over time and, where the study asks for it, `animation.gif`.
+///
+/// The run may be finished, interrupted or still going on. What is damaged is left out and told of.
+///
+/// # Errors
+/// [`Error::NotARun`](crate::Error::NotARun) for any other directory; [`Error::Unreadable`](crate::Error::Unreadable) or
+/// [`Error::Unwritable`](crate::Error::Unwritable).
+pub fn build(directory: &Path) -> Result<Built> {
+    let mut run = RunFiles::read(directory)?;
+    let plots = plots::of(&run);
+    let pictures = || {
+        plots.iter().try_for_each(|(name, figure)| {
+            let picture = figure.draw();
+            write_file(&directory.join(format!("{name}.svg")), picture.svg.as_bytes())?;
+            write_file(&directory.join(format!("{name}.png")), &picture.png)
+        })
+    };
+    let (viewer, drawn) = join(|| viewer::Viewer::of(&mut run), pictures);
+    drawn?;
+    if run.asks_for("animation") {
+        animation::write(&mut run)?;
+    }
+    let html = page::render(&run, &plots, viewer.as_ref());
+    let path = directory.join("report.html");
+    write_file(&path, html.as_bytes())?;
+    Ok(Built { path, bytes: html.len(), notes: run.notes })
+}
+
+/// As [`build`], at the end of a run whose study asks for a report or an animation.
+pub(crate) fn finish(directory: &Path, report: bool, animation: bool) -> Result<()> {
+    if report {
+        return build(directory).map(|_| ());
+    }
+    if animation { animation::write(&mut RunFiles::read(directory)?) } else { Ok(()) }
+}

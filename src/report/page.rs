@@ -1,0 +1,111 @@
+use super::files::RunFiles;
+use super::tables::{self, Part, Table};
+use super::viewer::Viewer;
+use crate::simulation::Figure;
+use base64::{Engine, engine::general_purpose::STANDARD};
+use minijinja::Environment;
+use serde::Serialize;
+use serde_json::Value;
+
+const TEMPLATE: &str = include_str!("../../assets/report/page.html");
+const STYLE: &str = include_str!("../../assets/report/style.css");
+const SCRIPT: &str = include_str!("../../assets/report/viewer.js");
+/// Pictures above this are left to the directory.
+const LARGE: u64 = 1 << 20;
+
+#[derive(Serialize)]
+struct Page<'a> {
+    study: &'a str,
+    kind: &'a str,
+    version: &'a str,
+    status: &'a str,
+    said: String,
+    /// What failed.
+    failure: Option<&'a str>,
+    warnings: Vec<&'a str>,
+    notes: &'a [String],
+    viewer: Option<ViewerOnPage<'a>>,
+    tables: Vec<Table>,
+    wall: Option<String>,
+    parts: Vec<Part>,
+    plots: Vec<Plot>,
+    pictures: Vec<Shown>,
+    text: &'a str,
+    style: &'a str,
+    script: &'a str,
+}
+
+#[derive(Serialize)]
+struct ViewerOnPage<'a> {
+    data: &'a str,
+    moves: bool,
+    thinned: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct Plot {
+    title: String,
+    svg: String,
+}
+
+/// A picture of the directory.
+#[derive(Serialize)]
+struct Shown {
+    title: &'static str,
+    source: String,
+}
+
+/// The page, everything in it.
+pub fn render(run: &RunFiles, plots: &[(&str, Figure)], viewer: Option<&Viewer>) -> String {
+    let (wall, parts) = tables::seconds(&run.summary);
+    let failure = run.summary.values().find_map(|value| value.get("message")?.as_str());
+    let warnings = run.summary.get("warnings").and_then(Value::as_array);
+    let status = run.word("status");
+    let page = Page {
+        study: run.word("study"),
+        kind: run.word("kind"),
+        version: run.word("version"),
+        status,
+        said: match status {
+            "completed" => "The run is complete.".into(),
+            "failed" => "The run failed; everything up to the last good state is here.".into(),
+            "not-converged" => "The iteration did not converge.".into(),
+            "running" => {
+                "The run has not ended: it was interrupted, or still goes on. This is what it left so far.".into()
+            }
+            other => format!("Status: {other}."),
+        },
+        failure,
+        warnings: warnings.into_iter().flatten().filter_map(Value::as_str).collect(),
+        notes: &run.notes,
+        viewer: viewer.map(|v| ViewerOnPage { data: &v.data, moves: v.moves, thinned: v.thinned.as_deref() }),
+        tables: tables::of(&run.summary),
+        wall,
+        parts,
+        plots: plots.iter().map(|(_, figure)| Plot { title: figure.title.clone(), svg: figure.svg() }).collect(),
+        pictures: pictures(run, viewer.is_some()),
+        text: &run.study_text,
+        style: STYLE,
+        script: SCRIPT,
+    };
+    let environment = Environment::new();
+    environment
+        .render_named_str("page.html", TEMPLATE, minijinja::value::Serde(&page))
+        .expect("the template fits the page")
+}
+
+/// Pictures that the run drew itself; the mesh only where no viewer shows it.
+fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
+    let candidates =
+        [("mesh", "The mesh", !viewed), ("convergence", "Convergence", true), ("front", "The front over time", true)];
+    let formats = [("svg", "image/svg+xml"), ("png", "image/png")];
+    let picture = |(name, title, wanted): (&str, &'static str, bool)| {
+        formats.iter().filter(|_| wanted).find_map(|(format, mime)| {
+            let path = run.directory.join(format!("{name}.{format}"));
+            let small = std::fs::metadata(&path).is_ok_and(|file| file.len() <= LARGE);
+            let bytes = small.then(|| std::fs::read(&path).ok()).flatten()?;
+            Some(Shown { title, source: format!("data:{mime};base64,{}", STANDARD.encode(bytes)) })
+        })
+    };
+    candidates.into_iter().filter_map(picture).collect()
+}

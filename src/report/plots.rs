@@ -1,0 +1,137 @@
+use super::files::{Column, RunFiles};
+use crate::simulation::{Curve, Figure, Scale};
+
+/// Curves of `history.csv` that belong into one plot.
+struct Group {
+    /// Name of its files.
+    name: &'static str,
+    title: &'static str,
+    label: &'static str,
+    scale: Scale,
+    /// Columns, with what the legend says.
+    columns: &'static [(&'static str, &'static str)],
+}
+
+const GROUPS: [Group; 7] = [
+    Group {
+        name: "error",
+        title: "Error over time",
+        label: "error (units of u)",
+        scale: Scale::Logarithmic,
+        columns: &[("error_linf", "largest error of u"), ("error_l2", "root mean square error of u")],
+    },
+    Group {
+        name: "front-error",
+        title: "Error of the front over time",
+        label: "error of the height (units of y)",
+        scale: Scale::Logarithmic,
+        columns: &[("front_error_linf", "largest error of the front")],
+    },
+    Group {
+        name: "front-position",
+        title: "Position of the front",
+        label: "height (units of y)",
+        scale: Scale::Linear,
+        columns: &[("front_mean", "mean"), ("front_min", "lowest point"), ("front_max", "highest point")],
+    },
+    Group {
+        name: "quality",
+        title: "Quality of the mesh over time",
+        label: "Q and scaled Jacobian (dimensionless)",
+        scale: Scale::Logarithmic,
+        columns: &[("q_max", "largest Q"), ("q_mean", "mean Q"), ("min_scaled_jacobian", "smallest corner Jacobian")],
+    },
+    Group {
+        name: "contraction",
+        title: "Contraction of a Schwarz iteration",
+        label: "factor an iteration (dimensionless)",
+        scale: Scale::Linear,
+        columns: &[
+            ("contraction_observed", "observed"),
+            ("contraction_predicted", "predicted bound"),
+            ("observed_rate", "observed, two iterations"),
+            ("bound", "predicted bound"),
+        ],
+    },
+    Group {
+        name: "energy",
+        title: "Missing in the balance of heat",
+        label: "share (dimensionless)",
+        scale: Scale::Logarithmic,
+        columns: &[
+            ("energy_imbalance", "fluxes by weighted residual"),
+            ("energy_imbalance_by_differences", "fluxes by differences"),
+        ],
+    },
+    Group {
+        name: "steps",
+        title: "Length of the time steps",
+        label: "step (units of t)",
+        scale: Scale::Logarithmic,
+        columns: &[("dt", "step"), ("step_limit", "longest stable step")],
+    },
+];
+/// Points of a curve.
+const POINTS: usize = 600;
+
+/// Plots of a history over time, as far as it has something to show.
+pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
+    let column = |name: &str| run.history.iter().find(|column| column.name == name);
+    let Some(t) = column("t") else { return Vec::new() };
+    let study = run.word("study");
+    let drawn = |group: &Group| {
+        let curves: Vec<Curve> = (group.columns.iter())
+            .filter_map(|(name, words)| Some(curve(words, t, column(name)?, group.scale)))
+            .filter(|curve| curve.points.len() > 1)
+            .collect();
+        // steps that never change are in the study
+        let changes = |curve: &Curve| curve.points.iter().any(|p| (p[1] / curve.points[0][1] - 1.0).abs() > 1e-6);
+        let worth = !curves.is_empty() && (group.name != "steps" || curves.iter().any(changes));
+        worth.then(|| {
+            let figure = Figure {
+                title: format!("{study}: {}", group.title),
+                labels: ["time t".into(), group.label.into()],
+                scales: [Scale::Linear, group.scale],
+                curves,
+            };
+            (group.name, figure)
+        })
+    };
+    GROUPS.iter().filter_map(drawn).collect()
+}
+
+/// A curve as few points, of every stretch its lowest and its highest.
+fn curve(name: &str, t: &Column, column: &Column, scale: Scale) -> Curve {
+    let placed = |v: f64| scale == Scale::Linear || v > 0.0;
+    let points: Vec<[f64; 2]> = (t.values.iter().zip(&column.values))
+        .filter_map(|(t, v)| Some([(*t)?, (*v)?]))
+        .filter(|p| placed(p[1]))
+        .collect();
+    let points = if points.len() <= POINTS {
+        points
+    } else {
+        let ends = |part: &[[f64; 2]]| {
+            let by = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
+            let ends = [part.iter().min_by(by), part.iter().max_by(by)].map(|end| *end.expect("a part is not empty"));
+            if ends[0][0] <= ends[1][0] { ends } else { [ends[1], ends[0]] }
+        };
+        points.chunks(points.len().div_ceil(POINTS / 2)).flat_map(ends).collect()
+    };
+    Curve { name: name.into(), points, plain: true, ..Curve::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A single spike among ten thousand values is drawn.
+    #[test]
+    fn a_thinned_curve_keeps_its_spikes() {
+        let values = |f: fn(usize) -> f64| (0..10_000).map(|k| Some(f(k))).collect();
+        let t = Column { name: "t".into(), values: values(|k| k as f64) };
+        let v = Column { name: "q_max".into(), values: values(|k| if k == 4321 { 50.0 } else { 1.0 }) };
+        let curve = curve("Q", &t, &v, Scale::Logarithmic);
+        assert!(curve.points.len() <= POINTS + 2 && curve.points.contains(&[4321.0, 50.0]));
+        assert!(curve.points.is_sorted_by(|a, b| a[0] <= b[0]));
+    }
+}

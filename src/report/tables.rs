@@ -1,0 +1,248 @@
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+/// A table of the page, of a summary of any kind.
+#[derive(Debug, Serialize)]
+pub struct Table {
+    pub title: String,
+    pub head: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+    /// What its words mean.
+    pub words: Vec<[&'static str; 2]>,
+}
+
+/// Seconds of a part.
+#[derive(Debug, Serialize)]
+pub struct Part {
+    pub name: String,
+    pub seconds: String,
+    /// Of the whole, in percent.
+    pub percent: f64,
+}
+
+/// Keys of a summary that are shown otherwise.
+const ELSEWHERE: [&str; 8] = ["schema", "study", "kind", "version", "status", "seconds", "warnings", "mesh"];
+/// More rows than this keep the order of the file: one report a row.
+const MANY: usize = 8;
+
+/// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
+const NAMES: [(&str, &str, &str); 36] = [
+    ("t", "t", ""),
+    ("n", "iteration", ""),
+    ("error.linf", "largest error", "over the nodes, against the exact solution"),
+    ("error.l2", "root mean square error", "over the area, against the exact solution"),
+    ("error.l2_integral", "square root of ∫ error²", "grows with the area"),
+    ("quality.q_max", "largest Q", "of a cell: 1 for a square, more for one that is stretched or sheared"),
+    ("quality.q_mean", "mean Q", ""),
+    (
+        "quality.min_scaled_jacobian",
+        "smallest corner Jacobian",
+        "over that of equal cells; positive as long as no cell is folded",
+    ),
+    ("quality.equidistribution", "equidistribution", "largest over mean density × area of a cell; 1 is perfect"),
+    ("quality.shortest_cell", "shortest cell", "over the mean one"),
+    ("quality.error_linf", "largest distance from the exact mesh", ""),
+    ("conserved.mass", "integral of the first unknown", ""),
+    ("conserved.drift", "change of the integral", "since the start, over its size there"),
+    ("interface.points", "points between subdomains", ""),
+    ("interface.standard_error", "standard error of these points", "root mean square over both coordinates"),
+    ("interface.noise", "… over the shortest edge", ""),
+    ("interface.sweeps", "sweeps before the walks", ""),
+    ("contraction.iterations", "Schwarz iterations", "in the last step"),
+    ("contraction.predicted", "contraction, predicted", "bound on the factor by which an iteration shrinks the error"),
+    ("contraction.observed", "contraction, observed", ""),
+    ("comparison.r_max", "largest Q, reference over this mesh", ""),
+    ("comparison.r_mean", "mean Q, reference over this mesh", ""),
+    ("comparison.cell_max", "… largest in one cell", ""),
+    ("comparison.mesh_rms", "distance of the meshes", "root mean square over the nodes"),
+    ("rate.stride", "iterations that these are for", ""),
+    ("rate.bound", "predicted bound", ""),
+    ("front.mean", "mean height of the front", ""),
+    ("front.range", "its lowest and highest point", ""),
+    ("front.error_linf", "largest error of the front", "against the exact solution"),
+    ("energy_imbalance", "missing in the balance of heat", "as a share, with fluxes by weighted residual"),
+    ("energy_imbalance_by_differences", "… with fluxes by differences", ""),
+    ("step_limit", "longest stable step", "of the explicit front, as estimated"),
+    ("error_linf", "largest error", "against the discrete solution on one domain"),
+    ("points_per_second", "stencils a second", ""),
+    ("nonnegative_fraction", "share without negative weights", ""),
+    ("exact_degree", "exact to degree", "of polynomials"),
+];
+
+/// Everything of a summary that makes a table.
+pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
+    let mut tables = Vec::new();
+    let mut loose = Vec::new();
+    for (key, value) in summary.iter().filter(|(key, _)| !ELSEWHERE.contains(&key.as_str())) {
+        match value {
+            // a failure is told at the top
+            Value::Object(object) if object.contains_key("message") => {}
+            Value::Array(records) if records.iter().any(Value::is_object) => tables.push(of_records(key, records)),
+            Value::Array(records) if records.is_empty() => {}
+            Value::Object(_) if ["work", "parallel"].contains(&key.as_str()) => {
+                // what stayed at nought was not needed
+                loose.extend(flat(value, key).into_iter().filter(|(_, v)| v.as_f64() != Some(0.0)));
+            }
+            Value::Object(_) => {
+                let rows = flat(value, key);
+                let words = meanings(rows.iter().map(|(path, _)| path.as_str()));
+                let rows = rows.iter().map(|(path, value)| vec![name(path), shown(value)]).collect();
+                tables.push(Table { title: title(key), head: Vec::new(), rows, words });
+            }
+            Value::Null => {}
+            _ => loose.push((key.clone(), value.clone())),
+        }
+    }
+    if !loose.is_empty() {
+        let rows = loose.iter().map(|(path, value)| vec![name(path), shown(value)]).collect();
+        tables.push(Table { title: "Work".into(), head: Vec::new(), rows, words: Vec::new() });
+    }
+    tables
+}
+
+/// Few records stand side by side, a quantity a row; many below each other.
+fn of_records(key: &str, records: &[Value]) -> Table {
+    let flat: Vec<Vec<(String, Value)>> = records.iter().map(|record| flat(record, "")).collect();
+    let mut paths: Vec<&String> = Vec::new();
+    for (path, _) in flat.iter().flatten() {
+        if !paths.contains(&path) {
+            paths.push(path);
+        }
+    }
+    // what no record knows is no row
+    paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && !value.is_null()));
+    let at = |record: &[(String, Value)], path: &String| {
+        record.iter().find(|(other, _)| other == path).map_or("–".into(), |(_, value)| shown(value))
+    };
+    let words = meanings(paths.iter().map(|path| path.as_str()));
+    let (head, rows) = if records.len() > MANY {
+        let row = |record: &Vec<(String, Value)>| paths.iter().map(|path| at(record, path)).collect();
+        (paths.iter().map(|path| name(path)).collect(), flat.iter().map(row).collect())
+    } else {
+        let line =
+            |path: &&String| [name(path)].into_iter().chain(flat.iter().map(|record| at(record, path))).collect();
+        let mut lines: Vec<Vec<String>> = paths.iter().map(line).collect();
+        if lines.is_empty() { (Vec::new(), lines) } else { (lines.remove(0), lines) }
+    };
+    Table { title: title(key), head, rows, words }
+}
+
+/// Where the time went, longest first.
+pub fn seconds(summary: &Map<String, Value>) -> (Option<String>, Vec<Part>) {
+    let Some(Value::Object(seconds)) = summary.get("seconds") else { return (None, Vec::new()) };
+    let wall = seconds.get("wall").and_then(Value::as_f64).unwrap_or(0.0);
+    let mut parts: Vec<(String, f64)> = (seconds.iter())
+        .filter(|(key, _)| !["wall", "cpu"].contains(&key.as_str()))
+        .filter_map(|(key, value)| Some((key.replace('_', " "), value.as_f64()?)))
+        .filter(|(_, seconds)| *seconds > 0.0)
+        .collect();
+    let rest = wall - parts.iter().map(|(_, seconds)| seconds).sum::<f64>();
+    if rest > 0.01 * wall {
+        parts.push(("other".into(), rest));
+    }
+    parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let part = |(name, seconds): (String, f64)| Part {
+        name,
+        seconds: format!("{seconds:.3}"),
+        percent: (100.0 * seconds / wall).clamp(0.0, 100.0),
+    };
+    ((wall > 0.0).then(|| format!("{wall:.3}")), parts.into_iter().map(part).collect())
+}
+
+/// Values with the path to each.
+fn flat(value: &Value, path: &str) -> Vec<(String, Value)> {
+    match value {
+        Value::Object(object) => (object.iter())
+            .flat_map(|(key, value)| flat(value, &if path.is_empty() { key.clone() } else { format!("{path}.{key}") }))
+            .collect(),
+        _ => vec![(path.to_string(), value.clone())],
+    }
+}
+
+fn known(path: &str) -> Option<&'static (&'static str, &'static str, &'static str)> {
+    let ends = |(key, ..): &&(&str, &str, &str)| path == *key || path.ends_with(&format!(".{key}"));
+    NAMES.iter().filter(ends).max_by_key(|(key, ..)| key.len())
+}
+
+pub fn name(path: &str) -> String {
+    let last = path.rsplit('.').next().unwrap_or(path);
+    known(path).map_or_else(|| last.replace('_', " "), |(_, name, _)| (*name).into())
+}
+
+fn meanings<'a>(paths: impl Iterator<Item = &'a str>) -> Vec<[&'static str; 2]> {
+    paths.filter_map(known).filter(|(_, _, words)| !words.is_empty()).map(|(_, name, words)| [*name, *words]).collect()
+}
+
+fn title(key: &str) -> String {
+    let words = match key {
+        "reports" => "Figures at the report times",
+        "rate" => "Contraction of the error",
+        "error" => "Error",
+        "stencil" => "Stencils of the Laplacian",
+        other => other,
+    };
+    let words = words.replace('_', " ");
+    let mut letters = words.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => "–".into(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.into(),
+        Value::Number(n) if n.is_f64() => number(n.as_f64().unwrap_or(0.0)),
+        Value::Number(n) => n.to_string(),
+        Value::String(text) => text.clone(),
+        Value::Array(values) if values.len() <= 4 => values.iter().map(shown).collect::<Vec<_>>().join(" … "),
+        Value::Array(values) => format!("{} values", values.len()),
+        Value::Object(_) => String::new(),
+    }
+}
+
+/// Five digits, as a power of ten where it is very large or small.
+fn number(x: f64) -> String {
+    let digits = if x == 0.0 {
+        "0".into()
+    } else if (1e-3..1e6).contains(&x.abs()) {
+        let decimals = (4 - x.abs().log10().floor() as i32).max(0) as usize;
+        let text = format!("{x:.decimals$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    } else {
+        format!("{x:.3e}")
+    };
+    digits.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_five_digits() {
+        for (x, text) in [(1.25, "1.25"), (0.75, "0.75"), (123456.0, "123456"), (-2.13e-5, "−2.130e−5"), (0.0, "0")]
+        {
+            assert_eq!(number(x), text);
+        }
+        assert_eq!(number(0.0308123), "0.030812");
+    }
+
+    #[test]
+    fn a_name_is_found_by_the_longest_end_of_its_path() {
+        assert_eq!(name("front.error_linf"), "largest error of the front");
+        assert_eq!(name("interface.contraction.observed"), "contraction, observed");
+        assert_eq!(name("work.newton_iterations"), "newton iterations");
+    }
+
+    /// Three reports stand side by side, a hundred iterations below each other; a record may lack a value.
+    #[test]
+    fn few_records_are_columns_and_many_are_rows() {
+        let summary = serde_json::json!({"reports": [{"t": 0.5, "error": {"l2": 1e-3}}, {"t": 1.0}]});
+        let table = of(summary.as_object().unwrap()).remove(0);
+        assert_eq!(table.head, ["t", "0.5", "1"]);
+        assert_eq!(table.rows, [["root mean square error", "0.001", "–"]]);
+        let iterations: Vec<Value> = (0..100).map(|n| serde_json::json!({"n": n, "increment": 0.5})).collect();
+        let summary = serde_json::json!({"iterations": iterations});
+        let table = of(summary.as_object().unwrap()).remove(0);
+        assert_eq!((table.head.len(), table.rows.len()), (2, 100));
+    }
+}

@@ -1,0 +1,228 @@
+use super::Picture;
+use super::picture::{FONT, picture};
+use plotters::coord::combinators::LogCoord;
+use plotters::coord::ranged1d::ValueFormatter;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::{FontStyle, register_font};
+
+/// Curves over linear or logarithmic axes, drawn as SVG and PNG.
+#[derive(Debug, Clone, Default)]
+pub struct Figure {
+    /// What it shows.
+    pub title: String,
+    /// Of the axis along the bottom, and of the one along the side.
+    pub labels: [String; 2],
+    /// Of the same axes.
+    pub scales: [Scale; 2],
+    /// The curves.
+    pub curves: Vec<Curve>,
+}
+
+/// Of an axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Scale {
+    /// Powers of ten; values of 0 or less are left out.
+    #[default]
+    Logarithmic,
+    /// Equal steps.
+    Linear,
+}
+
+/// One curve of a [`Figure`].
+#[derive(Debug, Clone, Default)]
+pub struct Curve {
+    /// What the legend says.
+    pub name: String,
+    /// Measured points, as filled marks.
+    pub points: Vec<[f64; 2]>,
+    /// Points that were not measured, as open marks; lines through all of them, from left to right.
+    pub extrapolated: Vec<[f64; 2]>,
+    /// A line alone, without marks, in the order of the points.
+    pub plain: bool,
+    /// Thin and grey: what is there beside what is meant.
+    pub faint: bool,
+}
+
+/// Colours that are told apart by everybody: Okabe and Ito (2008).
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+];
+const SIZE: (u32, u32) = (760, 520);
+/// Parts of a pixel: the drawing library places by whole numbers.
+const FINE: u32 = 8;
+/// More marks than this are small.
+const MANY: usize = 40;
+/// Share of an axis that a legend may take.
+const CORNER: f64 = 0.4;
+/// Room around the points, as a factor.
+const ROOM: f64 = 1.1;
+
+impl Figure {
+    /// Draws it.
+    pub fn draw(&self) -> Picture {
+        picture(self.svg())
+    }
+
+    /// Draws it for a page that has the font.
+    pub fn svg(&self) -> String {
+        let mut svg = String::new();
+        self.plot(&mut svg).expect("drawing into memory cannot fail");
+        // shown at its size, in units that are finer
+        let size = |fine: u32| format!("width=\"{}\" height=\"{}\"", SIZE.0 * fine, SIZE.1 * fine);
+        svg.replacen(&size(FINE), &size(1), 1)
+    }
+
+    fn plot(&self, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+        use Scale::{Linear, Logarithmic};
+        let range = |d: usize| self.ends(d)[0]..self.ends(d)[1];
+        let plain = |d: usize| RangedCoordf64::from(range(d));
+        let log = |d: usize| LogCoord::from(range(d).log_scale());
+        match self.scales {
+            [Logarithmic, Logarithmic] => self.chart(svg, log(0), log(1)),
+            [Linear, Logarithmic] => self.chart(svg, plain(0), log(1)),
+            [Logarithmic, Linear] => self.chart(svg, log(0), plain(1)),
+            [Linear, Linear] => self.chart(svg, plain(0), plain(1)),
+        }
+    }
+
+    /// Whether a point has a place.
+    fn shown(&self, point: &&[f64; 2]) -> bool {
+        let placed = |d: usize| point[d].is_finite() && (self.scales[d] == Scale::Linear || point[d] > 0.0);
+        placed(0) && placed(1)
+    }
+
+    /// From where to where an axis goes: around the points, and from power to power where it is logarithmic.
+    fn ends(&self, d: usize) -> [f64; 2] {
+        let points = self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
+        let around = |[low, high]: [f64; 2], p: &[f64; 2]| [low.min(p[d]), high.max(p[d])];
+        let [low, high] = points.filter(|p| self.shown(p)).fold([f64::INFINITY, f64::NEG_INFINITY], around);
+        match self.scales[d] {
+            _ if low > high => [1.0, 10.0],
+            // a little more, so that the powers at both ends are marked
+            Scale::Logarithmic => {
+                [whole(low / ROOM, f64::floor) * (1.0 - 1e-9), whole(high * ROOM, f64::ceil) * (1.0 + 1e-9)]
+            }
+            Scale::Linear if low == high => [low - 0.5, high + 0.5],
+            Scale::Linear => [low, high],
+        }
+    }
+
+    /// The corner of the plot in which the fewest points lie.
+    fn free_corner(&self) -> SeriesLabelPosition {
+        let on = |x: f64, d: usize| if self.scales[d] == Scale::Linear { x } else { x.log10() };
+        let ends = [0, 1].map(|d| self.ends(d).map(|end| on(end, d)));
+        let place = |p: &[f64; 2], d: usize| (on(p[d], d) - ends[d][0]) / (ends[d][1] - ends[d][0]);
+        let inside = |[right, top]: [bool; 2]| {
+            let points = self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
+            let near = |at: f64, end: bool| if end { 1.0 - at } else { at } < CORNER;
+            points.filter(|p| self.shown(p) && near(place(p, 0), right) && near(place(p, 1), top)).count()
+        };
+        let corners = [
+            ([true, true], SeriesLabelPosition::UpperRight),
+            ([false, false], SeriesLabelPosition::LowerLeft),
+            ([true, false], SeriesLabelPosition::LowerRight),
+            ([false, true], SeriesLabelPosition::UpperLeft),
+        ];
+        let free = corners.into_iter().min_by_key(|(corner, _)| inside(*corner));
+        free.map_or(SeriesLabelPosition::UpperRight, |(_, position)| position)
+    }
+
+    fn chart<X, Y>(&self, svg: &mut String, x: X, y: Y) -> Result<(), Box<dyn std::error::Error>>
+    where
+        X: Ranged<ValueType = f64> + ValueFormatter<f64> + 'static,
+        Y: Ranged<ValueType = f64> + ValueFormatter<f64> + 'static,
+    {
+        // a font that is registered twice stays the same
+        let _ = register_font("DejaVu Sans", FontStyle::Normal, FONT);
+        let font = |size: u32| ("DejaVu Sans", size * FINE).into_font();
+        let area = SVGBackend::with_string(svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
+        area.fill(&WHITE)?;
+        // room between the title and the plot
+        let below = area.titled(&self.title, font(17))?.margin(4 * FINE as i32, 0, 0, 0);
+        let mut chart = ChartBuilder::on(&below)
+            .margin(14 * FINE)
+            .margin_right(24 * FINE)
+            .x_label_area_size(46 * FINE)
+            .y_label_area_size(74 * FINE)
+            .build_cartesian_2d(x, y)?;
+        let [along, up] = self.scales;
+        chart
+            .configure_mesh()
+            .x_desc(&self.labels[0])
+            .y_desc(&self.labels[1])
+            .label_style(font(14))
+            .axis_desc_style(font(15))
+            .axis_style(BLACK.stroke_width(FINE))
+            .set_all_tick_mark_size(5 * FINE)
+            .bold_line_style(BLACK.mix(0.15).stroke_width(FINE))
+            .light_line_style(BLACK.mix(0.04).stroke_width(FINE))
+            .x_max_light_lines(between(along))
+            .y_max_light_lines(between(up))
+            .x_label_formatter(&|x| label(*x, along))
+            .y_label_formatter(&|y| label(*y, up))
+            .draw()?;
+        for (curve, colour) in self.curves.iter().zip(COLOURS.iter().cycle()) {
+            let measured = || curve.points.iter().filter(|p| self.shown(p)).map(|p| (p[0], p[1]));
+            let open = || curve.extrapolated.iter().filter(|p| self.shown(p)).map(|p| (p[0], p[1]));
+            let mut line: Vec<(f64, f64)> = measured().chain(open()).collect();
+            if !curve.plain {
+                line.sort_by(|a, b| a.0.total_cmp(&b.0));
+            }
+            let style = if curve.faint { BLACK.mix(0.25).stroke_width(FINE) } else { colour.stroke_width(2 * FINE) };
+            let drawn = chart.draw_series(LineSeries::new(line, style))?;
+            if !curve.name.is_empty() {
+                drawn.label(&curve.name).legend(move |(x, y)| {
+                    PathElement::new(vec![(x, y), (x + 22 * FINE as i32, y)], colour.stroke_width(2 * FINE))
+                });
+            }
+            if !curve.plain {
+                let size = FINE * if measured().count() > MANY { 2 } else { 4 };
+                chart.draw_series(measured().map(|p| Circle::new(p, size, colour.filled())))?;
+                chart.draw_series(open().map(|p| Circle::new(p, 5 * FINE, colour.stroke_width(2 * FINE))))?;
+            }
+        }
+        if self.curves.iter().any(|curve| !curve.name.is_empty()) {
+            chart
+                .configure_series_labels()
+                .label_font(font(14))
+                .background_style(WHITE.mix(0.9))
+                .border_style(BLACK.mix(0.4).stroke_width(FINE))
+                .margin(8 * FINE)
+                .legend_area_size(30 * FINE)
+                .position(self.free_corner())
+                .draw()?;
+        }
+        area.present()?;
+        Ok(())
+    }
+}
+
+/// The next power of ten, down or up.
+fn whole(x: f64, round: fn(f64) -> f64) -> f64 {
+    10_f64.powf(round(x.log10()))
+}
+
+/// Lines between the numbers of an axis.
+fn between(scale: Scale) -> usize {
+    if scale == Scale::Linear { 1 } else { 10 }
+}
+
+/// A number on an axis, as 0.01 or as 1e-5; nothing for those that would stand too close together.
+fn label(x: f64, scale: Scale) -> String {
+    if scale == Scale::Linear {
+        // a sum of steps has rounding in it
+        return format!("{}", (x * 1e9).round() / 1e9);
+    }
+    let text = format!("{x:.3e}").replacen(".000e", "e", 1);
+    match text.split('e').next() {
+        Some("1" | "2" | "5") if (0.0099..1.1e4).contains(&x) => format!("{}", (x * 1e6).round() / 1e6),
+        Some("1" | "2" | "5") => text,
+        _ => String::new(),
+    }
+}

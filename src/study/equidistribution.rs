@@ -1,0 +1,546 @@
+//! Studies of kind `equidistribution`: what they say.
+
+use super::mapped::parse;
+use super::{Header, Output, Source};
+use crate::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Measure, Method, Robin, Stop, Sweep, pieces};
+use crate::error::{Error, Failure, Result};
+use crate::kind::kinds;
+use crate::setting::{fixed, pair};
+use crate::simulation::{FramesAt, Schedule};
+use serde::{Deserialize, Serialize};
+
+/// A study of kind `equidistribution`: a mesh on a line, and the Schwarz methods for it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EquidistributionStudy {
+    /// `[study]`.
+    pub study: Header,
+    /// `[domain]`.
+    #[serde(default)]
+    pub domain: LineDomain,
+    /// `[grid]`.
+    pub grid: LineGrid,
+    /// `[density]`.
+    pub density: LineDensityKind,
+    /// `[equidistribution]`.
+    #[serde(default)]
+    pub equidistribution: Discretization,
+    /// `[schwarz]`; one solve on the whole line where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub schwarz: Option<SchwarzTable>,
+    /// `[start]`.
+    #[serde(default)]
+    pub start: Start,
+    /// `[stop]`.
+    #[serde(default)]
+    pub stop: StopTable,
+    /// `[time]`: the mesh moves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<LineTime>,
+    /// `[output]`.
+    #[serde(default)]
+    pub output: Output,
+}
+
+/// `[domain]`: the ends of the line.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LineDomain {
+    /// Where it begins.
+    #[serde(deserialize_with = "fixed")]
+    pub lower: [f64; 1],
+    /// Where it ends.
+    #[serde(deserialize_with = "fixed")]
+    pub upper: [f64; 1],
+}
+
+impl Default for LineDomain {
+    fn default() -> Self {
+        Self { lower: [0.0], upper: [1.0] }
+    }
+}
+
+/// `[grid]`.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineGrid {
+    /// Cells of the line.
+    #[serde(deserialize_with = "fixed")]
+    pub cells: [usize; 1],
+}
+
+kinds! {
+    /// The density of a line, as a study names it.
+    LineDensityKind {
+        "formula" = LineFormula: "M itself, a formula of x and t",
+        "arclength" = LineArclength: "√(1 + u_x²) for u, a formula of x and t",
+    }
+}
+
+/// `[density]` of kind `formula`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineFormula {
+    /// M.
+    pub value: String,
+}
+
+/// `[density]` of kind `arclength`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineArclength {
+    /// u.
+    pub of: String,
+}
+
+impl LineDensityKind {
+    /// The density itself.
+    ///
+    /// # Errors
+    /// [`Error::Formula`].
+    pub fn density(&self) -> Result<LineDensity> {
+        match self {
+            Self::LineFormula(LineFormula { value }) => LineDensity::formula(value),
+            Self::LineArclength(LineArclength { of }) => LineDensity::arclength(of),
+        }
+    }
+
+    fn setting(&self) -> (&'static str, &str) {
+        match self {
+            Self::LineFormula(LineFormula { value }) => ("density.value", value),
+            Self::LineArclength(LineArclength { of }) => ("density.of", of),
+        }
+    }
+}
+
+/// `[equidistribution]`.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Discretization {
+    /// Mean of M over a cell.
+    pub face_density: FaceDensity,
+}
+
+/// `[schwarz]`: a method with its options, and one way to divide the line.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SchwarzTable {
+    /// What is exchanged.
+    pub method: MethodName,
+    /// In which order; classical.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<Sweep>,
+    /// M of the last iterate; classical.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linearized: Option<bool>,
+    /// Between sweeps; classical.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coarse: Option<Coarse>,
+    /// p; optimized.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robin: Option<Robin>,
+    /// Of S₁ and S₂; optimal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integral: Option<Integral>,
+    /// Two subdomains, \[0, β\] and \[α, 1\], as \[α, β\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overlap: Option<Interval>,
+    /// Any that overlap.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals: Option<Vec<Interval>>,
+    /// Two that meet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cut: Option<f64>,
+    /// Any that meet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cuts: Option<Vec<f64>>,
+    /// So many of equal width.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subdomains: Option<usize>,
+    /// What these overlap by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overlap_cells: Option<usize>,
+}
+
+/// Two places in ξ.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Interval(#[serde(deserialize_with = "pair")] pub [f64; 2]);
+
+/// What subdomains exchange.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MethodName {
+    /// Values.
+    #[default]
+    Classical,
+    /// The flux of the rest of the domain.
+    Optimal,
+    /// F ± p x.
+    Optimized,
+}
+
+impl MethodName {
+    /// Name and description of every method.
+    pub const KINDS: &[(&str, &str)] = &[
+        ("classical", "overlapping subdomains with each other's values at their ends"),
+        ("optimal", "the flux of the rest of the domain at cuts: as many iterations as subdomains"),
+        ("optimized", "F ± p x at cuts, with p given, \"auto\" or \"lagged\""),
+    ];
+}
+
+/// How S₁ and S₂ are integrated.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Integral {
+    /// To round-off.
+    #[default]
+    Exact,
+    /// By so many panels.
+    Trapezoid(usize),
+}
+
+/// `[start]`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Start {
+    /// The first mesh; equidistributed where the mesh moves, else uniform.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<FirstMesh>,
+}
+
+/// The first mesh.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FirstMesh {
+    /// Equal cells.
+    Uniform,
+    /// The discrete solution on the whole line, at the first time.
+    Equidistributed,
+    /// A formula of xi from 0 to 1, between the ends of the line.
+    Formula(String),
+}
+
+/// `[stop]`.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StopTable {
+    /// So many; at most so many where there is a tolerance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<usize>,
+    /// Of what is measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
+    /// What is measured.
+    pub measure: Measure,
+}
+
+/// `[time]`: x_t = (1/τ)(M x_ξ)_ξ by backward Euler.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineTime {
+    /// Time of the first mesh.
+    pub start: f64,
+    /// Time of the last.
+    pub end: f64,
+    /// Longest step; steps are equal.
+    pub step: f64,
+    /// τ.
+    pub relaxation: f64,
+}
+
+const ITERATIONS: usize = 500;
+const TOLERANCE: f64 = 1e-10;
+const MAX_ITERATIONS: usize = 1_000_000;
+/// Memory for each cell, measured at a million of them, and a reserve.
+const BYTES_PER_CELL: u128 = 1000;
+/// Meshes kept of a run in time where nothing is said.
+const FRAMES_BY_DEFAULT: usize = 100;
+
+impl EquidistributionStudy {
+    /// Reads and checks a study, every default filled in.
+    ///
+    /// # Errors
+    /// [`Error::Study`] at the place of the first mistake.
+    pub fn from_source(source: &Source) -> Result<Self> {
+        let mut study: Self = source.parse()?;
+        study.resolve().map_err(|error| source.locate(error))?;
+        Ok(study)
+    }
+
+    /// Checks all settings and fills in the defaults that depend on others.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] or [`Error::Formula`] with the dotted key.
+    pub fn resolve(&mut self) -> Result<()> {
+        self.study.check_name()?;
+        let LineDomain { lower: [a], upper: [b] } = self.domain;
+        if !(a.is_finite() && b.is_finite() && a < b) {
+            return Err(Error::invalid(
+                "domain.upper",
+                format!("[{b}]"),
+                format!("must lie above domain.lower = [{a}]"),
+            ));
+        }
+        let [cells] = self.grid.cells;
+        if cells < 2 {
+            return Err(Error::invalid("grid.cells", format!("[{cells}]"), "must be 2 or more"));
+        }
+        super::memory::check(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
+        self.resolve_time()?;
+        self.check_density()?;
+        if let Some(schwarz) = &mut self.schwarz {
+            schwarz.resolve(self.time.is_some()).map_err(|error| error.within("schwarz"))?;
+            schwarz.ranges(cells).map_err(|error| error.within("schwarz"))?;
+        }
+        self.resolve_stop().map_err(|error| error.within("stop"))?;
+        let first = if self.time.is_some() { FirstMesh::Equidistributed } else { FirstMesh::Uniform };
+        self.start.mesh.get_or_insert(first);
+        self.given_start().map(|_| ())
+    }
+
+    fn resolve_time(&mut self) -> Result<()> {
+        let Some(time) = self.time else {
+            return match self.output.frames {
+                None => Ok(()),
+                Some(_) => Err(Error::invalid("output.frames", "given", "needs [time]; leave it out")),
+            };
+        };
+        let schedule = time.schedule()?;
+        if !(time.relaxation.is_finite() && time.relaxation > 0.0) {
+            return Err(Error::invalid("time.relaxation", time.relaxation, "must be above 0"));
+        }
+        let steps = schedule.steps().unwrap_or(1);
+        let frames = self.output.frames.get_or_insert(FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)));
+        frames.check([time.start, time.end]).map_err(|error| error.within("output"))
+    }
+
+    /// Refuses a density that is not positive everywhere, at the first and the last time.
+    fn check_density(&self) -> Result<()> {
+        let density = self.density.density().map_err(|error| error.within("density"))?;
+        let ends = self.line(density.clone()).ends;
+        let times = self.time.map_or([0.0; 2], |time| [time.start, time.end]);
+        for t in times {
+            if let Err(failure) = density.extremes(t, ends) {
+                let (key, text) = self.density.setting();
+                let rule = match failure {
+                    Failure::LineDensity { what, value, x, t } => {
+                        let when = if self.time.is_some() { format!(", t = {t}") } else { String::new() };
+                        let rule = if what == "M" { "it must be finite and above 0" } else { "it must be bounded" };
+                        format!("{what} is {value:.1e} at x = {x}{when}; {rule} on the whole line")
+                    }
+                    other => other.to_string(),
+                };
+                return Err(Error::invalid(key, format!("{text:?}"), rule));
+            }
+        }
+        Ok(())
+    }
+
+    fn resolve_stop(&mut self) -> Result<()> {
+        let stop = &mut self.stop;
+        match (stop.iterations, stop.tolerance) {
+            (Some(0), _) => return Err(Error::invalid("iterations", 0, "must be 1 or more")),
+            (Some(n), _) if n > MAX_ITERATIONS => {
+                return Err(Error::invalid("iterations", n, format!("must be at most {MAX_ITERATIONS}")));
+            }
+            (_, Some(tolerance)) if !(tolerance.is_finite() && tolerance > 0.0) => {
+                return Err(Error::invalid("tolerance", tolerance, "must be above 0"));
+            }
+            (None, None) => stop.tolerance = Some(TOLERANCE),
+            _ => {}
+        }
+        stop.iterations.get_or_insert(ITERATIONS);
+        Ok(())
+    }
+
+    fn line(&self, density: LineDensity) -> Line {
+        let ends = [self.domain.lower[0], self.domain.upper[0]];
+        Line { density, face: self.equidistribution.face_density, cells: self.grid.cells[0], ends }
+    }
+
+    /// The line itself.
+    ///
+    /// # Errors
+    /// [`Error::Formula`].
+    pub fn problem(&self) -> Result<Line> {
+        Ok(self.line(self.density.density().map_err(|error| error.within("density"))?))
+    }
+
+    /// The method and the subdomains, where there are any.
+    ///
+    /// # Errors
+    /// As [`EquidistributionStudy::resolve`].
+    pub fn decomposition(&self) -> Result<Option<(Method, Vec<[usize; 2]>)>> {
+        let Some(schwarz) = &self.schwarz else { return Ok(None) };
+        let ranges = schwarz.ranges(self.grid.cells[0]).map_err(|error| error.within("schwarz"))?;
+        Ok(Some((schwarz.method(), ranges)))
+    }
+
+    /// When an iteration ends.
+    pub fn until(&self) -> Stop {
+        let StopTable { iterations, tolerance, measure } = self.stop;
+        Stop { iterations: iterations.unwrap_or(ITERATIONS), tolerance, measure }
+    }
+
+    /// The first mesh, where it is not a solution.
+    fn given_start(&self) -> Result<Option<Vec<f64>>> {
+        let line = self.problem()?;
+        let Some(FirstMesh::Formula(text)) = &self.start.mesh else {
+            return Ok((self.start.mesh != Some(FirstMesh::Equidistributed)).then(|| line.uniform()));
+        };
+        let key = "start.mesh.formula";
+        let formula = parse(key, text, &["xi"])?;
+        let [first, last] = [0.0, 1.0].map(|xi| formula.eval(&[xi]));
+        if (first, last) != (0.0, 1.0) {
+            let rule = format!("must go from 0 to 1, but is {first} at xi = 0 and {last} at xi = 1");
+            return Err(Error::invalid(key, format!("{text:?}"), rule));
+        }
+        let mesh = line.mapped(|xi| formula.eval(&[xi]));
+        line.check_mesh(key, &mesh)?;
+        Ok(Some(mesh))
+    }
+
+    /// The first mesh.
+    ///
+    /// # Errors
+    /// As [`Line::solve`].
+    pub fn first(&self, line: &Line) -> Result<Vec<f64>> {
+        match self.given_start()? {
+            Some(mesh) => Ok(mesh),
+            None => Ok(line.solve(self.time.map_or(0.0, |time| time.start), &line.uniform(), None)?.0),
+        }
+    }
+
+    /// Memory that the run needs, in bytes.
+    pub fn memory(&self) -> u128 {
+        self.grid.cells[0] as u128 * BYTES_PER_CELL
+    }
+
+    /// The study as a file, every default filled in.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a study is plain data")
+    }
+}
+
+impl LineTime {
+    /// The times of all steps.
+    ///
+    /// # Errors
+    /// As [`Schedule::new`], with keys below `time`.
+    pub fn schedule(&self) -> Result<Schedule> {
+        Schedule::new(self.start, self.end, self.step, Vec::new()).map_err(|error| error.within("time"))
+    }
+}
+
+impl SchwarzTable {
+    /// Refuses options of another method, and fills in this one's.
+    fn resolve(&mut self, in_time: bool) -> Result<()> {
+        use MethodName::{Classical, Optimal, Optimized};
+        let options = [
+            ("sweep", self.sweep.is_some(), Classical),
+            ("linearized", self.linearized.is_some(), Classical),
+            ("coarse", self.coarse.is_some(), Classical),
+            ("robin", self.robin.is_some(), Optimized),
+            ("integral", self.integral.is_some(), Optimal),
+        ];
+        if let Some((key, ..)) = options.iter().find(|(_, given, of)| *given && *of != self.method) {
+            let rule = format!("is no option of the method {:?}; leave it out", self.method).to_lowercase();
+            return Err(Error::invalid(*key, "given", rule));
+        }
+        match self.method {
+            Classical => {
+                let sweep = *self.sweep.get_or_insert_default();
+                self.linearized.get_or_insert(false);
+                if *self.coarse.get_or_insert_default() == Coarse::Galerkin && sweep == Sweep::Alternating {
+                    let rule = "corrects all subdomains at once; set schwarz.sweep to \"parallel\"";
+                    return Err(Error::invalid("coarse", "\"galerkin\"", rule));
+                }
+            }
+            _ if in_time => {
+                let rule = "knows no time; leave [time] out, or set it to \"classical\"";
+                return Err(Error::invalid("method", format!("\"{:?}\"", self.method).to_lowercase(), rule));
+            }
+            Optimal => {
+                if *self.integral.get_or_insert_default() == Integral::Trapezoid(0) {
+                    return Err(Error::invalid("integral.trapezoid", 0, "must be 1 panel or more"));
+                }
+            }
+            Optimized => {
+                if let Robin::Value(p) = *self.robin.get_or_insert(Robin::Auto)
+                    && !(p.is_finite() && p > 0.0)
+                {
+                    return Err(Error::invalid("robin", p, "p must be above 0, or \"auto\" or \"lagged\""));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn method(&self) -> Method {
+        match self.method {
+            MethodName::Classical => Method::Classical {
+                sweep: self.sweep.unwrap_or_default(),
+                linearized: self.linearized.unwrap_or_default(),
+                coarse: self.coarse.unwrap_or_default(),
+            },
+            MethodName::Optimal => match self.integral {
+                Some(Integral::Trapezoid(panels)) => Method::Optimal { panels: Some(panels) },
+                _ => Method::Optimal { panels: None },
+            },
+            MethodName::Optimized => Method::Optimized { robin: self.robin.unwrap_or(Robin::Auto) },
+        }
+    }
+
+    fn ranges(&self, cells: usize) -> Result<Vec<[usize; 2]>> {
+        let given = [
+            ("overlap", self.overlap.is_some()),
+            ("intervals", self.intervals.is_some()),
+            ("cut", self.cut.is_some()),
+            ("cuts", self.cuts.is_some()),
+            ("subdomains", self.subdomains.is_some()),
+        ];
+        let given: Vec<&str> = given.into_iter().filter(|(_, given)| *given).map(|(key, _)| key).collect();
+        let [key] = given[..] else {
+            let ways = "the line is divided by exactly one of overlap, intervals, cut, cuts and subdomains";
+            return Err(match given.get(1) {
+                Some(second) => Error::invalid(*second, "given", format!("{} is too; {ways}", given[0])),
+                None => Error::invalid("overlap", "not given", format!("{ways}; give one, such as [0.45, 0.55]")),
+            });
+        };
+        if self.overlap_cells.is_some() && key != "subdomains" {
+            return Err(Error::invalid("overlap_cells", "given", "goes with schwarz.subdomains only; leave it out"));
+        }
+        let node = |key: String, xi: f64| pieces::node(&key, xi, cells);
+        let nodes = |key: String, Interval(ends): Interval| -> Result<[usize; 2]> {
+            Ok([node(format!("{key}[0]"), ends[0])?, node(format!("{key}[1]"), ends[1])?])
+        };
+        let cut = |inner: Vec<usize>| {
+            let ends = [vec![0], inner, vec![cells]].concat();
+            ends.windows(2).map(|ends| [ends[0], ends[1]]).collect()
+        };
+        let ranges: Vec<[usize; 2]> = match self {
+            Self { overlap: Some(overlap @ Interval([alpha, beta])), .. } => {
+                let [first, last] = nodes("overlap".into(), *overlap)?;
+                if first > last {
+                    let rule = format!(
+                        "the subdomains are [0, {beta}] and [{alpha}, 1], which overlap only where the first number is the lower one"
+                    );
+                    return Err(Error::invalid("overlap", format!("[{alpha}, {beta}]"), rule));
+                }
+                vec![[0, last], [first, cells]]
+            }
+            Self { intervals: Some(intervals), .. } => {
+                let each = intervals.iter().enumerate();
+                each.map(|(s, interval)| nodes(format!("intervals[{s}]"), *interval)).collect::<Result<_>>()?
+            }
+            Self { cut: Some(xi), .. } => cut(vec![node("cut".into(), *xi)?]),
+            Self { cuts: Some(cuts), .. } => {
+                let each = cuts.iter().enumerate();
+                cut(each.map(|(s, xi)| node(format!("cuts[{s}]"), *xi)).collect::<Result<_>>()?)
+            }
+            _ => pieces::equal(cells, self.subdomains.unwrap_or(1), self.overlap_cells.unwrap_or(0))?,
+        };
+        pieces::check(key, &ranges, cells, self.method())?;
+        Ok(ranges)
+    }
+}

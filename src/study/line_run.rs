@@ -1,0 +1,479 @@
+//! Studies of kind `equidistribution`: how they run, and what they leave.
+
+use super::EquidistributionStudy;
+use crate::equidistribution::{History, Iterate, Line};
+use crate::error::{Error, Failure, Moment, Result};
+use crate::report;
+use crate::simulation::{Curve, Failed, Figure, Parallel, RunDirectory, Scale};
+use ndarray::{Array1, Array2, arr0};
+use ndarray_npy::{NpzWriter, WriteNpzError};
+use serde::Serialize;
+use std::io::Cursor;
+use std::path::Path;
+use std::time::Instant;
+
+/// `summary.json` of a study of kind `equidistribution`.
+#[derive(Debug, Clone, Serialize)]
+pub struct EquidistributionSummary {
+    /// Version of this format.
+    pub schema: u32,
+    /// Name of the study.
+    pub study: String,
+    /// `equidistribution`.
+    pub kind: String,
+    /// Version of the program.
+    pub version: String,
+    /// `running`, `completed`, `not-converged` or `failed`.
+    pub status: String,
+    /// What failed and when, if something did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<Failed>,
+    /// Where the time went.
+    pub seconds: LineSeconds,
+    /// What the run had at its disposal.
+    pub parallel: Parallel,
+    /// What it cost.
+    pub work: LineWork,
+    /// Of the last mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<LineQuality>,
+    /// The start and every iterate; in time those of the last step.
+    pub iterations: Vec<NumberedIterate>,
+    /// Contraction in two iterations; in time that of the last step.
+    pub rate: Rate,
+    /// Whether the tolerance was met, in time in every step; null where none is asked for.
+    pub converged: Option<bool>,
+    /// The first iterate that meets it.
+    pub iterations_to_tolerance: Option<usize>,
+    /// In time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations_per_step: Option<PerStep>,
+    /// The last mesh, glued from the subdomains.
+    pub mesh: Vec<f64>,
+}
+
+/// Seconds by part.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct LineSeconds {
+    /// By the clock.
+    pub wall: f64,
+    /// Solving, the single-domain solution for comparison included.
+    pub mesh: f64,
+    /// Writing.
+    pub output: f64,
+}
+
+/// What a run cost.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct LineWork {
+    /// Time steps.
+    pub steps: usize,
+    /// Linear solves of the subdomains, or of the whole line where there are none.
+    pub linear_solves: usize,
+}
+
+/// Of a mesh.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct LineQuality {
+    /// max/mean of ∫M over the cells, by trapezoids.
+    pub equidistribution: f64,
+    /// Shortest cell over the mean one.
+    pub shortest_cell: f64,
+    /// Largest distance from the continuous mesh, of up to a thousand nodes; not in time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_linf: Option<f64>,
+}
+
+/// An iterate.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct NumberedIterate {
+    /// Its number; the start is 0.
+    pub n: usize,
+    /// Largest distance from the discrete single-domain mesh, over the subdomains.
+    pub error_linf: f64,
+    /// Largest change since the iterate before.
+    pub increment: f64,
+    /// Largest error of linear interpolation on the glued mesh.
+    pub interpolation_error: Option<f64>,
+    /// 2 max |u_i − u_{i−1}| of it.
+    pub largest_jump: Option<f64>,
+    /// So far.
+    pub linear_solves: usize,
+}
+
+/// Contraction of the error.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Rate {
+    /// As the iterates show it.
+    pub observed: Option<f64>,
+    /// By theory.
+    pub predicted: Option<f64>,
+    /// By theory at most.
+    pub bound: Option<f64>,
+    /// Iterations that it is of.
+    pub stride: usize,
+}
+
+/// Iterations in a time step.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct PerStep {
+    /// Mean over the steps.
+    pub mean: f64,
+    /// Fewest.
+    pub min: usize,
+    /// Most.
+    pub max: usize,
+}
+
+/// What a run left behind.
+#[derive(Debug)]
+pub struct LineFinished {
+    /// What `summary.json` holds.
+    pub summary: EquidistributionSummary,
+    /// What was computed.
+    pub evolution: Evolution,
+    /// Why the run is no success, if it is none.
+    pub failure: Option<Error>,
+}
+
+/// What was computed, as far as it came.
+#[derive(Debug, Clone, Default)]
+pub struct Evolution {
+    /// Times of the meshes kept, the first and the last among them; 0 and 0 where there is no time.
+    pub times: Vec<f64>,
+    /// The meshes.
+    pub meshes: Vec<Vec<f64>>,
+    /// How the iteration of each step went, in a line; none without subdomains.
+    pub steps: Vec<StepRow>,
+    /// The last of these iterations.
+    pub last: Option<History>,
+    /// Steps done.
+    pub done: usize,
+    /// Linear solves in them.
+    pub linear_solves: usize,
+}
+
+/// A step in `history.csv`.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct StepRow {
+    /// Time.
+    pub t: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// Error of the last against the discrete single-domain mesh.
+    pub error_linf: f64,
+    /// Contraction in two iterations.
+    pub observed_rate: Option<f64>,
+    /// By theory at most.
+    pub bound: Option<f64>,
+}
+
+/// Nodes compared with the continuous mesh.
+const COMPARED: usize = 1000;
+/// Points of a curve.
+const DRAWN: usize = 400;
+/// Paths of nodes drawn in time.
+const PATHS: usize = 40;
+
+impl EquidistributionStudy {
+    /// Solves, or moves the mesh through time.
+    ///
+    /// # Errors
+    /// [`Error::Failed`], also where an iteration misses its tolerance; `evolution` then holds what was done.
+    pub fn compute(&self, line: &Line, evolution: &mut Evolution) -> Result<()> {
+        let schedule = self.time.map(|time| time.schedule()).transpose()?;
+        let (steps, start) = schedule.as_ref().map_or((1, 0.0), |s| (s.steps().unwrap_or(1), s.time(0)));
+        let divided = self.decomposition()?;
+        let mut mesh = self.first(line)?;
+        (evolution.times, evolution.meshes) = (vec![start], vec![mesh.clone()]);
+        for step in 1..=steps {
+            let [before, t] = schedule.as_ref().map_or([start; 2], |s| [s.time(step - 1), s.time(step)]);
+            let dt = t - before;
+            let during = |error: Error| match (error, self.time) {
+                (Error::Failed { failure, .. }, Some(_)) => Error::Failed { failure, moment: Some(Moment { t, step }) },
+                (other, _) => other,
+            };
+            let old = self.time.map(|time| (mesh.as_slice(), time.relaxation / dt));
+            let next = match &divided {
+                None => {
+                    let (next, solves) = line.solve(t, &mesh, old).map_err(during)?;
+                    evolution.linear_solves += solves;
+                    next
+                }
+                Some((method, ranges)) => {
+                    let history = line.iterate(t, ranges, *method, &mesh, old, self.until()).map_err(during)?;
+                    let (next, missed) = (history.mesh.clone(), history.missed(*method, self.until()));
+                    evolution.tell(t, history);
+                    if let Some(failure) = missed {
+                        return Err(during(failure.into()));
+                    }
+                    next
+                }
+            };
+            mesh = next;
+            evolution.done = step;
+            let kept = self.output.frames.as_ref().is_none_or(|frames| frames.due(step, t, dt));
+            if kept || step == steps {
+                evolution.times.push(t);
+                evolution.meshes.push(mesh.clone());
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs the study into a directory.
+    ///
+    /// # Errors
+    /// Settings out of range, and what hinders writing. What fails in the computation is in [`LineFinished::failure`].
+    pub fn run(&self, directory: &Path) -> Result<LineFinished> {
+        let begin = Instant::now();
+        let mut study = self.clone();
+        study.resolve()?;
+        let line = study.problem()?;
+        let directory = RunDirectory::claim(directory)?;
+        directory.write("study.toml", study.to_toml().as_bytes())?;
+        let mut summary = study.summary();
+        directory.write_summary(&summary)?;
+        let mut evolution = Evolution::default();
+        let clock = Instant::now();
+        let failure = match study.compute(&line, &mut evolution) {
+            Err(error) if !error.is_failure() => return Err(error),
+            outcome => outcome.err(),
+        };
+        summary.seconds.mesh = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        summary.tell(&study, &line, &evolution);
+        summary.failure = failure.as_ref().map(Failed::from);
+        summary.status = match &failure {
+            None => "completed",
+            Some(Error::Failed { failure: Failure::NotConverged { .. }, .. }) => "not-converged",
+            Some(_) => "failed",
+        }
+        .into();
+        keep(&study, &line, &directory, &evolution)?;
+        summary.seconds.output = clock.elapsed().as_secs_f64();
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        directory.write_summary(&summary)?;
+        let clock = Instant::now();
+        report::finish(directory.path(), study.output.report, study.output.animation)?;
+        summary.seconds.output += clock.elapsed().as_secs_f64();
+        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        directory.write_summary(&summary)?;
+        Ok(LineFinished { summary, evolution, failure })
+    }
+
+    fn summary(&self) -> EquidistributionSummary {
+        EquidistributionSummary {
+            schema: 1,
+            study: self.study.name.clone(),
+            kind: "equidistribution".into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            status: "running".into(),
+            failure: None,
+            seconds: LineSeconds::default(),
+            parallel: Parallel { ranks: 1, threads: rayon::current_num_threads() },
+            work: LineWork::default(),
+            quality: None,
+            iterations: Vec::new(),
+            rate: Rate { observed: None, predicted: None, bound: None, stride: 2 },
+            converged: None,
+            iterations_to_tolerance: None,
+            iterations_per_step: None,
+            mesh: Vec::new(),
+        }
+    }
+}
+
+impl Evolution {
+    fn tell(&mut self, t: f64, history: History) {
+        let last = history.iterates[history.count()];
+        self.linear_solves += last.linear_solves;
+        self.steps.push(StepRow {
+            t,
+            iterations: history.count(),
+            error_linf: last.error,
+            observed_rate: history.observed,
+            bound: history.prediction.bound,
+        });
+        self.last = Some(history);
+    }
+
+    /// The last mesh; that of an iteration which missed its tolerance, where one did.
+    pub fn mesh(&self) -> &[f64] {
+        match &self.last {
+            Some(history) => &history.mesh,
+            None => self.meshes.last().map_or(&[], Vec::as_slice),
+        }
+    }
+}
+
+impl EquidistributionSummary {
+    fn tell(&mut self, study: &EquidistributionStudy, line: &Line, evolution: &Evolution) {
+        self.work = LineWork { steps: evolution.done, linear_solves: evolution.linear_solves };
+        self.mesh = evolution.mesh().to_vec();
+        let t = evolution.steps.last().map_or_else(|| *evolution.times.last().unwrap_or(&0.0), |step| step.t);
+        // a mesh of which nothing can be told is one of a failed run, which says so
+        self.quality = LineQuality::of(line, t, &self.mesh, study.time.is_none()).ok();
+        let tolerance = study.until().tolerance;
+        let Some(history) = &evolution.last else { return };
+        self.iterations = history.iterates.iter().enumerate().map(|(n, it)| NumberedIterate::new(n, it)).collect();
+        let prediction = history.prediction;
+        self.rate =
+            Rate { observed: history.observed, predicted: prediction.predicted, bound: prediction.bound, stride: 2 };
+        self.converged = tolerance.map(|_| history.converged);
+        self.iterations_to_tolerance = tolerance.filter(|_| history.converged).map(|_| history.count());
+        if study.time.is_some() {
+            let counts = || evolution.steps.iter().map(|step| step.iterations);
+            self.iterations_per_step = Some(PerStep {
+                mean: counts().sum::<usize>() as f64 / evolution.steps.len() as f64,
+                min: counts().min().unwrap_or(0),
+                max: counts().max().unwrap_or(0),
+            });
+        }
+    }
+}
+
+impl NumberedIterate {
+    fn new(n: usize, iterate: &Iterate) -> Self {
+        let Iterate { error, increment, largest_jump, interpolation_error, linear_solves } = *iterate;
+        Self { n, error_linf: error, increment, interpolation_error, largest_jump, linear_solves }
+    }
+}
+
+impl LineQuality {
+    fn of(line: &Line, t: f64, mesh: &[f64], steady: bool) -> Result<Self> {
+        let m = line.density.at_each(t, mesh)?;
+        let share = |i: usize| 0.5 * (m[i][0] + m[i + 1][0]) * (mesh[i + 1] - mesh[i]);
+        let shares: Vec<f64> = (0..line.cells).map(share).collect();
+        let mean = shares.iter().sum::<f64>() / line.cells as f64;
+        let shortest = mesh.windows(2).map(|x| x[1] - x[0]).fold(f64::INFINITY, f64::min);
+        let compared = |cells: usize| -> Result<f64> {
+            let every = cells.div_ceil(COMPARED);
+            let nodes: Vec<usize> = (0..=cells).step_by(every).collect();
+            let xi: Vec<f64> = nodes.iter().map(|&i| i as f64 / cells as f64).collect();
+            let exact = line.exact(t, &xi)?;
+            Ok(nodes.iter().zip(exact).map(|(&i, exact)| (mesh[i] - exact).abs()).fold(0.0, f64::max))
+        };
+        Ok(Self {
+            equidistribution: shares.iter().copied().fold(0.0, f64::max) / mean,
+            shortest_cell: shortest * line.cells as f64 / (line.ends[1] - line.ends[0]),
+            error_linf: steady.then(|| compared(line.cells)).transpose()?,
+        })
+    }
+}
+
+/// Writes the history, the arrays and the pictures.
+fn keep(study: &EquidistributionStudy, line: &Line, directory: &RunDirectory, evolution: &Evolution) -> Result<()> {
+    let iterates = evolution.last.iter().flat_map(|history| &history.iterates);
+    let table = match study.time {
+        Some(_) => csv_of(&evolution.steps),
+        None => csv_of(iterates.enumerate().map(|(n, iterate)| NumberedIterate::new(n, iterate))),
+    };
+    directory.write("history.csv", &table)?;
+    directory.write("final.npz", &arrays(line, evolution))?;
+    let mut pictures = vec![(
+        "mesh",
+        if study.time.is_some() { paths(study, line, evolution) } else { mapping(study, line, evolution) },
+    )];
+    pictures.extend(evolution.last.as_ref().map(|history| ("convergence", convergence(&study.study.name, history))));
+    for (name, figure) in pictures {
+        let picture = figure.draw();
+        directory.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
+        directory.write(&format!("{name}.png"), &picture.png)?;
+    }
+    Ok(())
+}
+
+fn csv_of<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Vec<u8> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row).expect("writing to memory cannot fail");
+    }
+    writer.into_inner().expect("writing to memory cannot fail")
+}
+
+/// `xi`, `x` and `t` of the last mesh; `times` and `path`, a row a mesh.
+fn arrays(line: &Line, evolution: &Evolution) -> Vec<u8> {
+    let n = line.cells;
+    let write = || -> Result<Vec<u8>, WriteNpzError> {
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
+        npz.add_array("xi", &Array1::from_iter((0..=n).map(|i| i as f64 / n as f64)))?;
+        npz.add_array("x", &Array1::from(evolution.mesh().to_vec()))?;
+        npz.add_array("t", &arr0(*evolution.times.last().unwrap_or(&0.0)))?;
+        npz.add_array("times", &Array1::from(evolution.times.clone()))?;
+        let path = Array2::from_shape_vec((evolution.times.len(), n + 1), evolution.meshes.concat());
+        npz.add_array("path", &path.expect("a mesh has a node more than cells"))?;
+        Ok(npz.finish()?.into_inner())
+    };
+    write().expect("writing to memory cannot fail")
+}
+
+/// Places in a list, the first and the last among them.
+fn thinned(count: usize, most: usize) -> impl Iterator<Item = usize> {
+    let every = count.saturating_sub(1).div_ceil(most).max(1);
+    (0..count).filter(move |i| i % every == 0 || i + 1 == count)
+}
+
+/// x over ξ.
+fn mapping(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Figure {
+    let mesh = evolution.mesh();
+    let points = thinned(mesh.len(), DRAWN).map(|i| [i as f64 / line.cells as f64, mesh[i]]).collect();
+    Figure {
+        title: format!("{}, {} cells", study.study.name, line.cells),
+        labels: ["ξ".into(), "x".into()],
+        scales: [Scale::Linear; 2],
+        curves: vec![Curve { points, plain: line.cells > DRAWN, ..Curve::default() }],
+    }
+}
+
+/// Nodes over time; ends of subdomains with a name.
+fn paths(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Figure {
+    let path = |node: usize| -> Vec<[f64; 2]> {
+        let kept = thinned(evolution.times.len(), DRAWN);
+        kept.map(|k| [evolution.meshes[k][node], evolution.times[k]]).collect()
+    };
+    let ranges = study.decomposition().ok().flatten().map_or(Vec::new(), |(_, ranges)| ranges);
+    let mut ends: Vec<usize> = ranges.iter().flatten().copied().filter(|&i| i > 0 && i < line.cells).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    let mut curves: Vec<Curve> = Vec::new();
+    if ends.len() <= PATHS {
+        for node in &ends {
+            let name = format!("ξ = {}", *node as f64 / line.cells as f64);
+            curves.push(Curve { name, points: path(*node), plain: true, ..Curve::default() });
+        }
+    }
+    for node in thinned(line.cells + 1, PATHS).filter(|node| !ends.contains(node)) {
+        curves.push(Curve { points: path(node), plain: true, faint: true, ..Curve::default() });
+    }
+    Figure {
+        title: format!("{}, paths of nodes", study.study.name),
+        labels: ["x".into(), "t".into()],
+        scales: [Scale::Linear; 2],
+        curves,
+    }
+}
+
+/// Errors over iterations, beside what theory says.
+fn convergence(title: &str, history: &History) -> Figure {
+    let errors: Vec<[f64; 2]> = history.iterates.iter().enumerate().map(|(n, it)| [n as f64, it.error]).collect();
+    let points = thinned(errors.len(), DRAWN).map(|n| errors[n]).collect();
+    let last = errors.len() - 1;
+    let floor = errors.iter().map(|e| e[1]).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
+    let line = |name: &str, rate: Option<f64>, [n, error]: [f64; 2]| {
+        let rate = rate.filter(|rate| *rate > 0.0)?;
+        let points = (0..=last).map(|k| [k as f64, error.max(floor) * rate.powf(0.5 * (k as f64 - n))]);
+        let points = points.filter(|p| (0.1 * floor..10.0 * errors[0][1].max(floor)).contains(&p[1])).collect();
+        Some(Curve { name: format!("{name}, {rate:.4} in two"), points, plain: true, ..Curve::default() })
+    };
+    let mut curves = vec![Curve { name: "error".into(), points, ..Curve::default() }];
+    // a bound holds from the start, what is predicted in the end
+    curves.extend(line("predicted", history.prediction.predicted, errors[last]));
+    curves.extend(line("bound", history.prediction.bound, errors[0]));
+    Figure {
+        title: format!("{title}, convergence"),
+        labels: ["iterations".into(), "distance to the single-domain mesh".into()],
+        scales: [Scale::Linear, Scale::Logarithmic],
+        curves,
+    }
+}

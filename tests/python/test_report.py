@@ -1,0 +1,264 @@
+"""The report of a run as a reader meets it: in headless Chromium, with screenshots in out/screenshots."""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+from selenium import webdriver
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SCREENSHOTS = ROOT / "out/screenshots"
+CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
+
+browser_is_here = pytest.mark.skipif(
+    not (CHROMIUM and DRIVER or os.environ.get("CI")),
+    reason="NO BROWSER: the viewer goes untested; install Debian's chromium and chromium-driver",
+)
+
+
+def study(name, out, *settings):
+    """Runs a study into a directory."""
+    command = [ROOT / "target/release/driftmesh", "run", ROOT / f"studies/{name}.toml", "--quiet", "--out", out]
+    subprocess.run(command + [part for setting in settings for part in ("--set", setting)], check=True)
+    return out
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Case B, short: eleven frames, four subdomains, and a mesh to compare with."""
+    short = ["time.end=0.35", "time.report=[0.3,0.35]", "output.frames.every=10", "mesh.generator.subdomains=[2,2]"]
+    return study("burgers-b-stochastic", tmp_path_factory.mktemp("report") / "out", *short)
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM or "chromium"
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1280,1000"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    browser.set_script_timeout(30)
+    yield browser
+    browser.quit()
+
+
+def opened(browser, directory, dark=False, width=1280):
+    """Opens a report, and waits for its viewer."""
+    scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": scheme})
+    metrics = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": width < 600}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    browser.get(f"file://{directory}/report.html")
+    browser.execute_async_script(
+        "const done = arguments[0], look = () => (window.viewer || !document.getElementById('viewer-data')) ? done() : setTimeout(look, 20); look()"
+    )
+
+
+def screenshot(browser, name):
+    size = browser.execute_cdp_cmd("Page.getLayoutMetrics", {})["cssContentSize"]
+    clip = {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}
+    shot = browser.execute_cdp_cmd("Page.captureScreenshot", {"captureBeyondViewport": True, "clip": clip})
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    (SCREENSHOTS / f"{name}.png").write_bytes(base64.b64decode(shot["data"]))
+
+
+def pixels(browser, canvas=0):
+    """The picture on a canvas, of shape (height, width, 3)."""
+    script = """const c = document.querySelectorAll('.stages canvas')[arguments[0]];
+        return [c.height, c.width, btoa(Array.from(c.getContext('2d').getImageData(0, 0, c.width, c.height).data, (v) => String.fromCharCode(v)).join(''))]"""
+    height, width, data = browser.execute_script(script, canvas)
+    return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3].astype(int)
+
+
+def readout(browser, mesh=0):
+    """Names and texts of what is read at the chosen node."""
+    script = """return Array.from(document.querySelectorAll('.readout dl')[arguments[0]].children,
+        (pair) => [pair.querySelector('dt').textContent, pair.querySelector('dd').textContent])"""
+    return dict(browser.execute_script(script, mesh))
+
+
+def figure(text):
+    return float(text.replace("−", "-"))
+
+
+@browser_is_here
+def test_the_report_loads_plays_and_moves_the_mesh(run, chromium):
+    opened(chromium, run)
+    assert chromium.execute_script("return document.querySelectorAll('.stages canvas').length") == 2
+    last = pixels(chromium)
+    # the slider, as a keyboard moves it
+    slider = chromium.find_element("id", "time")
+    slider.send_keys(webdriver.Keys.HOME)
+    assert "0.25" in chromium.find_element("id", "now").text
+    first = pixels(chromium)
+    assert np.abs(first - last).max(axis=2).astype(bool).mean() > 0.1, "the slider moves the mesh"
+    slider.send_keys(webdriver.Keys.ARROW_RIGHT)
+    assert "0.26" in chromium.find_element("id", "now").text
+    # playing ends at the last frame and changes the picture on the way
+    before = chromium.execute_script("return viewer.drawn")
+    chromium.find_element("id", "play").click()
+    chromium.execute_async_script(
+        "const done = arguments[0], look = () => viewer.playing ? setTimeout(look, 50) : done(); look()"
+    )
+    assert chromium.execute_script("return viewer.drawn") - before > 20
+    assert "0.35" in chromium.find_element("id", "now").text
+    assert np.array_equal(pixels(chromium), last)
+    # what the test itself does, reading pixels back, is slow and warned of
+    complaints = [entry for entry in chromium.get_log("browser") if "readback" not in entry["message"]]
+    assert complaints == []
+
+
+@browser_is_here
+def test_hovering_shows_the_numbers_of_the_frame(run, chromium):
+    opened(chromium, run)
+    frame = pyvista.read(run / "frames/step-000100.vtu")
+    reference = pyvista.read(run / "compare/step-000100.vtu")
+    i, j = 31, 12
+    k = i * 41 + j
+    x, y = frame.points[k, :2]
+    # where the node is on the canvas, by the axes: 62 + 14 pixels beside it, 8 above
+    canvas = chromium.find_element("css selector", ".stages canvas")
+    box = canvas.rect
+    width = box["width"] - 76
+    to = [62 + x * width - box["width"] / 2, 8 + (1 - y) * width - box["height"] / 2]
+    webdriver.ActionChains(chromium).move_to_element_with_offset(canvas, round(to[0]), round(to[1])).perform()
+    for mesh, expected in enumerate((frame, reference)):
+        shown = readout(chromium, mesh)
+        assert shown["node"] == f"({i}, {j})"
+        values = [*expected.points[k, :2], expected["u"][k], expected["rho"][k]]
+        for name, value in zip(("x", "y", "u", "ρ"), values):
+            assert figure(shown[name]) == pytest.approx(value, rel=1e-5, abs=1e-6), name
+        # one of the four cells at the node
+        cells = [a * 40 + b for a in (i - 1, i) for b in (j - 1, j)]
+        assert any(figure(shown["Q of the cell"]) == pytest.approx(expected.cell_data["Q"][c], rel=1e-4) for c in cells)
+        assert any(figure(shown["its Jacobian"]) == pytest.approx(expected.cell_data["jacobian"][c], rel=1e-4) for c in cells)
+
+
+@browser_is_here
+def test_subdomains_colours_zoom_and_keys_change_the_picture(run, chromium):
+    opened(chromium, run)
+    pictures = [pixels(chromium)]
+
+    def changed(what):
+        pictures.append(pixels(chromium))
+        share = np.abs(pictures[-1] - pictures[-2]).max(axis=2).astype(bool).mean()
+        assert share > 0.005, what
+
+    chromium.find_element("id", "cuts").click()
+    changed("interfaces are drawn")
+    chromium.find_element("id", "lines").click()
+    changed("mesh lines are drawn")
+    for field in ("rho", "Q", "Jacobian", "nothing", "u"):
+        chromium.execute_script(
+            "const f = document.getElementById('field'); f.value = arguments[0]; f.dispatchEvent(new Event('change'))", field
+        )
+        changed(field)
+    chromium.execute_script("const m = document.getElementById('map'); m.value = 'cividis'; m.dispatchEvent(new Event('change'))")
+    changed("the colour map")
+    canvas = chromium.find_element("css selector", ".stages canvas")
+    canvas.send_keys("+")
+    changed("zoom")
+    canvas.send_keys(webdriver.Keys.ARROW_RIGHT)
+    assert readout(chromium)["node"] == "(21, 20)"
+    canvas.send_keys(webdriver.Keys.SHIFT + webdriver.Keys.ARROW_UP)
+    changed("pan")
+    canvas.send_keys("0")
+    changed("the whole mesh again")
+    chromium.find_element("id", "theme").click()
+    changed("dark")
+
+
+@browser_is_here
+def test_everything_on_the_page_has_a_name(run, chromium):
+    opened(chromium, run)
+    unnamed = chromium.execute_script(
+        """const named = (e) => e.labels?.length || e.getAttribute('aria-label') || e.textContent.trim();
+        return [...document.querySelectorAll('button, input, select, .stages canvas, .plot, .scroll')].filter((e) => !named(e)).map((e) => e.outerHTML)"""
+    )
+    assert unnamed == []
+    label = chromium.find_element("css selector", ".stages canvas").get_attribute("aria-label")
+    assert "40 by 40 cells" in label and "t = 0.35" in label
+    assert chromium.execute_script("return document.querySelector('.readout').getAttribute('aria-live')") == "polite"
+
+
+def overflowing(browser):
+    """Texts that are cut, or leave the page."""
+    return browser.execute_script(
+        """const wide = document.documentElement.clientWidth + 1, out = [];
+        for (const e of document.querySelectorAll('h1, h2, p, button, label, output, figcaption, dd, dt, select, canvas, .box, .ticks span')) {
+          const r = e.getBoundingClientRect();
+          if (r.width && (r.right > wide || r.left < -1)) out.push(e.outerHTML.slice(0, 120));
+        }
+        return out"""
+    )
+
+
+KINDS = [
+    ("moving-mesh", "burgers-b-stochastic", []),
+    ("periodic", "dam-break-auto", ["time.end=0.05", "time.report=[0.05]"]),
+    ("poisson", "laplacian-model-problem", []),
+    ("stefan", "stefan-slides", ["time.end=0.2", "time.report=[0.2]"]),
+]
+
+
+@browser_is_here
+@pytest.mark.parametrize("name, source, settings", KINDS)
+def test_screenshots_of_every_kind(name, source, settings, run, chromium, tmp_path):
+    directory = run if name == "moving-mesh" else study(source, tmp_path / "out", *settings)
+    for look, dark, width in (("light", False, 1280), ("dark", True, 1280), ("narrow", False, 390)):
+        opened(chromium, directory, dark, width)
+        screenshot(chromium, f"{name}-{look}")
+        assert overflowing(chromium) == []
+        assert chromium.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+    assert [entry for entry in chromium.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+@browser_is_here
+def test_the_viewer_draws_161_by_161_nodes(chromium, tmp_path):
+    """Its rate is kept beside the screenshots; that it draws at all is asserted, speed by the clock is not."""
+    settings = ["grid.cells=[160,160]", "time.end=0.252", "time.report=[0.252]", "output.frames.every=1"]
+    opened(chromium, study("burgers-b-conservative", tmp_path / "out", *settings))
+    # the best of four half seconds: others use the machine too
+    rate = max(chromium.execute_async_script(
+        """const done = arguments[0], start = viewer.drawn, from = performance.now();
+        viewer.play(true);
+        setTimeout(() => { const rate = (viewer.drawn - start) / (performance.now() - from) * 1000; viewer.play(false); done(rate) }, 500)"""
+    ) for _ in range(4))
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    (SCREENSHOTS / "frames-a-second.json").write_text(json.dumps({"nodes": [161, 161], "frames_a_second": rate}) + "\n")
+    print(f"{rate:.1f} frames a second at 161 x 161 nodes")
+    assert rate > 1
+    screenshot(chromium, "161")
+
+
+def test_a_frame_renders_off_screen_in_pyvista(run):
+    grid = pyvista.read(run / "frames/step-000100.vtu")
+    assert {"u", "rho", "mesh velocity"} <= set(grid.point_data) and {"Q", "jacobian", "subdomain"} <= set(grid.cell_data)
+    assert sorted(np.unique(grid.cell_data["subdomain"])) == [0, 1, 2, 3]
+    assert grid.cell_data["Q"].min() >= 1 and grid.cell_data["jacobian"].min() > 0
+    plotter = pyvista.Plotter(off_screen=True, window_size=(400, 400))
+    plotter.add_mesh(grid, scalars="u", show_edges=True, cmap="viridis")
+    plotter.view_xy()
+    image = plotter.screenshot(return_img=True)
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 50
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    plotter.screenshot(SCREENSHOTS / "pyvista.png")
+
+
+def test_the_mesh_velocity_is_the_motion_of_the_last_step(tmp_path):
+    settings = ["grid.cells=[12,10]", "time.end=0.253", "time.report=[0.253]", "output.frames.every=1", "output.report=false"]
+    out = study("burgers-b-conservative", tmp_path / "out", *settings)
+    assert not (out / "report.html").exists()
+    frames = [pyvista.read(out / f"frames/step-{n:06}.vtu") for n in range(4)]
+    assert np.all(frames[0].point_data["mesh velocity"] == 0)
+    for before, after in zip(frames, frames[1:]):
+        velocity = after.point_data["mesh velocity"]
+        assert np.abs(velocity).max() > 0.01
+        assert velocity == pytest.approx((after.points - before.points) / 1e-3, abs=1e-9)
