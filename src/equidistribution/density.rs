@@ -1,5 +1,7 @@
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake, Program};
+use std::fmt;
+use std::sync::Arc;
 
 /// M(x, t) > 0 on a line, with its exact derivative by x
 ///
@@ -12,12 +14,26 @@ pub struct LineDensity {
     followed: Option<Program<1, 1>>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 enum Kind {
     /// M and M_x.
     Formula(Program<1, 2>),
     /// u_x and u_xx.
     Arclength(Program<1, 2>),
+    /// [M, M_x] of a time and places.
+    Function(Arc<Function>),
+}
+
+type Function = dyn Fn(f64, &[f64]) -> Vec<[f64; 2]> + Send + Sync;
+
+impl fmt::Debug for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Formula(_) => "Formula",
+            Self::Arclength(_) => "Arclength",
+            Self::Function(_) => "Function",
+        })
+    }
 }
 
 /// Nodes and weights of the Gauss–Kronrod rule of 15 points on [−1, 1], of the half with x ≥ 0, and of the 7-point Gauss
@@ -68,6 +84,23 @@ impl LineDensity {
         Ok(Self { kind: Kind::Arclength(Program::new([&slope, &curvature])), followed: Some(Program::new([&u])) })
     }
 
+    /// [M, M_x] by a function of t and some places, which gives one pair a place.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::equidistribution::{Line, LineDensity};
+    /// let density = LineDensity::function(|_, x| x.iter().map(|x| [x * x + 1.0, 2.0 * x]).collect());
+    /// let [by_function, by_formula] = [density, LineDensity::formula("x^2 + 1")?].map(|density| {
+    ///     let line = Line::new(density, 20);
+    ///     line.solve(0.0, &line.uniform(), None).unwrap().0
+    /// });
+    /// assert_eq!(by_function, by_formula);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn function(f: impl Fn(f64, &[f64]) -> Vec<[f64; 2]> + Send + Sync + 'static) -> Self {
+        Self { kind: Kind::Function(Arc::new(f)), followed: None }
+    }
+
     /// u at each place, where M is an arc length.
     pub fn followed(&self, t: f64, x: &[f64]) -> Option<Vec<f64>> {
         let mut out = vec![[0.0]; x.len()];
@@ -91,6 +124,12 @@ impl LineDensity {
                     let (u_x, u_xx) = (*m, *slope);
                     *m = (1.0 + u_x * u_x).sqrt();
                     *slope = u_x * u_xx / *m;
+                }
+            }
+            Kind::Function(f) => {
+                out = f(t, x);
+                if out.len() != x.len() {
+                    return Err(Failure::WrongLength { what: "the density", found: out.len(), expected: x.len() });
                 }
             }
         }

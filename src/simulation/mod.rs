@@ -9,7 +9,7 @@ mod schedule;
 
 pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
-pub(crate) use report::write_file;
+pub(crate) use report::{status, write_file};
 pub use report::{Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Summary, WorkTotal};
 pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
 pub use schedule::Schedule;

@@ -7,7 +7,7 @@ use crate::geometry::{Field, quality};
 use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, Observer, Parallel, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw, draw_curves,
-    final_arrays,
+    final_arrays, status,
 };
 use crate::stefan::{Front, FrontState, LOWER, Problem, Stepping, UPPER};
 use serde::Serialize;
@@ -204,7 +204,7 @@ impl StefanStudy {
         let kept = self.keep(&directory, &prepared, &mut frames, &curves);
         summary.seconds.output += output.elapsed().as_secs_f64();
         summary.seconds.wall = begin.elapsed().as_secs_f64();
-        summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+        summary.status = status(failure.as_ref()).into();
         summary.error = failure.as_ref().map(Failed::from);
         directory.write_summary(&summary)?;
         kept?;
@@ -225,7 +225,7 @@ impl StefanStudy {
         let mut prepared = self.prepare()?;
         let mut summary = self.summary();
         let failure = go(&mut prepared, &mut summary, Instant::now(), &mut |_, _, _, _| Ok(())).err();
-        summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+        summary.status = status(failure.as_ref()).into();
         let columns = prepared.front.columns.x().to_vec();
         Ok(FrontFinished { summary, state: prepared.state, columns, failure })
     }

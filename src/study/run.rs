@@ -4,7 +4,7 @@ use crate::geometry::{Mesh, compare};
 use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw,
-    final_arrays,
+    final_arrays, status,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -72,7 +72,7 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     });
 
     let failure = outcome.as_ref().map_or_else(Some, |(_, failure)| failure.as_ref());
-    summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+    summary.status = status(failure).into();
     summary.error = failure.map(Failed::from);
     summary.seconds = record.seconds;
     summary.work = record.work;

@@ -1,0 +1,123 @@
+"""Pictures, by matplotlib, which is imported here and nowhere else."""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._arrays import Floats
+
+try:
+    import matplotlib.pyplot as plt
+    from matplotlib.animation import FuncAnimation
+    from matplotlib.collections import LineCollection
+except ImportError as missing:
+    raise ImportError("this needs matplotlib: pip install 'driftmesh[plot]'") from missing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .mesh import Mesh
+    from .study import Frame, Run
+
+
+def mesh(of: Mesh, u: Floats | None, ax: Axes | None) -> Axes:
+    """The lines of a mesh, over colours."""
+    return _state(of.x, of.y, u, _axes(ax))
+
+
+def convergence(error: Floats, ax: Axes | None, **line: Any) -> Axes:
+    """Errors over iterations."""
+    ax = _axes(ax)
+    ax.semilogy(np.where(error > 0, error, np.nan), **line)
+    ax.set_xlabel("iteration")
+    ax.set_ylabel("largest error of the mesh")
+    return ax
+
+
+def run(of: Run, path: str | PathLike[str] | None, ax: Axes | None) -> Axes:
+    """The last state of a run, by what there is of it."""
+    ax = _axes(ax)
+    iterates = of.summary.get("iterations")
+    x, y = of.final.get("x"), of.final.get("y")
+    if x is not None and y is not None and x.ndim == 2:
+        name = _first(of.final)
+        _state(x, y, of.final[name], ax)
+        ax.set_title(_title(of.summary["study"], name, float(of.final["t"]) if "t" in of.final else None))
+    elif iterates:
+        convergence(np.array([iterate["error_linf"] for iterate in iterates]), ax)
+        ax.set_title(of.summary["study"])
+    elif of.summary.get("mesh"):
+        nodes = np.array(of.summary["mesh"])
+        ax.plot(np.linspace(0.0, 1.0, len(nodes)), nodes)
+        ax.set_xlabel("ξ")
+        ax.set_ylabel("x")
+        ax.set_title(of.summary["study"])
+    else:
+        raise ValueError(f"{of.directory} has no state to draw: the run is {of.status}")
+    if path is not None:
+        ax.figure.savefig(fspath(path), dpi=150)
+    return ax
+
+
+def animation(of: Run, path: str | PathLike[str] | None, field: str | None) -> FuncAnimation:
+    """The frames of a run, one after the other."""
+    if not of.frames:
+        raise ValueError(f"{of.directory} has no frames to animate")
+    name = of.frames[0].names[0] if field is None else field
+    values = [frame[name] for frame in of.frames]
+    if values[0].ndim != 2:
+        raise ValueError(f"`field` is {name!r}, a vector of shape {values[0].shape}; give one with a value a node")
+    limits = min(v.min() for v in values), max(v.max() for v in values)
+    ax = _axes(None)
+
+    def draw(number: int) -> list[Any]:
+        frame: Frame = of.frames[number]
+        ax.clear()
+        _state(frame.x, frame.y, values[number], ax, limits, colorbar=number == 0)
+        ax.set_title(_title(of.summary["study"], name, frame.t))
+        return []
+
+    draw(0)
+    moving = FuncAnimation(ax.figure, draw, frames=len(of.frames), init_func=lambda: [], interval=100)
+    if path is not None:
+        moving.save(fspath(path), writer="pillow" if fspath(path).endswith(".gif") else None)
+        plt.close(ax.figure)
+    return moving
+
+
+def _axes(ax: Axes | None) -> Axes:
+    return plt.subplots(layout="constrained")[1] if ax is None else ax
+
+
+def _first(final: dict[str, Floats]) -> str:
+    return next(name for name in final if name not in ("x", "y", "t"))
+
+
+def _title(study: str, name: str, t: float | None) -> str:
+    return f"{study}: {name}" if t is None else f"{study}: {name}, t = {t:.4g}"
+
+
+def _state(
+    x: Floats,
+    y: Floats,
+    u: Floats | None,
+    ax: Axes,
+    limits: tuple[float, float] | None = None,
+    colorbar: bool = True,
+) -> Axes:
+    if u is not None:
+        low, high = (u.min(), u.max()) if limits is None else limits
+        colours = ax.pcolormesh(x, y, u, shading="gouraud", vmin=low, vmax=high)
+        if colorbar:
+            ax.figure.colorbar(colours, ax=ax)
+    along = [np.stack([x, y], axis=-1), np.stack([x.T, y.T], axis=-1)]
+    lines = [line for lines in along for line in lines]
+    ax.add_collection(LineCollection(lines, colors="black" if u is None else "white", linewidths=0.3, alpha=0.7))
+    ax.autoscale_view()
+    ax.set_aspect("equal")
+    ax.set_xlabel("x")
+    ax.set_ylabel("y")
+    return ax

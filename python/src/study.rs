@@ -1,0 +1,91 @@
+use crate::errors::raised;
+use crate::threads::{Ended, interruptible};
+use driftmesh::error::Moment;
+use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot};
+use driftmesh::study::{Source, Study};
+use driftmesh::{Error, Result};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What the thread that computes tells, and what it is told.
+#[derive(Default)]
+struct Seen {
+    /// Share of the run, time and step.
+    progress: Mutex<(f64, f64, usize)>,
+    stop: AtomicBool,
+}
+
+struct Watcher(Arc<Seen>);
+
+impl Observer for Watcher {
+    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
+        let state = snapshot.state;
+        *self.0.progress.lock().unwrap_or_else(PoisonError::into_inner) = (snapshot.share, state.t, state.step);
+        if event != Event::Finished && self.0.stop.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted(Moment { t: state.t, step: state.step }));
+        }
+        Ok(())
+    }
+}
+
+/// A study from a file, or from text where `origin` names it, with assignments `KEY=VALUE` on top.
+fn read(path: Option<PathBuf>, origin: &str, text: &str, set: &[String]) -> Result<Study> {
+    let mut source = match path {
+        Some(path) => Source::read(&path)?,
+        None => Source::new(origin, text),
+    };
+    set.iter().try_for_each(|assignment| source.set(assignment))?;
+    Study::from_source(&source)
+}
+
+/// The name of a study that has no mistake.
+#[pyfunction]
+#[pyo3(signature = (path, origin, text, set))]
+pub fn check(py: Python<'_>, path: Option<PathBuf>, origin: &str, text: &str, set: Vec<String>) -> PyResult<String> {
+    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raised(py, &error, None))?;
+    Ok(study.name().into())
+}
+
+/// Runs a study into a directory. `told(share, t, step)` is called every now and then.
+///
+/// Returns what was raised in Python or by the study, and whether the run has ended: a study that cannot be stopped
+/// half-way goes on in the background.
+#[pyfunction]
+#[pyo3(signature = (path, origin, text, set, out, told))]
+#[allow(clippy::too_many_arguments)] // four of them are one study
+pub fn run(
+    py: Python<'_>,
+    path: Option<PathBuf>,
+    origin: &str,
+    text: &str,
+    set: Vec<String>,
+    out: PathBuf,
+    told: Option<Py<PyAny>>,
+) -> PyResult<(Option<PyErr>, bool)> {
+    let raise = |error: &Error| raised(py, error, None);
+    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raise(&error))?;
+    RunDirectory::check(&out).map_err(|error| raise(&error))?;
+    let seen = Arc::new(Seen::default());
+    let (study, theirs) = (Arc::new(study), seen.clone());
+    let computing = study.clone();
+    let ended = interruptible(
+        py,
+        move || computing.run(&out, &mut [&mut Watcher(theirs)]),
+        || seen.stop.store(true, Ordering::Relaxed),
+        |py| {
+            let Some(told) = &told else { return Ok(()) };
+            let progress = *seen.progress.lock().unwrap_or_else(PoisonError::into_inner);
+            told.call1(py, progress).map(|_| ())
+        },
+    )?;
+    Ok(match ended {
+        Ended::Itself(outcome) => match outcome {
+            Ok(None) => (None, true),
+            Ok(Some(error)) => (Some(raised(py, &error, study.remedy(&error))), true),
+            Err(error) => return Err(raised(py, &error, study.remedy(&error))),
+        },
+        Ended::Stopped(error, outcome) => (Some(error), outcome.is_some()),
+    })
+}
