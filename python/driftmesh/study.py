@@ -221,7 +221,10 @@ def _interrupted(directory: Path, ended: bool) -> str:
         return f"what is being computed goes on in the background and is left in {directory} when it ends"
     summary = json.loads((directory / "summary.json").read_text("utf-8"))
     if summary["status"] == "interrupted":
-        return f"{summary['error']['message']}; the last good state is in {directory}"
+        message = summary["error"]["message"]
+        if not (directory / "final.npz").is_file():
+            return f"{message}, before the first step"
+        return f"{message}; the last good state is in {directory}"
     return f"the run had just ended ({summary['status']}); it is in {directory}"
 
 
@@ -238,7 +241,7 @@ def _bar(name: str, wanted: bool) -> Iterator[_Told | None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of widgets that a notebook lacks: there is a bar of text then
         from tqdm.auto import tqdm
-    form = "{desc}: {percentage:3.0f} %|{bar}| {postfix} [{elapsed}<{remaining}]"
+    form = "{desc} {percentage:3.0f} %|{bar}| {elapsed}<{remaining}"
     with tqdm(total=1.0, desc=name, bar_format=form, file=sys.stderr, mininterval=0.1) as bar:
         seen = -1
 
@@ -246,7 +249,7 @@ def _bar(name: str, wanted: bool) -> Iterator[_Told | None]:
             nonlocal seen
             if step != seen:
                 seen = step
-                bar.set_postfix_str(f"t = {t:.4f}, step {step}", refresh=False)
+                bar.set_description_str(f"{name}: t = {t:.4f}, step {step}", refresh=False)
                 bar.update(max(share - bar.n, 0.0))
 
         yield told

@@ -4,7 +4,11 @@ use pyo3::prelude::*;
 
 /// An error of the library as the exception that a Python user expects, with the remedy below the message.
 pub fn raised(py: Python<'_>, error: &Error, help: Option<String>) -> PyErr {
-    let help = help.or_else(|| error.help());
+    let help = match error {
+        Error::ForeignDirectory { .. } => Some("name another directory with `out`, or empty this one".into()),
+        Error::Busy { .. } => Some("wait for it to end, or name another directory with `out`".into()),
+        _ => help.or_else(|| error.help()),
+    };
     let text = help.as_ref().map_or(error.to_string(), |help| format!("{error}\n  help: {help}"));
     match error {
         Error::Failed { failure, moment } => {

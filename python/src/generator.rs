@@ -73,7 +73,9 @@ impl Generator {
         self.kind.check(mesh.lattice()).map_err(|error| plain(py, error.within("mesh.generator")))?;
         let mut parts = self.parts.try_lock().map_err(|error| match error {
             TryLockError::WouldBlock => PyRuntimeError::new_err("this generator is at work in another thread; use two"),
-            TryLockError::Poisoned(_) => PyRuntimeError::new_err("this generator broke in an earlier step; make a new one"),
+            TryLockError::Poisoned(_) => {
+                PyRuntimeError::new_err("this generator broke in an earlier step; make a new one")
+            }
         })?;
         let (parts, equation) = (&mut *parts, self.equation);
         let moved = compute(py, move || {

@@ -1,5 +1,5 @@
 use crate::errors::plain;
-use crate::threads::{Ended, interruptible};
+use crate::threads::{BRIEFLY, Ended, interruptible};
 use driftmesh::equidistribution::{History, Iterate, Line, LineDensity};
 use driftmesh::study::{Discretization, SchwarzTable, Source, StopTable};
 use driftmesh::{Error, Failure};
@@ -75,7 +75,11 @@ impl Shared {
         py: Python<'_>,
         f: impl FnOnce() -> driftmesh::Result<T> + Send + 'static,
     ) -> PyResult<T> {
-        let ended = interruptible(py, f, || self.stop.store(true, Ordering::Relaxed), |_| Ok(()))?;
+        let stop = || {
+            self.stop.store(true, Ordering::Relaxed);
+            BRIEFLY
+        };
+        let ended = interruptible(py, f, stop, |_| Ok(()))?;
         if let Some(error) = self.raised().take() {
             return Err(error);
         }
@@ -126,12 +130,7 @@ pub fn equidistribute<'py>(
 }
 
 /// Five columns of a history, mesh, reference; observed, predicted and bound of the contraction; why it did not converge.
-type Iterated<'py> = (
-    [Bound<'py, PyArray1<f64>>; 5],
-    [Bound<'py, PyArray1<f64>>; 2],
-    [Option<f64>; 3],
-    Option<PyErr>,
-);
+type Iterated<'py> = ([Bound<'py, PyArray1<f64>>; 5], [Bound<'py, PyArray1<f64>>; 2], [Option<f64>; 3], Option<PyErr>);
 
 /// A Schwarz iteration on a line.
 #[pyfunction]

@@ -1,5 +1,5 @@
 use crate::errors::raised;
-use crate::threads::{Ended, interruptible};
+use crate::threads::{BRIEFLY, Ended, PATIENCE, interruptible};
 use driftmesh::error::Moment;
 use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot};
 use driftmesh::study::{Source, Study};
@@ -7,14 +7,20 @@ use driftmesh::{Error, Result};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What the thread that computes tells, and what it is told.
 #[derive(Default)]
 struct Seen {
-    /// Share of the run, time and step.
-    progress: Mutex<(f64, f64, usize)>,
+    /// Share of the run, time and step; nothing of a study that cannot be watched.
+    progress: Mutex<Option<(f64, f64, usize)>>,
     stop: AtomicBool,
+}
+
+impl Seen {
+    fn progress(&self) -> MutexGuard<'_, Option<(f64, f64, usize)>> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 struct Watcher(Arc<Seen>);
@@ -22,7 +28,7 @@ struct Watcher(Arc<Seen>);
 impl Observer for Watcher {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
         let state = snapshot.state;
-        *self.0.progress.lock().unwrap_or_else(PoisonError::into_inner) = (snapshot.share, state.t, state.step);
+        *self.0.progress() = Some((snapshot.share, state.t, state.step));
         if event != Event::Finished && self.0.stop.load(Ordering::Relaxed) {
             return Err(Error::Interrupted(Moment { t: state.t, step: state.step }));
         }
@@ -73,11 +79,13 @@ pub fn run(
     let ended = interruptible(
         py,
         move || computing.run(&out, &mut [&mut Watcher(theirs)]),
-        || seen.stop.store(true, Ordering::Relaxed),
+        || {
+            seen.stop.store(true, Ordering::Relaxed);
+            if seen.progress().is_some() { PATIENCE } else { BRIEFLY }
+        },
         |py| {
-            let Some(told) = &told else { return Ok(()) };
-            let progress = *seen.progress.lock().unwrap_or_else(PoisonError::into_inner);
-            told.call1(py, progress).map(|_| ())
+            let progress = *seen.progress();
+            told.iter().zip(progress).try_for_each(|(told, progress)| told.call1(py, progress).map(|_| ()))
         },
     )?;
     Ok(match ended {

@@ -9,8 +9,10 @@ use std::time::{Duration, Instant};
 
 /// How often signals are looked for.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long a computation that was told to stop may take to do so.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// How long a computation that was told to stop, and looks whether it was, may take to write what it has.
+pub const PATIENCE: Duration = Duration::from_secs(10);
+/// The same for one that may not look.
+pub const BRIEFLY: Duration = Duration::from_millis(200);
 
 /// The pool, and the process that it belongs to: the threads of a process are not there after a fork.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
@@ -36,12 +38,12 @@ pub fn compute<T: Send>(py: Python<'_>, f: impl FnOnce() -> T + Send) -> PyResul
     Ok(py.detach(|| pool.install(f)))
 }
 
-/// The same for what may take long: Ctrl-C calls `stop`, waits a little for the end, and raises `KeyboardInterrupt`.
-/// `look` is called every now and then meanwhile.
+/// The same for what may take long: Ctrl-C calls `stop`, which says how long the end may take. `look` is called every now
+/// and then meanwhile.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     f: impl FnOnce() -> T + Send + 'static,
-    stop: impl Fn(),
+    stop: impl Fn() -> Duration,
     mut look: impl FnMut(Python<'_>) -> PyResult<()>,
 ) -> PyResult<Ended<T>> {
     let (sender, receiver) = channel();
@@ -50,9 +52,8 @@ pub fn interruptible<T: Send + 'static>(
         let _ = sender.send(result);
     });
     let receiver = Mutex::new(receiver);
-    let wait = |py: Python<'_>| {
-        py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK))
-    };
+    let wait =
+        |py: Python<'_>| py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
     let mut interrupted: Option<(PyErr, Instant)> = None;
     loop {
         match wait(py) {
@@ -63,18 +64,19 @@ pub fn interruptible<T: Send + 'static>(
                 });
             }
             Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err("a mistake in driftmesh itself; please report it with these inputs"));
+                return Err(PyRuntimeError::new_err(
+                    "a mistake in driftmesh itself; please report it with these inputs",
+                ));
             }
             Err(RecvTimeoutError::Timeout) => {}
         }
         match (py.check_signals().and_then(|()| look(py)), interrupted.take()) {
             (Err(error), None) => {
-                stop();
-                interrupted = Some((error, Instant::now()));
+                interrupted = Some((error, Instant::now() + stop()));
             }
             // asked twice, or nothing that could stop it
             (Err(error), Some(_)) => return Ok(Ended::Stopped(error, None)),
-            (Ok(()), Some((error, since))) if since.elapsed() > PATIENCE => return Ok(Ended::Stopped(error, None)),
+            (Ok(()), Some((error, until))) if Instant::now() > until => return Ok(Ended::Stopped(error, None)),
             (Ok(()), before) => interrupted = before,
         }
     }

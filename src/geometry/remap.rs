@@ -41,7 +41,8 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
     let steps = (largest_share(&cells, &last) / SHARE).ceil().max(1.0);
     let mut u = values.to_vec();
     for step in 1..=steps as usize {
-        let next = if step as f64 == steps { last.clone() } else { DualCells::new(&between(from, to, step as f64 / steps)?) };
+        let next =
+            if step as f64 == steps { last.clone() } else { DualCells::new(&between(from, to, step as f64 / steps)?) };
         u = stepped(from, &u, &cells, &next);
         cells = next;
     }
@@ -63,9 +64,11 @@ fn between(from: &Mesh<2>, to: &Mesh<2>, share: f64) -> Result<Mesh<2>, Failure>
 fn largest_share(old: &DualCells, new: &DualCells) -> f64 {
     let (swept, strides) = (old.swept(new), old.patch().padded_strides());
     let areas = old.areas().iter().zip(new.areas()).map(|(a, b)| a.min(*b));
-    let shares = old.patch().places().zip(areas).map(|(k, area)| {
-        (0..2).map(|d| swept[k][d].abs() + swept[k - strides[d]][d].abs()).sum::<f64>() / area
-    });
+    let shares = old
+        .patch()
+        .places()
+        .zip(areas)
+        .map(|(k, area)| (0..2).map(|d| swept[k][d].abs() + swept[k - strides[d]][d].abs()).sum::<f64>() / area);
     shares.fold(0.0, f64::max)
 }
 

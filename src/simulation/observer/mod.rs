@@ -15,6 +15,8 @@ use crate::meshing::Interface;
 /// What just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Event {
+    /// The mesh is adapted to the initial solution: a state that the run may start from.
+    Starting,
     /// The initial state is there.
     Started,
     /// A step was done.
