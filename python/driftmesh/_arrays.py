@@ -56,7 +56,7 @@ def scalar(name: str, value: float) -> float:
 
 def count(name: str, value: Any) -> int:
     """A whole number, 0 or more."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 0:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or not 0 <= value < 1 << 62:
         raise ValueError(f"`{name}` is {value!r}, but must be a whole number, 0 or more")
     return int(value)
 

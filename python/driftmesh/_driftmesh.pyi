@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from .errors import MeshError
 
+__all__ = ["VERSION", "Generator", "areas", "check", "equidistribute", "quality", "run", "schwarz", "stencils", "transfer", "uniform"]
+
 VERSION: str
 
 _Floats = NDArray[np.float64]
 _Mesh = tuple[_Floats, tuple[float, float], tuple[float, float], tuple[bool, bool]]
-_Density = tuple[str, str] | Callable[[_Floats], _Floats]
+_Density = tuple[str, str] | tuple[list[float], list[float]] | Callable[[_Floats], _Floats]
 
 @final
 class Generator:

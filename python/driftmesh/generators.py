@@ -220,6 +220,10 @@ class MeshGenerator:
         method = Whole() if method is None else method
         if not isinstance(method, (Whole, Stochastic, Schwarz, Fixed)):
             raise ValueError(f"`method` is {method!r}, but must be Whole(), Stochastic(…), Schwarz(…) or Fixed()")
+        if isinstance(monitor, (str, type)):
+            raise ValueError(
+                f"`monitor` is {monitor!r}, but must be Arclength(…), RootGradient(), Given(), an array or a function"
+            )
         if isinstance(relaxation, Mapping) and "prediction" in relaxation:
             raise ValueError("a prediction of the mesh belongs to studies; give relaxation={'steps': …} alone")
         self.monitor: Monitor = RootGradient() if monitor is None else monitor

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, overload
 
 from numpy.typing import ArrayLike
 
@@ -16,6 +16,26 @@ if TYPE_CHECKING:
 Kind = Literal["optimised", "harmonic", "published", "compact25", "mapped"]
 
 
+@overload
+def laplacian_stencils(
+    x: ArrayLike,
+    y: ArrayLike,
+    kind: Kind = ...,
+    *,
+    source: Literal[False] = ...,
+    polynomials: Literal["printed", "harmonic"] | None = ...,
+    scaling: Literal["none", "global", "local"] | None = ...,
+) -> csr_matrix: ...
+@overload
+def laplacian_stencils(
+    x: ArrayLike,
+    y: ArrayLike,
+    kind: Kind = ...,
+    *,
+    source: Literal[True],
+    polynomials: Literal["printed", "harmonic"] | None = ...,
+    scaling: Literal["none", "global", "local"] | None = ...,
+) -> tuple[csr_matrix, csr_matrix]: ...
 def laplacian_stencils(
     x: ArrayLike,
     y: ArrayLike,
@@ -59,6 +79,9 @@ def laplacian_stencils(
     if first.ndim != 2 or min(first.shape) < 3:
         raise ValueError(f"`x` has shape {first.shape}, but must have two axes of 3 nodes or more")
     second = finite("y", y, first.shape, "`x`")
+    for name, values in (("x", first), ("y", second)):
+        if not 1e-100 < np.ptp(values) < 1e100:
+            raise ValueError(f"`{name}` extends over {np.ptp(values)}, which cannot be squared or told from 0; scale the mesh")
     if kind == "compact25" and not source:
         raise ValueError("compact25 has weights on Δu too: with source=True there are two matrices, A u = B Δu")
     rows, columns, on_u, on_source, near = _driftmesh.stencils(first, second, kind, polynomials, scaling)

@@ -26,7 +26,7 @@ def equidistribute(
     cells: int,
     *,
     domain: Sequence[float] = (0.0, 1.0),
-    face_density: Faces = "trapezoid",
+    face_density: Faces | None = None,
 ) -> Floats:
     """The mesh on which every cell has the same share of ∫M.
 
@@ -36,7 +36,8 @@ def equidistribute(
             (places, values), both taken as piecewise linear.
         cells: Number of cells, at least 2.
         domain: Ends of the line, in the unit of length.
-        face_density: How M is averaged over a cell: ``"trapezoid"``, ``"midpoint"`` or ``"exact"`` (∫M).
+        face_density: How M is averaged over a cell: ``"trapezoid"``, ``"midpoint"`` or ``"exact"`` (∫M). Where nothing is
+            said, the exact integral for arrays, which may be rough from cell to cell, and the trapezoid else.
 
     Returns:
         The nodes, shape (cells + 1,), in order from end to end.
@@ -52,8 +53,9 @@ def equidistribute(
     0.5961
     """
     ends = _ends(domain)
-    settings = _toml.document({"equidistribution": {"face_density": face_density}})
-    return _driftmesh.equidistribute(_density(density, ends), _cells(cells), ends, settings)
+    given, faces = _density(density, ends, face_density)
+    settings = _toml.document({"equidistribution": {"face_density": faces}})
+    return _driftmesh.equidistribute(given, _cells(cells), ends, settings)
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ def schwarz(
     measure: Literal["error", "increment"] = "error",
     start: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
     domain: Sequence[float] = (0.0, 1.0),
-    face_density: Faces = "trapezoid",
+    face_density: Faces | None = None,
 ) -> SchwarzResult:
     """Equidistributes subdomain by subdomain and iterates until they agree. Words as in a study of kind
     ``equidistribution``.
@@ -170,8 +172,9 @@ def schwarz(
         "integral": integral,
     }
     stop = {"iterations": iterations, "tolerance": tolerance, "measure": measure}
-    settings = _toml.document({"equidistribution": {"face_density": face_density}, "schwarz": table, "stop": stop})
-    columns, meshes, rates, missed = _driftmesh.schwarz(_density(density, ends), n, ends, settings, _start(start, n, ends))
+    given, faces = _density(density, ends, face_density)
+    settings = _toml.document({"equidistribution": {"face_density": faces}, "schwarz": table, "stop": stop})
+    columns, meshes, rates, missed = _driftmesh.schwarz(given, n, ends, settings, _start(start, n, ends))
     result = SchwarzResult(*meshes, *columns, *rates)
     if missed is not None:
         missed.result = result
@@ -206,29 +209,29 @@ def _start(start: Any, cells: int, ends: tuple[float, float]) -> list[float] | N
     return mesh
 
 
-def _density(density: Any, ends: tuple[float, float]) -> Any:
-    """A density as the library takes it: a kind and a formula, or a function of places."""
+def _density(density: Any, ends: tuple[float, float], faces: Faces | None) -> tuple[Any, Faces]:
+    """A density as the library takes it: a kind and a formula, places and values, or a function; and its mean over a cell."""
     if isinstance(density, str):
-        return "formula", density
+        return ("formula", density), faces or "trapezoid"
     if isinstance(density, Mapping):
         keys = {"formula": "value", "arclength": "of"}
         kind = density.get("kind", "formula")
         if set(density) - {"kind"} != {keys.get(kind)}:
             raise ValueError(f"`density` is {dict(density)}, but must be a table such as {{'kind': 'arclength', 'of': 'x^2'}}")
-        return kind, density[keys[kind]]
-    if callable(density):
+        return (kind, density[keys[kind]]), faces or "trapezoid"
+    if not callable(density):
+        return _sampled(density, ends), faces or "exact"
 
-        def function(places: Floats) -> Floats:
-            values = real("density", density(places))
-            if values.shape not in ((), places.shape):
-                raise ValueError(f"the density has shape {values.shape}, but was asked for places of shape {places.shape}")
-            return np.ascontiguousarray(np.broadcast_to(values, places.shape))
+    def function(places: Floats) -> Floats:
+        values = real("density", density(places))
+        if values.shape not in ((), places.shape):
+            raise ValueError(f"the density has shape {values.shape}, but was asked for places of shape {places.shape}")
+        return np.ascontiguousarray(np.broadcast_to(values, places.shape))
 
-        return function
-    return _sampled(density, ends)
+    return function, faces or "trapezoid"
 
 
-def _sampled(density: Any, ends: tuple[float, float]) -> Callable[[Floats], Floats]:
+def _sampled(density: Any, ends: tuple[float, float]) -> tuple[list[float], list[float]]:
     if isinstance(density, tuple):
         given, samples = pair("density", density)
         places = finite("places of the density", given)
@@ -244,9 +247,4 @@ def _sampled(density: Any, ends: tuple[float, float]) -> Callable[[Floats], Floa
         places = np.linspace(*ends, len(values))
     if not (values > 0).all():
         raise ValueError(f"`density` is {values.min()} at index {values.argmin()}, but must be above 0")
-
-    def function(x: Floats) -> Floats:
-        out: Floats = np.interp(x, places, values)
-        return out
-
-    return function
+    return places.tolist(), values.tolist()

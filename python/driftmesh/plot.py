@@ -18,6 +18,8 @@ except ImportError as missing:
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.figure import Figure
 
     from .mesh import Mesh
     from .study import Frame, Run
@@ -58,7 +60,7 @@ def run(of: Run, path: str | PathLike[str] | None, ax: Axes | None) -> Axes:
     else:
         raise ValueError(f"{of.directory} has no state to draw: the run is {of.status}")
     if path is not None:
-        ax.figure.savefig(fspath(path), dpi=150)
+        _figure(ax).savefig(fspath(path), dpi=150)
     return ax
 
 
@@ -72,24 +74,35 @@ def animation(of: Run, path: str | PathLike[str] | None, field: str | None) -> F
         raise ValueError(f"`field` is {name!r}, a vector of shape {values[0].shape}; give one with a value a node")
     limits = min(v.min() for v in values), max(v.max() for v in values)
     ax = _axes(None)
+    _state(of.frames[0].x, of.frames[0].y, values[0], ax, limits)
+    ax.set_title(_title(of.summary["study"], name, of.frames[0].t))
+    # laid out once: the frames differ in what is inside
+    _figure(ax).canvas.draw()
+    _figure(ax).set_layout_engine("none")
 
     def draw(number: int) -> list[Any]:
         frame: Frame = of.frames[number]
-        ax.clear()
-        _state(frame.x, frame.y, values[number], ax, limits, colorbar=number == 0)
+        for old in list(ax.collections):
+            old.remove()
+        _fill(frame.x, frame.y, values[number], ax, limits)
         ax.set_title(_title(of.summary["study"], name, frame.t))
         return []
 
-    draw(0)
-    moving = FuncAnimation(ax.figure, draw, frames=len(of.frames), init_func=lambda: [], interval=100)
+    moving = FuncAnimation(_figure(ax), draw, frames=len(of.frames), init_func=lambda: [], interval=100)
     if path is not None:
         moving.save(fspath(path), writer="pillow" if fspath(path).endswith(".gif") else None)
-        plt.close(ax.figure)
+        plt.close(_figure(ax))
     return moving
 
 
 def _axes(ax: Axes | None) -> Axes:
     return plt.subplots(layout="constrained")[1] if ax is None else ax
+
+
+def _figure(ax: Axes) -> Figure:
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return figure
 
 
 def _first(final: dict[str, Floats]) -> str:
@@ -100,24 +113,25 @@ def _title(study: str, name: str, t: float | None) -> str:
     return f"{study}: {name}" if t is None else f"{study}: {name}, t = {t:.4g}"
 
 
-def _state(
-    x: Floats,
-    y: Floats,
-    u: Floats | None,
-    ax: Axes,
-    limits: tuple[float, float] | None = None,
-    colorbar: bool = True,
-) -> Axes:
-    if u is not None:
-        low, high = (u.min(), u.max()) if limits is None else limits
-        colours = ax.pcolormesh(x, y, u, shading="gouraud", vmin=low, vmax=high)
-        if colorbar:
-            ax.figure.colorbar(colours, ax=ax)
-    along = [np.stack([x, y], axis=-1), np.stack([x.T, y.T], axis=-1)]
-    lines = [line for lines in along for line in lines]
-    ax.add_collection(LineCollection(lines, colors="black" if u is None else "white", linewidths=0.3, alpha=0.7))
+def _state(x: Floats, y: Floats, u: Floats | None, ax: Axes, limits: tuple[float, float] | None = None) -> Axes:
+    colours = _fill(x, y, u, ax, limits)
+    if colours is not None:
+        _figure(ax).colorbar(colours, ax=ax)
     ax.autoscale_view()
     ax.set_aspect("equal")
     ax.set_xlabel("x")
     ax.set_ylabel("y")
     return ax
+
+
+def _fill(x: Floats, y: Floats, u: Floats | None, ax: Axes, limits: tuple[float, float] | None) -> QuadMesh | None:
+    """The lines of a mesh, and colours: of a cell, the mean of its corners."""
+    colours = None
+    if u is not None:
+        means = 0.25 * (u[:-1, :-1] + u[1:, :-1] + u[:-1, 1:] + u[1:, 1:])
+        low, high = (u.min(), u.max()) if limits is None else limits
+        colours = ax.pcolormesh(x, y, means, vmin=low, vmax=high)
+    along = [np.stack([x, y], axis=-1), np.stack([x.T, y.T], axis=-1)]
+    lines = [line for lines in along for line in lines]
+    ax.add_collection(LineCollection(lines, colors="black" if u is None else "white", linewidths=0.3, alpha=0.7 if u is None else 0.35))
+    return colours

@@ -189,9 +189,11 @@ def run(
     if isinstance(study, Mapping):
         given: tuple[Path | None, str, str] = None, "the study", _toml.document(study)
     else:
-        given = Path(study), "", ""
-        if not given[0].exists():  # type: ignore[union-attr]
+        if not Path(study).exists():
             raise FileNotFoundError(f"cannot read {study}: there is no such file")
+        given = Path(study), "", ""
+    if not isinstance(set, Mapping | None):
+        raise TypeError(f"`set` is {set!r}, but must be a dict of dotted keys and values")
     assignments = [f"{name}={_toml.value(value)}" for name, value in (set or {}).items()]
     name = _driftmesh.check(*given, assignments)
     directory = Path("out") / name if out is None else Path(out)

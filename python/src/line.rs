@@ -1,7 +1,7 @@
-use crate::errors::plain;
+use crate::errors::{plain, raised};
 use crate::threads::{BRIEFLY, Ended, interruptible};
 use driftmesh::equidistribution::{History, Iterate, Line, LineDensity};
-use driftmesh::study::{Discretization, SchwarzTable, Source, StopTable};
+use driftmesh::study::{Discretization, SchwarzTable, Source, StopTable, check_memory};
 use driftmesh::{Error, Failure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -14,6 +14,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub enum Density {
     /// `("formula" or "arclength", text)`.
     Text(String, String),
+    /// Places and M there.
+    Samples(Vec<f64>, Vec<f64>),
     /// M of an array of places.
     Function(Py<PyAny>),
 }
@@ -26,6 +28,8 @@ struct Shared {
     stop: Arc<AtomicBool>,
 }
 
+/// Memory for each cell, about.
+const BYTES_PER_CELL: u128 = 1000;
 /// Distance over which the slope of a function is differenced, as a share of the line: Newton's method needs no better.
 const APART: f64 = 1e-6;
 
@@ -34,6 +38,7 @@ impl Shared {
         let function = match density {
             Density::Text(kind, text) if kind == "arclength" => return LineDensity::arclength(&text),
             Density::Text(_, text) => return LineDensity::formula(&text),
+            Density::Samples(x, m) => return LineDensity::sampled(x, m),
             Density::Function(function) => function,
         };
         let (shared, apart) = (self.clone(), APART * (b - a));
@@ -84,7 +89,12 @@ impl Shared {
             return Err(error);
         }
         match ended {
-            Ended::Itself(result) => result.map_err(|error| plain(py, error)),
+            Ended::Itself(result) => result.map_err(|error| match &error {
+                Error::Failed { failure: Failure::NewtonStalled { .. }, .. } => {
+                    raised(py, &error, Some("set face_density to \"exact\": rough densities need it".into()))
+                }
+                _ => plain(py, error),
+            }),
             Ended::Stopped(error, _) => Err(error),
         }
     }
@@ -110,6 +120,7 @@ fn problem(
 ) -> driftmesh::Result<(Line, Settings)> {
     let mut settings: Settings = Source::new("settings", settings).parse()?;
     settings.stop.resolve()?;
+    check_memory(cells as u128 + 1, BYTES_PER_CELL, &[cells])?;
     let density = shared.density(density, ends)?;
     Ok((Line { density, face: settings.equidistribution.face_density, cells, ends }, settings))
 }

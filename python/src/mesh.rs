@@ -3,10 +3,14 @@
 use crate::errors::plain;
 use crate::threads::compute;
 use driftmesh::geometry::{self, DualCells, Lattice, Mesh};
+use driftmesh::study::check_memory;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+/// Memory for each node while a mesh is moved, about.
+const BYTES_PER_NODE: u128 = 1000;
 
 /// A mesh as the package hands it over: contiguous nodes and the box.
 #[derive(FromPyObject)]
@@ -57,9 +61,11 @@ pub fn uniform<'py>(
     upper: [f64; 2],
     periodic: [bool; 2],
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let lattice = Lattice::new(cells, periodic).map_err(|error| plain(py, error))?;
-    let mesh = Mesh::uniform(lattice, lower, upper).map_err(|error| plain(py, error))?;
-    nodes(py, &mesh)
+    let mesh = Lattice::new(cells, periodic).and_then(|lattice| {
+        check_memory(lattice.len() as u128, BYTES_PER_NODE, &cells)?;
+        Mesh::uniform(lattice, lower, upper)
+    });
+    nodes(py, &mesh.map_err(|error| plain(py, error))?)
 }
 
 /// `q_max`, `q_mean`, `min_scaled_jacobian` and `equidistribution` of a mesh under a density.

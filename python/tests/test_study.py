@@ -36,10 +36,10 @@ def result(tmp_path_factory):
 
 
 def test_results_are_those_of_the_program(tmp_path):
-    settings = {"time.end": 0.3, "grid.cells": np.array([16, 16]), "mesh.generator.kind": "whole", "output.report": False}
+    settings = {"time.end": 0.3, "time.report": [0.3], "grid.cells": np.array([16, 16]), "mesh.generator.kind": "whole", "output.report": False}
     ours = driftmesh.run(ROOT / "studies/burgers.toml", out=tmp_path / "ours", set=settings)
     command = [PROGRAM, "run", ROOT / "studies/burgers.toml", "--out", tmp_path / "theirs", "--quiet"]
-    assignments = ["time.end=0.3", "grid.cells=[16, 16]", "mesh.generator.kind=whole", "output.report=false"]
+    assignments = ["time.end=0.3", "time.report=[0.3]", "grid.cells=[16, 16]", "mesh.generator.kind=whole", "output.report=false"]
     subprocess.run(command + [part for a in assignments for part in ("--set", a)], check=True)
     theirs = driftmesh.load(tmp_path / "theirs")
     assert ours.summary["reports"] == theirs.summary["reports"] and ours.summary["work"] == theirs.summary["work"]
@@ -74,7 +74,7 @@ def test_results_pickle_and_copy(result):
     ("study", "settings", "arrays"),
     [
         ("laplacian-model-problem", {}, {"x": (22, 18), "u": (22, 18)}),
-        ("stefan-slides", {"time.end": 0.05, "grid.cells": [10, 6, 6]}, {"x": (11, 13), "u": (11, 13)}),
+        ("stefan-slides", {"time.end": 0.05, "time.report": [0.05], "grid.cells": [10, 6, 6]}, {"x": (11, 13), "u": (11, 13)}),
         ("table-8-1-nonlinear", {}, {"x": (101,)}),
         ("moving-front-1d", {"time.end": 0.02}, {"x": (101,), "path": (None, 101)}),
     ],

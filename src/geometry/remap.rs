@@ -13,7 +13,8 @@ use crate::error::Failure;
 /// differ by a time step.
 ///
 /// # Errors
-/// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh.
+/// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where values
+/// are not finite or so large that their differences are not.
 ///
 /// # Example
 /// ```
@@ -46,7 +47,13 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
         u = stepped(from, &u, &cells, &next);
         cells = next;
     }
-    Ok(u)
+    match u.iter().position(|u| !u.is_finite()) {
+        None => Ok(u),
+        Some(k) => {
+            let (what, value, node, x) = ("the carried field", u[k], to.lattice().node(k), to.x()[k]);
+            Err(Failure::NonFinite { what, value, node, x })
+        }
+    }
 }
 
 /// The most that the faces of a dual cell may sweep in a step, over its area.
@@ -99,8 +106,11 @@ fn stepped(mesh: &Mesh<2>, values: &[f64], old: &DualCells, new: &DualCells) -> 
 
 /// Van Leer's mean of two differences: harmonic where they agree in sign, 0 where they do not.
 fn limited(below: f64, above: f64) -> f64 {
-    let product = below * above;
-    if product > 0.0 { 2.0 * product / (below + above) } else { 0.0 }
+    if (below > 0.0) == (above > 0.0) && below != 0.0 && above != 0.0 {
+        below * (2.0 * (above / (below + above)))
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]

@@ -285,7 +285,7 @@ impl EquidistributionStudy {
         if cells < 2 {
             return Err(Error::invalid("grid.cells", format!("[{cells}]"), "must be 2 or more"));
         }
-        super::memory::check(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
+        super::memory::check_memory(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
         self.resolve_time()?;
         self.check_density()?;
         if let Some(schwarz) = &mut self.schwarz {

@@ -24,6 +24,7 @@ pub use line_run::{
     Rate, StepRow,
 };
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
+pub use memory::check_memory;
 pub use moving_mesh::{
     Compare, Domain, Grid, Header, MeshForm, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time,
 };
