@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// How often signals are looked for.
 const LOOK: Duration = Duration::from_millis(20);
 /// How long a computation that was told to stop, and looks whether it was, may take to write what it has.
-pub const PATIENCE: Duration = Duration::from_secs(10);
+pub const PATIENCE: Duration = Duration::from_secs(3);
 /// The same for one that may not look.
 pub const BRIEFLY: Duration = Duration::from_millis(200);
 
