@@ -393,7 +393,12 @@ impl Observer for Pair {
 /// No study is left out of the tests above.
 #[test]
 fn every_study_is_tested() {
-    let tested = concat!(include_str!("studies.rs"), include_str!("laplacian.rs"), include_str!("stefan.rs"));
+    let tested = concat!(
+        include_str!("studies.rs"),
+        include_str!("laplacian.rs"),
+        include_str!("stefan.rs"),
+        include_str!("equidistribution.rs")
+    );
     for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies")).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         let stem = name.strip_suffix(".toml").unwrap_or_else(|| panic!("{name} is not a study"));

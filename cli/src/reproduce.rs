@@ -28,12 +28,11 @@ impl Reproduce {
             .map_err(|error| Error::Unwritable { path: self.out.clone(), reason: error.to_string() })?;
         for item in ITEMS.iter().filter(|item| self.items.is_empty() || self.items.iter().any(|name| name == item.name))
         {
-            let Rerun { tables, figures } = item.run(Options { quick: self.quick })?;
+            let Rerun { tables, pictures } = item.run(Options { quick: self.quick })?;
             let text = tables.iter().map(|table| table.to_string()).collect::<Vec<_>>().join("\n");
             say(&text);
             self.write(&format!("{}.md", item.name), text.as_bytes())?;
-            for (name, figure) in figures {
-                let picture = figure.draw();
+            for (name, picture) in pictures {
                 self.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
                 self.write(&format!("{name}.png"), &picture.png)?;
             }

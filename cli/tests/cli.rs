@@ -69,11 +69,26 @@ fn a_run_leaves_its_directory() {
     let output = sandbox.run(&[]);
     assert!(output.status.success(), "{}", words(&output));
     let said = String::from_utf8(output.stdout).unwrap();
-    for part in ["l_inf", "0.2600", "0.2700", "20 steps", "out/mesh.png", "run      out"] {
+    for part in ["l_inf", "0.2600", "0.2700", "20 steps", "out/mesh.png", "out/report.html", "run      out"] {
         assert!(said.contains(part), "{part:?} is not in\n{said}");
     }
-    let expected =
-        ["final.npz", "frames", "history.csv", "mesh.png", "mesh.svg", "run.pvd", "study.toml", "summary.json"];
+    let expected = [
+        "compare",
+        "compare.pvd",
+        "error.png",
+        "error.svg",
+        "final.npz",
+        "frames",
+        "history.csv",
+        "mesh.png",
+        "mesh.svg",
+        "quality.png",
+        "quality.svg",
+        "report.html",
+        "run.pvd",
+        "study.toml",
+        "summary.json",
+    ];
     assert_eq!(entries(&sandbox.path("out")), expected);
     // the first state, steps 8 and 16, and the last
     assert_eq!(entries(&sandbox.path("out/frames")).len(), 4);

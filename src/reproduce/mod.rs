@@ -13,7 +13,7 @@ pub use laplacian::slides_error;
 pub use table::Table;
 
 use crate::error::Result;
-use crate::simulation::Figure;
+use crate::simulation::Picture;
 
 /// Something published, or measured for this project, that can be rerun.
 pub struct Item {
@@ -25,17 +25,17 @@ pub struct Item {
 }
 
 /// What an item comes out as.
-#[derive(Debug, Clone, Default)]
+#[derive(Default)]
 pub struct Rerun {
     /// Its tables.
     pub tables: Vec<Table>,
-    /// Its plots, each with the name of its files.
-    pub figures: Vec<(String, Figure)>,
+    /// Its pictures, each with the name of its files.
+    pub pictures: Vec<(String, Picture)>,
 }
 
 impl From<Vec<Table>> for Rerun {
     fn from(tables: Vec<Table>) -> Self {
-        Self { tables, figures: Vec::new() }
+        Self { tables, pictures: Vec::new() }
     }
 }
 
@@ -82,18 +82,10 @@ pub const ITEMS: &[Item] = &[
     Item {
         name: "laplacian-table",
         line: "the optimised Laplacian and its rivals on three meshes, and the slides' table",
-        run: |options| laplacian::run(options).map(Rerun::from),
+        run: laplacian::run,
     },
-    Item {
-        name: "stefan-slides",
-        line: "the slides' front between ice and water, with balances",
-        run: |options| fronts::slides(options).map(Rerun::from),
-    },
-    Item {
-        name: "stefan-exact",
-        line: "fronts against three exact solutions, by every method",
-        run: |options| fronts::exact(options).map(Rerun::from),
-    },
+    Item { name: "stefan-slides", line: "the slides' front between ice and water, with balances", run: fronts::slides },
+    Item { name: "stefan-exact", line: "fronts against three exact solutions, by every method", run: fronts::exact },
     Item { name: "table-8-1", line: "the boundary layer by four Schwarz methods", run: schwarz::table_8_1 },
     Item {
         name: "figure-8-1",

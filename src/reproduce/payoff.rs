@@ -182,7 +182,7 @@ fn payoff(options: Options) -> Result<Rerun> {
         curves: curves.into(),
         ..Figure::default()
     };
-    Ok(Rerun { tables, figures: vec![("payoff".into(), figure)] })
+    Ok(Rerun { tables, pictures: vec![("payoff".into(), figure.draw())] })
 }
 
 /// A row for each method.

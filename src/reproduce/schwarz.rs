@@ -172,7 +172,7 @@ pub fn table_8_1(_: Options) -> Result<Rerun> {
         scales: [Scale::Linear, Scale::Logarithmic],
         curves,
     };
-    Ok(Rerun { tables: vec![table], figures: vec![("table-8-1".into(), figure)] })
+    Ok(Rerun { tables: vec![table], pictures: vec![("table-8-1".into(), figure.draw())] })
 }
 
 pub fn figure_8_1(_: Options) -> Result<Rerun> {
@@ -180,7 +180,7 @@ pub fn figure_8_1(_: Options) -> Result<Rerun> {
         "Figure 8.1: parallel nonlinear Schwarz on two subdomains of 100 cells",
         &["M", "overlap", "predicted", "observed", "iterations to 1e-10", "elsewhere", "verdict"],
     );
-    let mut figures = Vec::new();
+    let mut pictures = Vec::new();
     let sides: [(&str, &str, Line, [Option<usize>; 3]); 2] = [
         ("left", "x² + 1", square(100)?, [Some(259), Some(105), Some(53)]),
         ("right", "layer", layer(100)?, [None, Some(111), None]),
@@ -201,10 +201,10 @@ pub fn figure_8_1(_: Options) -> Result<Rerun> {
             curves.push(curve(&name(overlap), &history, 1));
         }
         let title = format!("Figure 8.1, {side}: classical Schwarz, M of {m}");
-        figures.push((format!("figure-8-1-{side}"), errors(&title, "iterations", curves)));
+        pictures.push((format!("figure-8-1-{side}"), errors(&title, "iterations", curves).draw()));
     }
     table.note("rates are of two iterations; predicted is (α/β)(1 − β)/(1 − α), theorem 3.2, whatever M is");
-    Ok(Rerun { tables: vec![table], figures })
+    Ok(Rerun { tables: vec![table], pictures })
 }
 
 pub fn figure_8_2(_: Options) -> Result<Rerun> {
@@ -243,7 +243,7 @@ pub fn figure_8_2(_: Options) -> Result<Rerun> {
             ],
         ),
     ];
-    let mut figures = Vec::new();
+    let mut pictures = Vec::new();
     for (side, m, line, methods) in sides {
         let mut curves = Vec::new();
         for (what, method, elsewhere) in methods {
@@ -263,11 +263,11 @@ pub fn figure_8_2(_: Options) -> Result<Rerun> {
             curves.push(curve(what, &shown, 2));
         }
         let title = format!("Figure 8.2, {side}: every second iteration, M of {m}");
-        figures.push((format!("figure-8-2-{side}"), errors(&title, "iterations", curves)));
+        pictures.push((format!("figure-8-2-{side}"), errors(&title, "iterations", curves).draw()));
     }
     table.note("M = x² + 1 with exact faces, the layer with trapezoidal ones");
     table.note("the bound is (5.7); two p make the rate zero, M(x(α))/α and M(x(α))/(1 − α): here both are 2.71");
-    Ok(Rerun { tables: vec![table, optimal()?], figures })
+    Ok(Rerun { tables: vec![table, optimal()?], pictures })
 }
 
 /// Theorem 4.1 beside what discretisation leaves of it.
@@ -335,7 +335,7 @@ pub fn figure_8_3(_: Options) -> Result<Rerun> {
     };
     Ok(Rerun {
         tables: vec![table],
-        figures: vec![("figure-8-3-left".into(), left), ("figure-8-3-right".into(), right)],
+        pictures: vec![("figure-8-3-left".into(), left.draw()), ("figure-8-3-right".into(), right.draw())],
     })
 }
 
@@ -374,7 +374,7 @@ pub fn figure_8_4(_: Options) -> Result<Rerun> {
     let right = errors("Figure 8.4, right: M of the layer, .45/.55", "linear solves", right);
     Ok(Rerun {
         tables: vec![table],
-        figures: vec![("figure-8-4-left".into(), left), ("figure-8-4-right".into(), right)],
+        pictures: vec![("figure-8-4-left".into(), left.draw()), ("figure-8-4-right".into(), right.draw())],
     })
 }
 
@@ -419,11 +419,11 @@ pub fn figure_8_5(_: Options) -> Result<Rerun> {
         table.row(row("ours", &counts, verdict(close)));
     }
     table.note("from the uniform mesh a symmetric M hides the slowest error: hence the other start");
-    let figures = vec![
-        ("figure-8-5-left".into(), errors("Figure 8.5, left: linearised, from ξ^1.3", "iterations", left)),
-        ("figure-8-5-right".into(), errors("Figure 8.5, right: both, from ξ^1.3", "iterations", right)),
+    let pictures = vec![
+        ("figure-8-5-left".into(), errors("Figure 8.5, left: linearised, from ξ^1.3", "iterations", left).draw()),
+        ("figure-8-5-right".into(), errors("Figure 8.5, right: both, from ξ^1.3", "iterations", right).draw()),
     ];
-    Ok(Rerun { tables: vec![table, counterexample()?], figures })
+    Ok(Rerun { tables: vec![table, counterexample()?], pictures })
 }
 
 /// Theorem 3.4 says that linearised Schwarz always converges.
@@ -454,7 +454,7 @@ pub fn figure_8_6(_: Options) -> Result<Rerun> {
         "Figure 8.6: a front that steepens and moves, 100 cells, 100 steps, to 1e-10 in each",
         &["subdomains", "iterations a step", "elsewhere", "t", "x(.45)", "x(.55)", "elsewhere", "verdict"],
     );
-    let mut figures = Vec::new();
+    let mut pictures = Vec::new();
     let cases = [
         ("two", "overlap = [0.45, 0.55]", 75.5, [45, 55, 45, 55]),
         ("three", "intervals = [[0.0, 0.38], [0.29, 0.71], [0.62, 1.0]]", 104.8, [29, 38, 62, 71]),
@@ -513,10 +513,10 @@ pub fn figure_8_6(_: Options) -> Result<Rerun> {
             scales: [Scale::Linear; 2],
             curves,
         };
-        figures.push((format!("figure-8-6-{side}"), figure));
+        pictures.push((format!("figure-8-6-{side}"), figure.draw()));
     }
     table.note("MMPDE5, τ = 1e-2, backward Euler, Δt = 1e-3; the mesh is monotone throughout");
-    Ok(Rerun { tables: vec![table], figures })
+    Ok(Rerun { tables: vec![table], pictures })
 }
 
 pub fn coarse(options: Options) -> Result<Rerun> {
@@ -562,5 +562,5 @@ pub fn coarse(options: Options) -> Result<Rerun> {
         curves,
         ..Figure::default()
     };
-    Ok(Rerun { tables: vec![table], figures: vec![("coarse".into(), figure)] })
+    Ok(Rerun { tables: vec![table], pictures: vec![("coarse".into(), figure.draw())] })
 }

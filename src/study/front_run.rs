@@ -6,8 +6,8 @@ use crate::error::{Error, Moment, Result};
 use crate::geometry::{Field, quality};
 use crate::report;
 use crate::simulation::{
-    Event, Failed, Frames, Observer, Parallel, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw, draw_curves,
-    final_arrays, status,
+    Event, Failed, Frames, Observer, Parallel, Picture, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw,
+    draw_curves, final_arrays, status,
 };
 use crate::stefan::{Front, FrontState, LOWER, Problem, Stepping, UPPER};
 use serde::Serialize;
@@ -101,6 +101,10 @@ pub struct FrontFinished {
     pub state: FrontState,
     /// x of its columns.
     pub columns: Vec<f64>,
+    /// Times and fronts, some of them.
+    pub fronts: Vec<(f64, Vec<f64>)>,
+    /// Both phases of the last good state as one mesh.
+    pub whole: State,
     /// Why the run ended early, if it did.
     pub failure: Option<Error>,
 }
@@ -184,16 +188,12 @@ impl StefanStudy {
         directory.write_summary(&summary)?;
         let mut tables = Tables::create(directory.path(), prepared.front.columns.x())?;
         let mut frames = Frames::create(directory.path(), prepared.frames.clone(), [1, 1])?;
-        let mut curves: Vec<(f64, Vec<f64>)> = Vec::new();
+        let mut fronts = Vec::new();
         let failure = {
             let mut leave = |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState| {
                 if let Some(row) = row {
                     tables.write(row, &state.front)?;
-                    let due =
-                        curves.last().is_none_or(|_| snapshot.share >= curves.len() as f64 / CURVES as f64 - 1e-9);
-                    if due {
-                        curves.push((state.t, state.front.clone()));
-                    }
+                    collect(&mut fronts, snapshot.share, state);
                 }
                 frames.observe(event, snapshot)?;
                 watchers.iter_mut().try_for_each(|watcher| watcher.observe(event, snapshot))
@@ -201,20 +201,21 @@ impl StefanStudy {
             go(&mut prepared, &mut summary, begin, &mut leave).err()
         };
         let output = Instant::now();
-        let kept = self.keep(&directory, &prepared, &mut frames, &curves);
+        let mut finished = FrontFinished::of(summary, prepared, fronts, failure)?;
+        let kept = self.keep(&directory, &finished, &mut frames);
+        let FrontFinished { summary, failure, .. } = &mut finished;
         summary.seconds.output += output.elapsed().as_secs_f64();
         summary.seconds.wall = begin.elapsed().as_secs_f64();
         summary.status = status(failure.as_ref()).into();
         summary.error = failure.as_ref().map(Failed::from);
-        directory.write_summary(&summary)?;
+        directory.write_summary(summary)?;
         kept?;
         let output = Instant::now();
         report::finish(directory.path(), self.output.report, self.output.animation)?;
         summary.seconds.output += output.elapsed().as_secs_f64();
         summary.seconds.wall = begin.elapsed().as_secs_f64();
-        directory.write_summary(&summary)?;
-        let columns = prepared.front.columns.x().to_vec();
-        Ok(FrontFinished { summary, state: prepared.state, columns, failure })
+        directory.write_summary(summary)?;
+        Ok(finished)
     }
 
     /// Runs the study without leaving anything on disk.
@@ -224,10 +225,14 @@ impl StefanStudy {
     pub fn compute(&self) -> Result<FrontFinished> {
         let mut prepared = self.prepare()?;
         let mut summary = self.summary();
-        let failure = go(&mut prepared, &mut summary, Instant::now(), &mut |_, _, _, _| Ok(())).err();
+        let mut fronts = Vec::new();
+        let mut leave = |_, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState| {
+            row.iter().for_each(|_| collect(&mut fronts, snapshot.share, state));
+            Ok(())
+        };
+        let failure = go(&mut prepared, &mut summary, Instant::now(), &mut leave).err();
         summary.status = status(failure.as_ref()).into();
-        let columns = prepared.front.columns.x().to_vec();
-        Ok(FrontFinished { summary, state: prepared.state, columns, failure })
+        FrontFinished::of(summary, prepared, fronts, failure)
     }
 
     fn summary(&self) -> StefanSummary {
@@ -247,33 +252,52 @@ impl StefanStudy {
     }
 
     /// Writes the last good state: as a frame, as arrays, as pictures.
-    fn keep(
-        &self,
-        directory: &RunDirectory,
-        prepared: &Prepared,
-        frames: &mut Frames,
-        curves: &[(f64, Vec<f64>)],
-    ) -> Result<()> {
+    fn keep(&self, directory: &RunDirectory, finished: &FrontFinished, frames: &mut Frames) -> Result<()> {
         let names = ["u".to_string()];
-        let state = pictured(&prepared.front, &prepared.state)?;
-        frames.write(&names, &state)?;
-        directory.write("final.npz", &final_arrays(&names, &state))?;
-        let t: f64 = format!("{:.9}", state.t).parse().unwrap_or(state.t);
-        let picture = draw(&format!("{}, t = {t}", self.study.name), "u", &state);
-        directory.write("mesh.svg", picture.svg.as_bytes())?;
-        directory.write("mesh.png", &picture.png)?;
-        let mut curves = curves.to_vec();
-        if curves.last().is_none_or(|(t, _)| *t != prepared.state.t) {
-            curves.push((prepared.state.t, prepared.state.front.clone()));
+        frames.write(&names, &finished.whole)?;
+        directory.write("final.npz", &final_arrays(&names, &finished.whole))?;
+        for (name, picture) in ["mesh", "front"].into_iter().zip(finished.pictures(&self.study.name)) {
+            directory.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
+            directory.write(&format!("{name}.png"), &picture.png)?;
         }
-        let all = || curves.iter().flat_map(|(_, h)| h.iter().copied());
+        Ok(())
+    }
+}
+
+/// Keeps some of the fronts, evenly over the run.
+fn collect(fronts: &mut Vec<(f64, Vec<f64>)>, share: f64, state: &FrontState) {
+    if fronts.is_empty() || share >= fronts.len() as f64 / CURVES as f64 - 1e-9 {
+        fronts.push((state.t, state.front.clone()));
+    }
+}
+
+impl FrontFinished {
+    fn of(
+        summary: StefanSummary,
+        prepared: Prepared,
+        mut fronts: Vec<(f64, Vec<f64>)>,
+        failure: Option<Error>,
+    ) -> Result<Self> {
+        let Prepared { front, state, .. } = prepared;
+        if fronts.last().is_none_or(|(t, _)| *t != state.t) {
+            fronts.push((state.t, state.front.clone()));
+        }
+        let whole = pictured(&front, &state)?;
+        Ok(Self { summary, columns: front.columns.x().to_vec(), fronts, whole, state, failure })
+    }
+
+    /// The mesh over the temperature, and the fronts over time.
+    pub fn pictures(&self, title: &str) -> [Picture; 2] {
+        let t: f64 = format!("{:.9}", self.state.t).parse().unwrap_or(self.state.t);
+        let all = || self.fronts.iter().flat_map(|(_, h)| h.iter().copied());
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
         let margin = (0.05 * (high - low)).max(1e-3 * high.abs().max(1e-12));
-        let x = prepared.front.columns.x();
-        let title = format!("{}, the front over time", self.study.name);
-        let picture = draw_curves(&title, "t", x, &curves, [x[0], low - margin], [x[x.len() - 1], high + margin]);
-        directory.write("front.svg", picture.svg.as_bytes())?;
-        directory.write("front.png", &picture.png)
+        let (x, last) = (&self.columns, self.columns.len() - 1);
+        let over_time = format!("{title}, the front over time");
+        [
+            draw(&format!("{title}, t = {t}"), "u", &self.whole),
+            draw_curves(&over_time, "t", x, &self.fronts, [x[0], low - margin], [x[last], high + margin]),
+        ]
     }
 }
 

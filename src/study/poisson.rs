@@ -7,7 +7,7 @@ use crate::laplacian::{Laplacian, Poisson, Polynomials, Scaling, Stencils, outwa
 use crate::numerics::{larger, sum};
 use crate::report;
 use crate::setting::pair;
-use crate::simulation::{Failed, Frames, FramesAt, Parallel, RunDirectory, State, draw, final_arrays};
+use crate::simulation::{Failed, Frames, FramesAt, Parallel, Picture, RunDirectory, State, draw, final_arrays};
 use crate::study::Source;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
@@ -433,6 +433,24 @@ impl PoissonStudy {
 }
 
 impl Solved {
+    /// The solution as a state: its mesh, u and the error where it is known, with their names.
+    fn state(&self) -> (Vec<String>, State) {
+        let mut names = vec!["u".to_string()];
+        let mut fields = vec![self.u.clone()];
+        if let Some(exact) = &self.exact {
+            names.push("error".into());
+            fields.push(self.u.iter().zip(exact).map(|(u, e)| u - e).collect());
+        }
+        let rho = vec![1.0; self.u.len()];
+        let velocity = vec![[0.0; 2]; rho.len()];
+        (names, State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, velocity })
+    }
+
+    /// The mesh over the solution.
+    pub fn picture(&self, title: &str) -> Picture {
+        draw(title, "u", &self.state().1)
+    }
+
     /// What is known of the stencils.
     pub fn report(&self) -> StencilReport {
         StencilReport {
@@ -482,19 +500,11 @@ fn values<const K: usize>(mesh: &Mesh<2>, what: &str, program: &Program<2, K>) -
 
 /// Writes the solution: as a frame, as arrays, as a picture.
 fn keep(study: &PoissonStudy, directory: &RunDirectory, solved: &Solved) -> Result<()> {
-    let mut names = vec!["u".to_string()];
-    let mut fields = vec![solved.u.clone()];
-    if let Some(exact) = &solved.exact {
-        names.push("error".into());
-        fields.push(solved.u.iter().zip(exact).map(|(u, e)| u - e).collect());
-    }
-    let rho = vec![1.0; solved.u.len()];
-    let velocity = vec![[0.0; 2]; rho.len()];
-    let state = State { t: 0.0, step: 0, mesh: solved.mesh.clone(), u: Field::joined(&fields), rho, velocity };
+    let (names, state) = solved.state();
     Frames::create(directory.path(), FramesAt::Every(1), [1, 1])?.write(&names, &state)?;
     directory.write("final.npz", &final_arrays(&names, &state))?;
     let title = format!("{}, {}", study.study.name, study.laplacian.kind);
-    let picture = draw(&title, "u", &state);
+    let picture = solved.picture(&title);
     directory.write("mesh.svg", picture.svg.as_bytes())?;
     directory.write("mesh.png", &picture.png)
 }

@@ -205,6 +205,7 @@ KINDS = [
     ("periodic", "dam-break-auto", ["time.end=0.05", "time.report=[0.05]"]),
     ("poisson", "laplacian-model-problem", []),
     ("stefan", "stefan-slides", ["time.end=0.2", "time.report=[0.2]"]),
+    ("equidistribution", "table-8-1-nonlinear", []),
 ]
 
 

@@ -67,7 +67,13 @@ impl Grid {
 
 /// VTK's vectors have three components.
 fn vectors(xml: &mut String, name: &str, values: &[[f64; 2]]) {
-    array(xml, "Float64", name, 3, values.iter().flat_map(|v| [v[0], v[1], 0.0]).map(f64::to_le_bytes));
+    let three = |v: &[f64; 2]| {
+        let mut bytes = [0; 24];
+        bytes[..8].copy_from_slice(&v[0].to_le_bytes());
+        bytes[8..16].copy_from_slice(&v[1].to_le_bytes());
+        bytes
+    };
+    array(xml, "Float64", name, 3, values.iter().map(three));
 }
 
 /// One array: a header of block count, block size, last block size and compressed size, then the one block.
