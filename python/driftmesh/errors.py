@@ -12,7 +12,17 @@ from typing import Any
 
 
 class StudyError(ValueError):
-    """A mistake in a study: its line, a caret under the place, and the remedy, as the program prints them."""
+    """A mistake in a study: its line, a caret under the place, and the remedy, as the program prints them.
+
+    >>> import driftmesh
+    >>> try:
+    ...     driftmesh.equidistribute("x^^2", 10)
+    ... except driftmesh.StudyError as mistake:
+    ...     print(mistake)
+    `value`: something is missing after `^`
+      x^^2
+       ^
+    """
 
 
 class MeshError(ArithmeticError):
@@ -23,6 +33,13 @@ class MeshError(ArithmeticError):
         step: That step.
         directory: Where everything up to the last good state is, where a study was run.
         result: What there is up to the failure: a :class:`driftmesh.Run` or a :class:`driftmesh.SchwarzResult`.
+
+    >>> import driftmesh
+    >>> try:
+    ...     driftmesh.schwarz("x^2 + 1", 100, overlap=(0.4, 0.6), tolerance=1e-10, iterations=5)
+    ... except driftmesh.MeshError as failure:
+    ...     print(type(failure).__name__, failure.result.iterations)
+    NotConverged 5
     """
 
     t: float | None = None

@@ -65,14 +65,26 @@ class Arclength(_Kind):
 
 @dataclass(frozen=True)
 class RootGradient(_Kind):
-    """ρ = 1 + 4 √|∇u| / mean of √|∇u|, smoothed: no number to set. What ``monitor.kind = "auto"`` is in a study."""
+    """ρ = 1 + 4 √|∇u| / mean of √|∇u|, smoothed: no number to set. What ``monitor.kind = "auto"`` is in a study.
+
+    >>> from driftmesh import MeshGenerator, RootGradient
+    >>> MeshGenerator().monitor == RootGradient()
+    True
+    """
 
     kind = "auto"
 
 
 @dataclass(frozen=True)
 class Given(_Kind):
-    """u is the density itself: positive at every node. ``smoothing`` passes of the filter follow."""
+    """u is the density itself: positive at every node. ``smoothing`` passes of the filter follow.
+
+    >>> from driftmesh import Given, Mesh, MeshGenerator
+    >>> mesh = Mesh.uniform(cells=(8, 8))
+    >>> new = MeshGenerator(monitor=Given()).step(mesh, 1 + 3 * mesh.x, dt=0.1)
+    >>> bool(new.x[4, 4] > 0.5)  # more nodes where the density is larger
+    True
+    """
 
     kind = "given"
     smoothing: int = 0
@@ -81,14 +93,27 @@ class Given(_Kind):
 
 @dataclass(frozen=True)
 class Whole(_Kind):
-    """One implicit solve of the mesh equation on the whole domain."""
+    """One implicit solve of the mesh equation on the whole domain.
+
+    >>> from driftmesh import Mesh, MeshGenerator, Whole
+    >>> mesh = Mesh.uniform(cells=(8, 8))
+    >>> generator = MeshGenerator(method=Whole())
+    >>> generator.step(mesh, mesh.x**2, dt=0.1).cells
+    (8, 8)
+    """
 
     kind = "whole"
 
 
 @dataclass(frozen=True)
 class Fixed(_Kind):
-    """The mesh does not move."""
+    """The mesh does not move.
+
+    >>> from driftmesh import Fixed, Mesh, MeshGenerator
+    >>> mesh = Mesh.uniform(cells=(8, 8))
+    >>> MeshGenerator(method=Fixed()).step(mesh, mesh.x**2, dt=0.1) == mesh
+    True
+    """
 
     kind = "fixed"
 
@@ -102,6 +127,13 @@ class Schwarz(_Kind):
         overlap: Cells that neighbours share.
         tolerance: Change in the last iteration, as a share of the largest coordinate.
         iterations: Most in a step.
+
+    >>> from driftmesh import Mesh, MeshGenerator, Schwarz
+    >>> mesh = Mesh.uniform(cells=(16, 16))
+    >>> generator = MeshGenerator(method=Schwarz(subdomains=(2, 2)))
+    >>> _ = generator.step(mesh, mesh.x**2, dt=0.01)
+    >>> generator.last["interface"]["contraction"]["observed"] < 1
+    True
     """
 
     kind = "schwarz"
@@ -119,6 +151,10 @@ class ResidualWalk(_Kind):
         sweeps: A number, or ``"auto"``.
         walks: From each node.
         smoother: ``"chebyshev"`` or ``"jacobi"``.
+
+    >>> from driftmesh import ResidualWalk, Stochastic
+    >>> Stochastic(subdomains=(4, 4)).estimator == ResidualWalk()
+    True
     """
 
     kind = "residual-walk"
@@ -129,7 +165,12 @@ class ResidualWalk(_Kind):
 
 @dataclass(frozen=True)
 class GridWalk(_Kind):
-    """Random walks on the lattice; ``increment`` estimates the motion over the step instead of the position."""
+    """Random walks on the lattice; ``increment`` estimates the motion over the step instead of the position.
+
+    >>> from driftmesh import GridWalk, Stochastic
+    >>> Stochastic(subdomains=(4, 4), estimator=GridWalk(walks=100, increment=True)).estimator.walks
+    100
+    """
 
     kind = "grid-walk"
     walks: int
@@ -138,7 +179,12 @@ class GridWalk(_Kind):
 
 @dataclass(frozen=True)
 class MonteCarlo(_Kind):
-    """Paths of the stochastic differential equation, as published, with ``substeps`` in a time step."""
+    """Paths of the stochastic differential equation, as published, with ``substeps`` in a time step.
+
+    >>> from driftmesh import MonteCarlo, Stochastic
+    >>> Stochastic(subdomains=(4, 4), estimator=MonteCarlo(paths=10000, substeps=10)).estimator.sobol
+    False
+    """
 
     kind = "monte-carlo"
     paths: int
@@ -151,7 +197,12 @@ class MonteCarlo(_Kind):
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Estimates ``sample`` nodes of each interface only, placed ``"uniform"`` or by ``"density"``, and interpolates."""
+    """Estimates ``sample`` nodes of each interface only, placed ``"uniform"`` or by ``"density"``, and interpolates.
+
+    >>> from driftmesh import Interpolation, Stochastic
+    >>> Stochastic(subdomains=(4, 4), interface=Interpolation(sample=9)).interface.placement
+    'density'
+    """
 
     sample: int
     placement: Literal["density", "uniform"] = "density"
@@ -166,6 +217,13 @@ class Stochastic(_Kind):
         estimator: :class:`ResidualWalk`, :class:`GridWalk` or :class:`MonteCarlo`.
         seed: Of all random numbers.
         interface: :class:`Interpolation`, or every node where nothing is said.
+
+    >>> from driftmesh import Mesh, MeshGenerator, Stochastic
+    >>> mesh = Mesh.uniform(cells=(16, 16))
+    >>> generator = MeshGenerator(method=Stochastic(subdomains=(2, 2), seed=1))
+    >>> _ = generator.step(mesh, mesh.x**2, dt=0.01)
+    >>> generator.last["interface"]["points"]
+    29
     """
 
     kind = "stochastic"

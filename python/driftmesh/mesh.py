@@ -28,6 +28,10 @@ class Quality:
         q_mean: Mean Q over the cells.
         min_scaled_jacobian: Smallest corner Jacobian over that of the uniform mesh; positive as long as no cell is folded.
         equidistribution: max/mean of density × area over the cells; 1 is perfect.
+
+    >>> from driftmesh import Mesh
+    >>> Mesh.uniform(cells=(4, 4)).quality()
+    Quality(q_max=1.0, q_mean=1.0, min_scaled_jacobian=1.0, equidistribution=1.0)
     """
 
     q_max: float

@@ -37,6 +37,8 @@ class Frame:
         t: Time.
         path: The ``.vtu`` file, which ParaView, PyVista and meshio open too.
         shape: (nx + 1, ny + 1).
+
+    See :class:`Run` for an example.
     """
 
     t: float
@@ -94,6 +96,26 @@ class Run:
             without time.
         final: Arrays of ``final.npz`` by name: the last mesh and the unknowns on it.
         frames: States over time.
+
+    >>> import tempfile
+    >>> from driftmesh import run
+    >>> study = {
+    ...     "study": {"name": "bump", "kind": "moving-mesh"},
+    ...     "grid": {"cells": [12, 12]},
+    ...     "time": {"start": 0, "end": 0.01, "step": 0.005},
+    ...     "pde": {
+    ...         "kind": "formula",
+    ...         "unknowns": ["u"],
+    ...         "diffusivity": {"u": 0.01},
+    ...         "initial": {"u": "exp(-20*((x - 0.5)^2 + (y - 0.5)^2))"},
+    ...         "boundary": {"u": "no-flux"},
+    ...     },
+    ...     "output": {"report": False},
+    ... }
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     result = run(study, out=out)
+    ...     result.status, result.frames[-1].names, result.frames[-1]["u"].shape
+    ('completed', ['u', 'rho', 'mesh velocity'], (13, 13))
     """
 
     directory: Path
@@ -138,8 +160,16 @@ class Run:
 def load(directory: str | PathLike[str]) -> Run:
     """Opens the directory of a run: finished, failed or interrupted.
 
+    Args:
+        directory: As given to :func:`run`, or to the program.
+
     Raises:
         FileNotFoundError: It has no ``summary.json``.
+
+    >>> from driftmesh import load
+    >>> load("no/such/run")
+    Traceback (most recent call last):
+    FileNotFoundError: no/such/run is no run directory: it has no summary.json
     """
     path = Path(directory)
     summary = path / "summary.json"

@@ -56,8 +56,8 @@ def test_package_and_examples_pass_mypy_strict(tmp_path):
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_in_docstrings_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    failed, _ = doctest.testmod(importlib.import_module(f"driftmesh.{name}"))
-    assert failed == 0
+    failed, tried = doctest.testmod(importlib.import_module(f"driftmesh.{name}"))
+    assert failed == 0 < tried
 
 
 def test_every_public_function_has_an_example_and_says_what_it_raises():
@@ -65,10 +65,10 @@ def test_every_public_function_has_an_example_and_says_what_it_raises():
         value = getattr(driftmesh, name)
         if name.startswith("_"):
             continue
-        doc = inspect.getdoc(value)
-        assert doc and len(doc) > 20, name
-        if inspect.isfunction(value) and name != "load":
-            assert ">>> " in doc and "Raises:" in doc and "Args:" in doc, name
+        doc = inspect.getdoc(value) or ""
+        assert ">>> " in doc or "for an example" in doc, name
+        if inspect.isfunction(value):
+            assert "Raises:" in doc and "Args:" in doc, name
 
 
 def test_the_examples_of_the_readme_run(tmp_path):
