@@ -8,9 +8,9 @@ use crate::error::Failure;
 /// ```
 ///
 /// Σ A u ([`DualCells::areas`]) is kept to round-off, constants exactly. u_f is the value upwind with van Leer's limited
-/// slope, of second order where u is smooth, and no value leaves the range of its neighbours. Nodes go from one mesh to the
-/// other in straight lines, in as many steps as keep what a dual cell gives and takes below half of it: one for meshes that
-/// differ by a time step.
+/// slope, of second order where u is smooth (of first at nodes on sides), and no value leaves the range of its neighbours.
+/// Nodes go from one mesh to the other in straight lines, in as many steps as keep what the faces of a dual cell sweep below
+/// half of it: one for meshes that differ by a time step.
 ///
 /// # Errors
 /// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where values
@@ -79,29 +79,35 @@ fn largest_share(old: &DualCells, new: &DualCells) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
+/// A u + Σ s u_f, by Heun's method: both stages with the same swept areas, so that constants stay.
 fn stepped(mesh: &Mesh<2>, values: &[f64], old: &DualCells, new: &DualCells) -> Vec<f64> {
-    let (patch, swept) = (old.patch(), old.swept(new));
+    let swept = old.swept(new);
+    let first = carried(mesh, values, old, &swept);
+    let areas = || values.iter().zip(old.areas()).zip(new.areas());
+    let middle: Vec<f64> = areas().zip(&first).map(|(((u, before), after), c)| (before * u + c) / after).collect();
+    let second = carried(mesh, &middle, old, &swept);
+    let changes = first.iter().zip(&second).map(|(a, b)| 0.5 * (a + b));
+    areas().zip(changes).map(|(((u, before), after), change)| (before * u + change) / after).collect()
+}
+
+/// What the faces of each dual cell bring in.
+fn carried(mesh: &Mesh<2>, values: &[f64], cells: &DualCells, swept: &[[f64; 2]]) -> Vec<f64> {
+    let patch = cells.patch();
     let strides = patch.padded_strides();
     let nodal: Vec<[f64; 1]> = values.iter().map(|u| [*u]).collect();
     let u: Vec<f64> = padded(mesh.lattice(), &nodal, [[0.0]; 2]).into_flattened();
     // beyond a bounded side stands the value of the side, so that no slope is seen there
     let mut slopes = vec![[0.0; 2]; u.len()];
-    let mut areas = vec![f64::INFINITY; u.len()];
-    for (k, area) in patch.places().zip(old.areas()) {
+    for k in patch.places() {
         slopes[k] = strides.map(|s| limited(u[k] - u[k - s], u[k + s] - u[k]));
-        areas[k] = *area;
     }
     patch.wrap(&mut slopes);
-    patch.wrap(&mut areas);
-    let carried = |k: usize, d: usize| {
+    let through = |k: usize, d: usize| {
         let (s, above) = (swept[k][d], k + strides[d]);
         // a face that moves up takes from above
-        let (from, side) = if s > 0.0 { (above, -0.5) } else { (k, 0.5) };
-        s * (u[from] + side * (1.0 - s.abs() / areas[from]) * slopes[from][d])
+        s * if s > 0.0 { u[above] - 0.5 * slopes[above][d] } else { u[k] + 0.5 * slopes[k][d] }
     };
-    let nodes = patch.places().zip(old.areas().iter().zip(new.areas()));
-    let change = |k: usize| (0..2).map(|d| carried(k, d) - carried(k - strides[d], d)).sum::<f64>();
-    nodes.map(|(k, (before, after))| (before * u[k] + change(k)) / after).collect()
+    patch.places().map(|k| (0..2).map(|d| through(k, d) - through(k - strides[d], d)).sum()).collect()
 }
 
 /// Van Leer's mean of two differences: harmonic where they agree in sign, 0 where they do not.
