@@ -1,7 +1,7 @@
 use crate::errors::raised;
 use crate::threads::{BRIEFLY, Ended, PATIENCE, interruptible};
 use driftmesh::error::Moment;
-use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot};
+use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, State};
 use driftmesh::study::{Source, Study};
 use driftmesh::{Error, Result};
 use pyo3::prelude::*;
@@ -25,14 +25,26 @@ impl Seen {
 
 struct Watcher(Arc<Seen>);
 
+impl Watcher {
+    fn saw(&self, share: f64, state: &State) -> Result<()> {
+        *self.0.progress() = Some((share, state.t, state.step));
+        match self.0.stop.load(Ordering::Relaxed) {
+            true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
+            false => Ok(()),
+        }
+    }
+}
+
 impl Observer for Watcher {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        let state = snapshot.state;
-        *self.0.progress() = Some((snapshot.share, state.t, state.step));
-        if event != Event::Finished && self.0.stop.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted(Moment { t: state.t, step: state.step }));
+        match event {
+            Event::Finished => Ok(()),
+            _ => self.saw(snapshot.share, snapshot.state),
         }
-        Ok(())
+    }
+
+    fn adapting(&mut self, state: &State) -> Result<()> {
+        self.saw(0.0, state)
     }
 }
 

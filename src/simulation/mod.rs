@@ -129,19 +129,18 @@ impl Simulation {
     /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
     ///
     /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more than a
-    /// small share of the shortest edge. Observers see each of them ([`Event::Starting`]).
+    /// small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
     ///
     /// # Errors
     /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer returned.
     pub fn adapted(&self, mut mesh: Mesh<2>, observers: &mut [&mut dyn Observer]) -> Result<(Mesh<2>, bool)> {
-        let (mut record, started) = (Record::default(), Instant::now());
         let equation = Mmpde { relaxation: Relaxation::steps(STEPS_OF_THE_START), ..self.equation };
         let given = mesh.clone();
         let mut whole = Whole::to(0.1 * AT_REST);
         let mut before: Option<Vec<f64>> = None;
         for _ in 0..MAX_STEPS_OF_THE_START {
             let mut state = self.start(mesh)?;
-            self.show(Event::Starting, &state, &mut record, observers, 0.0, started)?;
+            observers.iter_mut().try_for_each(|observer| observer.adapting(&state))?;
             if let Some(before) = &before {
                 blend(before, &mut state.rho);
             }

@@ -15,8 +15,6 @@ use crate::meshing::Interface;
 /// What just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Event {
-    /// The mesh is adapted to the initial solution: a state that the run may start from.
-    Starting,
     /// The initial state is there.
     Started,
     /// A step was done.
@@ -57,4 +55,13 @@ pub trait Observer {
     /// # Errors
     /// Whatever stops the observer from doing its work, such as a full disk.
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()>;
+
+    /// Called before the run, with every mesh on the way to the one that is adapted to the initial solution. An error ends
+    /// the run.
+    ///
+    /// # Errors
+    /// Whatever stops the observer from doing its work.
+    fn adapting(&mut self, _state: &State) -> Result<()> {
+        Ok(())
+    }
 }
