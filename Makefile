@@ -3,7 +3,7 @@ CARGO ?= cargo
 PYTHON ?= python3
 VENV := .venv
 
-.PHONY: check test slow bench docs
+.PHONY: check test slow bench docs python
 
 # Formatting, lints and documentation, without a warning.
 check:
@@ -15,7 +15,17 @@ check:
 test: $(VENV)/ready
 	$(CARGO) build --release --workspace
 	$(CARGO) test --release --workspace
-	$(VENV)/bin/python -m pytest -q tests/python
+	$(MAKE) python
+	$(VENV)/bin/python -m pip install --quiet --force-reinstall --no-deps target/wheels/*.whl
+	$(VENV)/bin/python -m pytest tests/python python/tests
+
+# A wheel, installed as a new user would in a fresh environment with nothing else, and the README's examples with it.
+python: $(VENV)/ready
+	rm -rf target/wheels target/fresh
+	$(VENV)/bin/maturin build --release --out target/wheels
+	$(PYTHON) -m venv target/fresh
+	target/fresh/bin/python -m pip install --quiet target/wheels/*.whl
+	target/fresh/bin/python python/tests/readme.py
 
 # Tests that take minutes. None needs to yet: everything runs in `test`.
 slow: test
@@ -28,6 +38,8 @@ bench: $(VENV)/ready
 	$(VENV)/bin/python benches/mesh_solve.py
 	$(VENV)/bin/python benches/stencils.py
 	$(VENV)/bin/python benches/schwarz_line.py
+	$(VENV)/bin/python -m pip install --quiet .
+	$(VENV)/bin/python benches/mesh_steps.py
 
 # The library's documentation in target/doc, and the gallery of studies in target/doc/gallery.
 docs:

@@ -22,7 +22,7 @@ fn developed(n: usize) -> State {
     }
     let study = MovingMesh::from_source(&source).unwrap();
     let mut simulation = study.simulation().unwrap();
-    let mut state = study.start(&simulation, &mut Record::default()).unwrap();
+    let mut state = study.start(&simulation, &mut Record::default(), &mut []).unwrap();
     simulation.run(&mut state, &mut Record::default(), &mut []).unwrap();
     state
 }

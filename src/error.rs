@@ -406,6 +406,9 @@ pub enum Error {
         /// The step that failed.
         moment: Option<Moment>,
     },
+    /// Somebody asked a run to end.
+    #[error("interrupted at t = {:.6} (step {})", .0.t, .0.step)]
+    Interrupted(Moment),
     /// A setting is out of range.
     #[error("`{key}` is {value}, but {rule}")]
     Invalid {
@@ -548,13 +551,13 @@ impl Error {
             Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
             Self::ForeignDirectory { .. } => Some("name another directory with --out, or empty this one".into()),
             Self::NotARun { .. } => Some("name the directory that `driftmesh run` printed behind `run`".into()),
-            Self::Invalid { .. } | Self::Unreadable { .. } | Self::Unwritable { .. } => None,
+            Self::Interrupted(_) | Self::Invalid { .. } | Self::Unreadable { .. } | Self::Unwritable { .. } => None,
         }
     }
 
     /// True if the computation failed (exit status 1), false if what was asked for is wrong (exit status 2).
     pub fn is_failure(&self) -> bool {
-        matches!(self, Self::Failed { .. } | Self::Unwritable { .. })
+        matches!(self, Self::Failed { .. } | Self::Interrupted(_) | Self::Unwritable { .. })
     }
 }
 

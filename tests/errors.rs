@@ -392,3 +392,32 @@ fn not_converged() {
     let short = line.solve(0.0, &[0.0, 1.0], None).unwrap_err();
     assert_says(short, &["`guess` is 2 nodes, but 20 cells have 21"], None, false);
 }
+
+/// An observer that ends the run after the third step.
+struct Impatient;
+
+impl driftmesh::simulation::Observer for Impatient {
+    fn observe(
+        &mut self,
+        _event: driftmesh::simulation::Event,
+        snapshot: &driftmesh::simulation::Snapshot<'_>,
+    ) -> driftmesh::Result<()> {
+        let state = snapshot.state;
+        match state.step {
+            3 => Err(Error::Interrupted(driftmesh::error::Moment { t: state.t, step: state.step })),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The last good state is there, and the summary says why the run ended.
+#[test]
+fn interrupted_runs_leave_their_last_state() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = driftmesh::study::Source::read("studies/burgers-b-conservative.toml".as_ref()).unwrap();
+    let study = driftmesh::study::Study::from_source(&source).unwrap();
+    let failure = study.run(directory.path(), &mut [&mut Impatient]).unwrap().unwrap();
+    assert_says(failure, &["interrupted at t = 0.253", "(step 3)"], None, true);
+    let summary = std::fs::read_to_string(directory.path().join("summary.json")).unwrap();
+    assert!(summary.contains("\"status\": \"interrupted\"") && directory.path().join("final.npz").is_file());
+}

@@ -79,7 +79,7 @@ fn a_prediction_has_no_lag() {
         let study = study(start, 1.0, relaxation);
         let mut simulation = study.simulation().unwrap();
         let mut record = Record::default();
-        let mut state = study.start(&simulation, &mut record).unwrap();
+        let mut state = study.start(&simulation, &mut record, &mut []).unwrap();
         if start < 0.9 {
             simulation.run(&mut state, &mut record, &mut []).unwrap();
         }

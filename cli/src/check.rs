@@ -24,7 +24,7 @@ impl Check {
             }
         };
         study.warnings()?.iter().for_each(|warning| warn(warning));
-        if let Err(error) = study.start(&study.simulation()?, &mut driftmesh::simulation::Record::default()) {
+        if let Err(error) = study.start(&study.simulation()?, &mut driftmesh::simulation::Record::default(), &mut []) {
             return Ok(complain(&error, study.remedy(&error).or_else(|| error.help()), None));
         }
         Ok(valid(&study.to_toml(), study.memory()))

@@ -1,5 +1,7 @@
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake, Program};
+use std::fmt;
+use std::sync::Arc;
 
 /// M(x, t) > 0 on a line, with its exact derivative by x
 ///
@@ -12,12 +14,65 @@ pub struct LineDensity {
     followed: Option<Program<1, 1>>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 enum Kind {
     /// M and M_x.
     Formula(Program<1, 2>),
     /// u_x and u_xx.
     Arclength(Program<1, 2>),
+    /// [M, M_x] of a time and places.
+    Function(Arc<Function>),
+    /// Linear between places.
+    Samples(Samples),
+}
+
+/// M at some places, linear between them and constant beyond.
+#[derive(Clone)]
+struct Samples {
+    x: Vec<f64>,
+    m: Vec<f64>,
+    /// ∫M from the first place.
+    integral: Vec<f64>,
+}
+
+impl Samples {
+    /// The piece that x lies in, and how far from its beginning.
+    fn place(&self, x: f64) -> (usize, f64) {
+        let k = self.x.partition_point(|at| *at <= x).clamp(1, self.x.len() - 1) - 1;
+        (k, x - self.x[k])
+    }
+
+    fn slope(&self, k: usize) -> f64 {
+        (self.m[k + 1] - self.m[k]) / (self.x[k + 1] - self.x[k])
+    }
+
+    fn at(&self, x: f64) -> [f64; 2] {
+        let (k, along) = self.place(x);
+        match x.clamp(self.x[0], self.x[self.x.len() - 1]) {
+            end if end != x => [self.m[if along < 0.0 { 0 } else { k + 1 }], 0.0],
+            _ => [self.m[k] + along * self.slope(k), self.slope(k)],
+        }
+    }
+
+    /// ∫M from the first place to x.
+    fn up_to(&self, x: f64) -> f64 {
+        let inside = x.clamp(self.x[0], self.x[self.x.len() - 1]);
+        let (k, along) = self.place(inside);
+        self.integral[k] + along * (self.m[k] + 0.5 * along * self.slope(k)) + (x - inside) * self.at(x)[0]
+    }
+}
+
+type Function = dyn Fn(f64, &[f64]) -> Vec<[f64; 2]> + Send + Sync;
+
+impl fmt::Debug for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Formula(_) => "Formula",
+            Self::Arclength(_) => "Arclength",
+            Self::Function(_) => "Function",
+            Self::Samples(_) => "Samples",
+        })
+    }
 }
 
 /// Nodes and weights of the Gauss–Kronrod rule of 15 points on [−1, 1], of the half with x ≥ 0, and of the 7-point Gauss
@@ -68,6 +123,58 @@ impl LineDensity {
         Ok(Self { kind: Kind::Arclength(Program::new([&slope, &curvature])), followed: Some(Program::new([&u])) })
     }
 
+    /// [M, M_x] by a function of t and some places, which gives one pair a place.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::equidistribution::{Line, LineDensity};
+    /// let density = LineDensity::function(|_, x| x.iter().map(|x| [x * x + 1.0, 2.0 * x]).collect());
+    /// let [by_function, by_formula] = [density, LineDensity::formula("x^2 + 1")?].map(|density| {
+    ///     let line = Line::new(density, 20);
+    ///     line.solve(0.0, &line.uniform(), None).unwrap().0
+    /// });
+    /// assert_eq!(by_function, by_formula);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn function(f: impl Fn(f64, &[f64]) -> Vec<[f64; 2]> + Send + Sync + 'static) -> Self {
+        Self { kind: Kind::Function(Arc::new(f)), followed: None }
+    }
+
+    /// M at some places, linear between them and constant beyond; best with [`FaceDensity::Exact`](super::FaceDensity).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless there are two places or more that grow from left to right, with a finite M above 0 each.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
+    /// // ∫M = x + x²/2: half of it lies left of √2.5 − 1
+    /// let line = Line { face: FaceDensity::Exact, ..Line::new(LineDensity::sampled(vec![0.0, 1.0], vec![1.0, 2.0])?, 20) };
+    /// let x = line.solve(0.0, &line.uniform(), None)?.0;
+    /// assert!((x[10] - (2.5_f64.sqrt() - 1.0)).abs() < 1e-12);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn sampled(x: Vec<f64>, m: Vec<f64>) -> Result<Self> {
+        if x.len() < 2 || x.len() != m.len() {
+            let rule = format!("must have two places or more and one value each, not {}", m.len());
+            return Err(Error::invalid("density", format!("{} places", x.len()), rule));
+        }
+        if let Some(k) = (1..x.len()).find(|&k| !(x[k] > x[k - 1] && (x[k] - x[0]).is_finite())) {
+            let rule = format!("places must be finite and grow from left to right; place {} is {}", k - 1, x[k - 1]);
+            return Err(Error::invalid("density", format!("at {} in place {k}", x[k]), rule));
+        }
+        if let Some(k) = m.iter().position(|m| !(m.is_finite() && *m > 0.0)) {
+            return Err(Error::invalid("density", format!("{} at {}", m[k], x[k]), "it must be finite and above 0"));
+        }
+        let mut integral = vec![0.0];
+        let mut sum = 0.0;
+        for k in 1..x.len() {
+            sum += 0.5 * (m[k - 1] + m[k]) * (x[k] - x[k - 1]);
+            integral.push(sum);
+        }
+        Ok(Self { kind: Kind::Samples(Samples { x, m, integral }), followed: None })
+    }
+
     /// u at each place, where M is an arc length.
     pub fn followed(&self, t: f64, x: &[f64]) -> Option<Vec<f64>> {
         let mut out = vec![[0.0]; x.len()];
@@ -91,6 +198,15 @@ impl LineDensity {
                     let (u_x, u_xx) = (*m, *slope);
                     *m = (1.0 + u_x * u_x).sqrt();
                     *slope = u_x * u_xx / *m;
+                }
+            }
+            Kind::Samples(samples) => {
+                out.iter_mut().zip(x).for_each(|(out, x)| *out = samples.at(*x));
+            }
+            Kind::Function(f) => {
+                out = f(t, x);
+                if out.len() != x.len() {
+                    return Err(Failure::WrongLength { what: "the density", found: out.len(), expected: x.len() });
                 }
             }
         }
@@ -150,7 +266,10 @@ impl LineDensity {
     /// # Errors
     /// As [`at_each`](Self::at_each).
     pub fn integral(&self, t: f64, a: f64, b: f64) -> Result<f64, Failure> {
-        self.piece(t, a, b, DEEPEST)
+        match &self.kind {
+            Kind::Samples(samples) => Ok(samples.up_to(b) - samples.up_to(a)),
+            _ => self.piece(t, a, b, DEEPEST),
+        }
     }
 
     fn piece(&self, t: f64, a: f64, b: f64, depth: usize) -> Result<f64, Failure> {

@@ -7,6 +7,7 @@ mod locate;
 mod mesh;
 mod patch;
 mod quality;
+mod remap;
 mod simple;
 
 pub use dual::{DualCells, padded};
@@ -19,4 +20,5 @@ pub use patch::Patch;
 pub use quality::{
     Comparison, Quality, cell_areas, cell_jacobians, cell_qualities, check_unfolded, compare, node_areas, quality,
 };
+pub use remap::remap;
 pub use simple::check_simple;

@@ -70,6 +70,7 @@ pub fn render(run: &RunFiles, plots: &[(&str, Figure)], viewer: Option<&Viewer>)
             "completed" => "The run is complete.".into(),
             "failed" => "The run failed; everything up to the last good state is here.".into(),
             "not-converged" => "The iteration did not converge.".into(),
+            "interrupted" => "The run was interrupted; everything up to the last good state is here.".into(),
             "running" => {
                 "The run has not ended: it was interrupted, or still goes on. This is what it left so far.".into()
             }

@@ -256,7 +256,7 @@ pub(super) fn table_2(options: Options) -> Result<Vec<Table>> {
 /// The state at the end of a study.
 fn state_of(study: &MovingMesh) -> Result<State> {
     let mut simulation = study.simulation()?;
-    let mut state = study.start(&simulation, &mut Record::default())?;
+    let mut state = study.start(&simulation, &mut Record::default(), &mut [])?;
     simulation.run(&mut state, &mut Record::default(), &mut [])?;
     Ok(state)
 }

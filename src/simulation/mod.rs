@@ -9,9 +9,9 @@ mod schedule;
 
 pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
-pub(crate) use report::write_file;
 pub use report::{Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Summary, WorkTotal};
 pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
+pub(crate) use report::{status, write_file};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
@@ -129,17 +129,18 @@ impl Simulation {
     /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
     ///
     /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more than a
-    /// small share of the shortest edge.
+    /// small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
     ///
     /// # Errors
-    /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds.
-    pub fn adapted(&self, mut mesh: Mesh<2>) -> Result<(Mesh<2>, bool)> {
+    /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer returned.
+    pub fn adapted(&self, mut mesh: Mesh<2>, observers: &mut [&mut dyn Observer]) -> Result<(Mesh<2>, bool)> {
         let equation = Mmpde { relaxation: Relaxation::steps(STEPS_OF_THE_START), ..self.equation };
         let given = mesh.clone();
         let mut whole = Whole::to(0.1 * AT_REST);
         let mut before: Option<Vec<f64>> = None;
         for _ in 0..MAX_STEPS_OF_THE_START {
             let mut state = self.start(mesh)?;
+            observers.iter_mut().try_for_each(|observer| observer.adapting(&state))?;
             if let Some(before) = &before {
                 blend(before, &mut state.rho);
             }

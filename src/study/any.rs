@@ -1,6 +1,8 @@
 use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::simulation::Observer;
 use serde::Deserialize;
+use std::path::Path;
 
 /// A study of any kind.
 #[derive(Debug, Clone)]
@@ -36,6 +38,27 @@ impl Study {
             Ok(StudyKind::Stefan) => StefanStudy::from_source(source).map(Self::Stefan),
             Ok(StudyKind::Equidistribution) => EquidistributionStudy::from_source(source).map(Self::Equidistribution),
             _ => MovingMesh::from_source(source).map(Self::MovingMesh),
+        }
+    }
+
+    /// Runs it into a directory, and says why it ended early, if it did. Observers watch what goes step by step.
+    ///
+    /// # Errors
+    /// As the `run` of each kind.
+    pub fn run(&self, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<Option<Error>> {
+        Ok(match self {
+            Self::MovingMesh(study) => super::run(study, directory, watchers)?.failure,
+            Self::Poisson(study) => study.run(directory).map(|_| None)?,
+            Self::Stefan(study) => study.run(directory, watchers)?.failure,
+            Self::Equidistribution(study) => study.run(directory)?.failure,
+        })
+    }
+
+    /// The remedy for an error, in the keys of this study.
+    pub fn remedy(&self, error: &Error) -> Option<String> {
+        match self {
+            Self::MovingMesh(study) => study.remedy(error),
+            _ => error.help(),
         }
     }
 

@@ -285,14 +285,14 @@ impl EquidistributionStudy {
         if cells < 2 {
             return Err(Error::invalid("grid.cells", format!("[{cells}]"), "must be 2 or more"));
         }
-        super::memory::check(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
+        super::memory::check_memory(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
         self.resolve_time()?;
         self.check_density()?;
         if let Some(schwarz) = &mut self.schwarz {
             schwarz.resolve(self.time.is_some()).map_err(|error| error.within("schwarz"))?;
             schwarz.ranges(cells).map_err(|error| error.within("schwarz"))?;
         }
-        self.resolve_stop().map_err(|error| error.within("stop"))?;
+        self.stop.resolve().map_err(|error| error.within("stop"))?;
         let first = if self.time.is_some() { FirstMesh::Equidistributed } else { FirstMesh::Uniform };
         self.start.mesh.get_or_insert(first);
         self.given_start().map(|_| ())
@@ -336,23 +336,6 @@ impl EquidistributionStudy {
         Ok(())
     }
 
-    fn resolve_stop(&mut self) -> Result<()> {
-        let stop = &mut self.stop;
-        match (stop.iterations, stop.tolerance) {
-            (Some(0), _) => return Err(Error::invalid("iterations", 0, "must be 1 or more")),
-            (Some(n), _) if n > MAX_ITERATIONS => {
-                return Err(Error::invalid("iterations", n, format!("must be at most {MAX_ITERATIONS}")));
-            }
-            (_, Some(tolerance)) if !(tolerance.is_finite() && tolerance > 0.0) => {
-                return Err(Error::invalid("tolerance", tolerance, "must be above 0"));
-            }
-            (None, None) => stop.tolerance = Some(TOLERANCE),
-            _ => {}
-        }
-        stop.iterations.get_or_insert(ITERATIONS);
-        Ok(())
-    }
-
     fn line(&self, density: LineDensity) -> Line {
         let ends = [self.domain.lower[0], self.domain.upper[0]];
         Line { density, face: self.equidistribution.face_density, cells: self.grid.cells[0], ends }
@@ -378,8 +361,7 @@ impl EquidistributionStudy {
 
     /// When an iteration ends.
     pub fn until(&self) -> Stop {
-        let StopTable { iterations, tolerance, measure } = self.stop;
-        Stop { iterations: iterations.unwrap_or(ITERATIONS), tolerance, measure }
+        self.stop.until()
     }
 
     /// The first mesh, where it is not a solution.
@@ -422,6 +404,34 @@ impl EquidistributionStudy {
     }
 }
 
+impl StopTable {
+    /// Checks the settings and fills in the defaults.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub fn resolve(&mut self) -> Result<()> {
+        match (self.iterations, self.tolerance) {
+            (Some(0), _) => return Err(Error::invalid("iterations", 0, "must be 1 or more")),
+            (Some(n), _) if n > MAX_ITERATIONS => {
+                return Err(Error::invalid("iterations", n, format!("must be at most {MAX_ITERATIONS}")));
+            }
+            (_, Some(tolerance)) if !(tolerance.is_finite() && tolerance > 0.0) => {
+                return Err(Error::invalid("tolerance", tolerance, "must be above 0"));
+            }
+            (None, None) => self.tolerance = Some(TOLERANCE),
+            _ => {}
+        }
+        self.iterations.get_or_insert(ITERATIONS);
+        Ok(())
+    }
+
+    /// When an iteration ends.
+    pub fn until(&self) -> Stop {
+        let Self { iterations, tolerance, measure } = *self;
+        Stop { iterations: iterations.unwrap_or(ITERATIONS), tolerance, measure }
+    }
+}
+
 impl LineTime {
     /// The times of all steps.
     ///
@@ -434,7 +444,10 @@ impl LineTime {
 
 impl SchwarzTable {
     /// Refuses options of another method, and fills in this one's.
-    fn resolve(&mut self, in_time: bool) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub fn resolve(&mut self, in_time: bool) -> Result<()> {
         use MethodName::{Classical, Optimal, Optimized};
         let options = [
             ("sweep", self.sweep.is_some(), Classical),
@@ -476,7 +489,8 @@ impl SchwarzTable {
         Ok(())
     }
 
-    fn method(&self) -> Method {
+    /// The method with its options.
+    pub fn method(&self) -> Method {
         match self.method {
             MethodName::Classical => Method::Classical {
                 sweep: self.sweep.unwrap_or_default(),
@@ -491,7 +505,11 @@ impl SchwarzTable {
         }
     }
 
-    fn ranges(&self, cells: usize) -> Result<Vec<[usize; 2]>> {
+    /// The first and last node of each subdomain of a line of so many cells.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the key, where there is no node or the method cannot use them.
+    pub fn ranges(&self, cells: usize) -> Result<Vec<[usize; 2]>> {
         let given = [
             ("overlap", self.overlap.is_some()),
             ("intervals", self.intervals.is_some()),

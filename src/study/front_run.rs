@@ -7,7 +7,7 @@ use crate::geometry::{Field, quality};
 use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, Observer, Parallel, Picture, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw,
-    draw_curves, final_arrays,
+    draw_curves, final_arrays, status,
 };
 use crate::stefan::{Front, FrontState, LOWER, Problem, Stepping, UPPER};
 use serde::Serialize;
@@ -206,7 +206,7 @@ impl StefanStudy {
         let FrontFinished { summary, failure, .. } = &mut finished;
         summary.seconds.output += output.elapsed().as_secs_f64();
         summary.seconds.wall = begin.elapsed().as_secs_f64();
-        summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+        summary.status = status(failure.as_ref()).into();
         summary.error = failure.as_ref().map(Failed::from);
         directory.write_summary(summary)?;
         kept?;
@@ -231,7 +231,7 @@ impl StefanStudy {
             Ok(())
         };
         let failure = go(&mut prepared, &mut summary, Instant::now(), &mut leave).err();
-        summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+        summary.status = status(failure.as_ref()).into();
         FrontFinished::of(summary, prepared, fronts, failure)
     }
 

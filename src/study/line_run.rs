@@ -2,9 +2,9 @@
 
 use super::EquidistributionStudy;
 use crate::equidistribution::{History, Iterate, Line};
-use crate::error::{Error, Failure, Moment, Result};
+use crate::error::{Error, Moment, Result};
 use crate::report;
-use crate::simulation::{Curve, Failed, Figure, Parallel, RunDirectory, Scale};
+use crate::simulation::{Curve, Failed, Figure, Parallel, RunDirectory, Scale, status};
 use ndarray::{Array1, Array2, arr0};
 use ndarray_npy::{NpzWriter, WriteNpzError};
 use serde::Serialize;
@@ -250,12 +250,7 @@ impl EquidistributionStudy {
         let clock = Instant::now();
         summary.tell(&study, &line, &evolution);
         summary.failure = failure.as_ref().map(Failed::from);
-        summary.status = match &failure {
-            None => "completed",
-            Some(Error::Failed { failure: Failure::NotConverged { .. }, .. }) => "not-converged",
-            Some(_) => "failed",
-        }
-        .into();
+        summary.status = status(failure.as_ref()).into();
         keep(&study, &line, &directory, &evolution)?;
         summary.seconds.output = clock.elapsed().as_secs_f64();
         summary.seconds.wall = begin.elapsed().as_secs_f64();

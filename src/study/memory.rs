@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Invalid`] for `grid.cells`.
-pub(super) fn check(nodes: u128, bytes_per_node: u128, cells: &[usize]) -> Result<()> {
+pub fn check_memory(nodes: u128, bytes_per_node: u128, cells: &[usize]) -> Result<()> {
     let there = sysinfo::System::new().map_or(u128::MAX, |mut system| {
         system.refresh_memory();
         u128::from(system.total_memory())

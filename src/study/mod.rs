@@ -24,7 +24,10 @@ pub use line_run::{
     Rate, StepRow,
 };
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
-pub use moving_mesh::{Compare, Domain, Grid, Header, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time};
+pub use memory::check_memory;
+pub use moving_mesh::{
+    Compare, Domain, Grid, Header, MeshForm, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time,
+};
 pub use poisson::{
     Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary,
     Sides, Solved, SolverKind, SolverTable, StencilReport,

@@ -5,7 +5,7 @@ use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
-use crate::simulation::{Coupling, FramesAt, Record, Schedule, Simulation, State, timed};
+use crate::simulation::{Coupling, FramesAt, Observer, Record, Schedule, Simulation, State, timed};
 use serde::{Deserialize, Serialize};
 
 /// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
@@ -459,15 +459,20 @@ impl MovingMesh {
     }
 
     /// The state that the run starts from; `record` gets the time that it took, and a warning where the mesh does not come
-    /// to rest.
+    /// to rest. Observers see the states in between.
     ///
     /// # Errors
-    /// [`Error::Failed`] where there is none.
-    pub fn start(&self, simulation: &Simulation, record: &mut Record) -> Result<State> {
+    /// [`Error::Failed`] where there is none, or what an observer returned.
+    pub fn start(
+        &self,
+        simulation: &Simulation,
+        record: &mut Record,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<State> {
         record.timed(|record| {
             let mut mesh = self.uniform_mesh()?;
             if self.mesh.start == Some(StartMesh::Adapted) {
-                let (adapted, at_rest) = timed(&mut record.seconds.mesh, || simulation.adapted(mesh))?;
+                let (adapted, at_rest) = timed(&mut record.seconds.mesh, || simulation.adapted(mesh, observers))?;
                 mesh = adapted;
                 if !at_rest {
                     record.warnings.push(

@@ -259,7 +259,7 @@ impl PoissonStudy {
             let rule = "the solution is then known up to a constant only; leave one side out";
             return Err(Error::invalid("sides.neumann", "all four sides", rule));
         }
-        super::memory::check(
+        super::memory::check_memory(
             self.grid.cells.iter().map(|&n| n as u128 + 1).product(),
             BYTES_PER_NODE,
             &self.grid.cells,

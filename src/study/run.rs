@@ -4,7 +4,7 @@ use crate::geometry::{Mesh, compare};
 use crate::report;
 use crate::simulation::{
     Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw,
-    final_arrays,
+    final_arrays, status,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -51,7 +51,7 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     directory.write("study.toml", study.to_toml().as_bytes())?;
     directory.write_summary(&summary)?;
     let mut record = Record { warnings: study.warnings()?, ..Record::default() };
-    let outcome = study.start(&simulation, &mut record).and_then(|mut state| {
+    let outcome = study.start(&simulation, &mut record, watchers).and_then(|mut state| {
         let mut history = History::create(&directory.path().join("history.csv"))?;
         let mut frames = Frames::create(directory.path(), study.frames(), study.mesh.generator.subdomains())?;
         let mut meshes = Meshes::of(&study);
@@ -72,7 +72,7 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     });
 
     let failure = outcome.as_ref().map_or_else(Some, |(_, failure)| failure.as_ref());
-    summary.status = if failure.is_some() { "failed" } else { "completed" }.into();
+    summary.status = status(failure).into();
     summary.error = failure.map(Failed::from);
     summary.seconds = record.seconds;
     summary.work = record.work;
@@ -100,7 +100,7 @@ pub fn compute(study: &MovingMesh) -> Result<(Record, Option<Error>)> {
     study.resolve()?;
     let mut simulation = study.simulation()?;
     let mut record = Record::default();
-    let mut state = study.start(&simulation, &mut record)?;
+    let mut state = study.start(&simulation, &mut record, &mut [])?;
     let mut meshes = Meshes::of(&study);
     let failure = simulation.run(&mut state, &mut record, &mut [&mut meshes]).err();
     let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record, &mut []).err(), Some);
@@ -145,7 +145,7 @@ fn compare_with_reference(
 ) -> Result<()> {
     let Some(reference) = study.reference() else { return Ok(()) };
     let mut simulation = reference.simulation()?;
-    let mut state = reference.start(&simulation, &mut Record::default())?;
+    let mut state = reference.start(&simulation, &mut Record::default(), &mut [])?;
     let mut theirs = Meshes::of(study);
     let mut observers: Vec<&mut dyn Observer> = vec![&mut theirs];
     watchers.iter_mut().for_each(|watcher| observers.push(*watcher));

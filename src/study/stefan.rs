@@ -406,7 +406,7 @@ impl StefanStudy {
         let walls = [wall("bottom", &self.domain.bottom)?, wall("top", &self.domain.top)?];
         check_between(x, &walls).map_err(|error| error.within("domain"))?;
         let nodes = self.memory() / BYTES_PER_NODE;
-        super::memory::check(nodes, BYTES_PER_NODE, &self.grid.cells)?;
+        super::memory::check_memory(nodes, BYTES_PER_NODE, &self.grid.cells)?;
         let [bottom, top] = &walls;
         let columns =
             Columns::new(x, [&|x| bottom.eval(&[x]), &|x| top.eval(&[x])], self.grid.cells, self.grid.grading)

@@ -55,4 +55,13 @@ pub trait Observer {
     /// # Errors
     /// Whatever stops the observer from doing its work, such as a full disk.
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()>;
+
+    /// Called before the run, with every mesh on the way to the one that is adapted to the initial solution. An error ends
+    /// the run.
+    ///
+    /// # Errors
+    /// Whatever stops the observer from doing its work.
+    fn adapting(&mut self, _state: &State) -> Result<()> {
+        Ok(())
+    }
 }

@@ -13,4 +13,5 @@ pub use directory::RunDirectory;
 pub(crate) use directory::write_file;
 pub use figure::{Curve, Figure, Scale};
 pub use picture::{Picture, Pixels, Sheet, draw};
+pub(crate) use summary::status;
 pub use summary::{Conserved, ErrorNorms, Failed, Parallel, Report, Seconds, Summary, WorkTotal};

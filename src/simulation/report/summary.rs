@@ -1,4 +1,4 @@
-use crate::error::Error;
+use crate::error::{Error, Failure};
 use crate::geometry::{Comparison, Quality};
 use crate::meshing::Interface;
 use crate::work::Work;
@@ -15,7 +15,7 @@ pub struct Summary {
     pub kind: String,
     /// Version of the program.
     pub version: String,
-    /// `running`, `completed` or `failed`.
+    /// `running`, `completed`, `interrupted` or `failed`.
     pub status: String,
     /// What failed and when, if it did.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,9 +50,20 @@ impl From<&Error> for Failed {
     fn from(error: &Error) -> Self {
         let (kind, moment) = match error {
             Error::Failed { failure, moment } => (failure.name(), *moment),
+            Error::Interrupted(moment) => ("interrupted", Some(*moment)),
             _ => ("unwritable", None),
         };
         Self { kind: kind.into(), message: error.to_string(), t: moment.map(|m| m.t), step: moment.map(|m| m.step) }
+    }
+}
+
+/// `status` of a run that has ended, from what ended it early.
+pub(crate) fn status(failure: Option<&Error>) -> &'static str {
+    match failure {
+        None => "completed",
+        Some(Error::Failed { failure: Failure::NotConverged { .. }, .. }) => "not-converged",
+        Some(Error::Interrupted(_)) => "interrupted",
+        Some(_) => "failed",
     }
 }
 

@@ -1,0 +1,62 @@
+"""Moving meshes for time-dependent PDEs.
+
+Three ways in:
+
+* move a mesh to the data of your own solver: :class:`Mesh`, :class:`MeshGenerator`, :func:`transfer`;
+* run a study: :func:`run`, :func:`load`;
+* the tools by themselves: :func:`laplacian_stencils`, :func:`equidistribute`, :func:`schwarz`.
+
+Arrays over a mesh have shape ``(nx + 1, ny + 1)``, first index along ξ; periodic axes repeat their first node at the end.
+Any real dtype, strides and order will do. Wrong shapes and values raise :class:`ValueError`, numerical failures
+:class:`MeshError` or the subclass of it that is named after the failure.
+"""
+
+from ._driftmesh import VERSION as __version__
+from .errors import MeshError, StudyError
+from .generators import (
+    Arclength,
+    Fixed,
+    Given,
+    GridWalk,
+    Interpolation,
+    MeshGenerator,
+    MonteCarlo,
+    ResidualWalk,
+    RootGradient,
+    Schwarz,
+    Stochastic,
+    Whole,
+)
+from .laplacian import laplacian_stencils
+from .line import SchwarzResult, equidistribute, schwarz
+from .mesh import Mesh, Quality, transfer
+from .study import Frame, Run, load, run
+
+__all__ = [
+    "Arclength",
+    "Fixed",
+    "Frame",
+    "Given",
+    "GridWalk",
+    "Interpolation",
+    "Mesh",
+    "MeshError",
+    "MeshGenerator",
+    "MonteCarlo",
+    "Quality",
+    "ResidualWalk",
+    "RootGradient",
+    "Run",
+    "Schwarz",
+    "SchwarzResult",
+    "Stochastic",
+    "StudyError",
+    "Whole",
+    "__version__",
+    "equidistribute",
+    "laplacian_stencils",
+    "load",
+    "run",
+    "schwarz",
+    "transfer",
+]

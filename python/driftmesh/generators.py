@@ -1,0 +1,348 @@
+"""What moves a mesh: monitors, methods, and the generator that puts them together."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _driftmesh, _toml
+from ._arrays import finite, positive
+from .mesh import Mesh, periodic_values
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A table of a study that says its kind."""
+
+    kind: ClassVar[str]
+
+    def _table(self) -> dict[str, Any]:
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {"kind": self.kind} | {
+            name: value._table() if isinstance(value, _Kind) else value for name, value in values.items()
+        }
+
+
+@dataclass(frozen=True)
+class Arclength(_Kind):
+    """ρ = √(1 + α|∇u|²), smoothed.
+
+    Args:
+        relative: α = relative / max|∇u|²; 30 where neither is given.
+        absolute: α itself, in the unit (x/u)².
+        smoothing: Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+        gradient: How ∇ρ/ρ is differenced where ``form="gradient"``: ``"central"``, ``"log"`` or ``"safe"``.
+
+    Raises:
+        ValueError: Both are given. Numbers out of range are refused by the generator.
+
+    >>> from driftmesh import Arclength
+    >>> Arclength(relative=30, smoothing=2).smoothing
+    2
+    """
+
+    kind = "arclength"
+    relative: float | None = None
+    absolute: float | None = None
+    smoothing: int = 2
+    gradient: Literal["central", "log", "safe"] = "central"
+
+    def __post_init__(self) -> None:
+        if self.relative is not None and self.absolute is not None:
+            raise ValueError(f"give `relative` or `absolute`, not both: {self.relative} and {self.absolute}")
+
+    def _table(self) -> dict[str, Any]:
+        strength = {"relative": self.relative, "absolute": self.absolute}
+        if self.relative is None and self.absolute is None:
+            strength["relative"] = 30.0
+        return {"kind": self.kind, "strength": strength, "smoothing": self.smoothing, "gradient": self.gradient}
+
+
+@dataclass(frozen=True)
+class RootGradient(_Kind):
+    """ρ = 1 + 4 √|∇u| / mean of √|∇u|, smoothed: no number to set. What ``monitor.kind = "auto"`` is in a study.
+
+    >>> from driftmesh import MeshGenerator, RootGradient
+    >>> MeshGenerator().monitor == RootGradient()
+    True
+    """
+
+    kind = "auto"
+
+
+@dataclass(frozen=True)
+class Given(_Kind):
+    """u is the density itself: positive at every node. ``smoothing`` passes of the filter follow.
+
+    >>> from driftmesh import Given, Mesh, MeshGenerator
+    >>> mesh = Mesh.uniform(cells=(8, 8))
+    >>> new = MeshGenerator(monitor=Given()).step(mesh, 1 + 3 * mesh.x, dt=0.1)
+    >>> bool(new.x[4, 4] > 0.5)  # more nodes where the density is larger
+    True
+    """
+
+    kind = "given"
+    smoothing: int = 0
+    gradient: Literal["central", "log", "safe"] = "central"
+
+
+@dataclass(frozen=True)
+class Whole(_Kind):
+    """One implicit solve of the mesh equation on the whole domain.
+
+    >>> from driftmesh import Mesh, MeshGenerator, Whole
+    >>> mesh = Mesh.uniform(cells=(8, 8))
+    >>> generator = MeshGenerator(method=Whole())
+    >>> generator.step(mesh, mesh.x**2, dt=0.1).cells
+    (8, 8)
+    """
+
+    kind = "whole"
+
+
+@dataclass(frozen=True)
+class Fixed(_Kind):
+    """The mesh does not move.
+
+    >>> from driftmesh import Fixed, Mesh, MeshGenerator
+    >>> mesh = Mesh.uniform(cells=(8, 8))
+    >>> MeshGenerator(method=Fixed()).step(mesh, mesh.x**2, dt=0.1) == mesh
+    True
+    """
+
+    kind = "fixed"
+
+
+@dataclass(frozen=True)
+class Schwarz(_Kind):
+    """Overlapping subdomains, solved in parallel and iterated to a tolerance.
+
+    Args:
+        subdomains: Along each axis.
+        overlap: Cells that neighbours share.
+        tolerance: Change in the last iteration, as a share of the largest coordinate.
+        iterations: Most in a step.
+
+    >>> from driftmesh import Mesh, MeshGenerator, Schwarz
+    >>> mesh = Mesh.uniform(cells=(16, 16))
+    >>> generator = MeshGenerator(method=Schwarz(subdomains=(2, 2)))
+    >>> _ = generator.step(mesh, mesh.x**2, dt=0.01)
+    >>> generator.last["interface"]["contraction"]["observed"] < 1
+    True
+    """
+
+    kind = "schwarz"
+    subdomains: tuple[int, int] = (2, 2)
+    overlap: int = 2
+    tolerance: float = 1e-10
+    iterations: int = 1000
+
+
+@dataclass(frozen=True)
+class ResidualWalk(_Kind):
+    """Sweeps of relaxation, then random walks that estimate what the sweeps leave.
+
+    Args:
+        sweeps: A number, or ``"auto"``.
+        walks: From each node.
+        smoother: ``"chebyshev"`` or ``"jacobi"``.
+
+    >>> from driftmesh import ResidualWalk, Stochastic
+    >>> Stochastic(subdomains=(4, 4)).estimator == ResidualWalk()
+    True
+    """
+
+    kind = "residual-walk"
+    sweeps: int | Literal["auto"] = "auto"
+    walks: int = 10
+    smoother: Literal["chebyshev", "jacobi"] = "chebyshev"
+
+
+@dataclass(frozen=True)
+class GridWalk(_Kind):
+    """Random walks on the lattice; ``increment`` estimates the motion over the step instead of the position.
+
+    >>> from driftmesh import GridWalk, Stochastic
+    >>> Stochastic(subdomains=(4, 4), estimator=GridWalk(walks=100, increment=True)).estimator.walks
+    100
+    """
+
+    kind = "grid-walk"
+    walks: int
+    increment: bool = False
+
+
+@dataclass(frozen=True)
+class MonteCarlo(_Kind):
+    """Paths of the stochastic differential equation, as published, with ``substeps`` in a time step.
+
+    >>> from driftmesh import MonteCarlo, Stochastic
+    >>> Stochastic(subdomains=(4, 4), estimator=MonteCarlo(paths=10000, substeps=10)).estimator.sobol
+    False
+    """
+
+    kind = "monte-carlo"
+    paths: int
+    substeps: int
+    antithetic: bool = False
+    sobol: bool = False
+    control_variate: bool = False
+    common: bool = False
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """Estimates ``sample`` nodes of each interface only, placed ``"uniform"`` or by ``"density"``, and interpolates.
+
+    >>> from driftmesh import Interpolation, Stochastic
+    >>> Stochastic(subdomains=(4, 4), interface=Interpolation(sample=9)).interface.placement
+    'density'
+    """
+
+    sample: int
+    placement: Literal["density", "uniform"] = "density"
+
+
+@dataclass(frozen=True)
+class Stochastic(_Kind):
+    """Random walks give the nodes between the subdomains, then each is solved by itself: no iteration between them.
+
+    Args:
+        subdomains: Along each axis.
+        estimator: :class:`ResidualWalk`, :class:`GridWalk` or :class:`MonteCarlo`.
+        seed: Of all random numbers.
+        interface: :class:`Interpolation`, or every node where nothing is said.
+
+    >>> from driftmesh import Mesh, MeshGenerator, Stochastic
+    >>> mesh = Mesh.uniform(cells=(16, 16))
+    >>> generator = MeshGenerator(method=Stochastic(subdomains=(2, 2), seed=1))
+    >>> _ = generator.step(mesh, mesh.x**2, dt=0.01)
+    >>> generator.last["interface"]["points"]
+    29
+    """
+
+    kind = "stochastic"
+    subdomains: tuple[int, int] = (2, 2)
+    estimator: ResidualWalk | GridWalk | MonteCarlo = ResidualWalk()
+    seed: int = 0
+    interface: Interpolation | None = None
+
+    def _table(self) -> dict[str, Any]:
+        sample = None if self.interface is None else vars(self.interface)
+        return super()._table() | {"interface": sample}
+
+
+#: Where a mesh should be fine: a monitor of u, the density itself, or a function of mesh and u that gives it.
+Monitor: TypeAlias = "Arclength | RootGradient | Given | NDArray[Any] | Callable[[Mesh, Any], ArrayLike]"
+
+
+class MeshGenerator:
+    """Moves a mesh step by step to where its monitor wants it: x_t = (1/τ)(∇ρ/ρ·∇x + ∇²x) in ξ, implicit in time.
+
+    Args:
+        monitor: :class:`Arclength`, :class:`RootGradient` (the default, nothing to set), :class:`Given`; or the density
+            itself, an array of shape (nx + 1, ny + 1) that may be set anew between steps; or a function of mesh and u that
+            returns it. A density is positive, only its ratios matter.
+        method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`.
+        relaxation: τ, in units of time: how long the mesh takes to follow. Or ``{"steps": 25}``, so many time steps.
+        form: ``"conservative"``, stable for any density, or ``"gradient"``, as published.
+
+    Raises:
+        ValueError: Settings out of range.
+
+    A generator remembers its last step (to start the next solve near its end) and counts steps (for the random numbers of
+    :class:`Stochastic`); use one for each run. A copy and an unpickled one begin anew.
+
+    >>> import numpy as np
+    >>> from driftmesh import Arclength, Mesh, MeshGenerator
+    >>> mesh = Mesh.uniform(cells=(20, 20))
+    >>> generator = MeshGenerator(monitor=Arclength(relative=30, smoothing=2), relaxation=0.1)
+    >>> for _ in range(20):
+    ...     mesh = generator.step(mesh, np.tanh(20 * (mesh.x - 0.5)), dt=0.01)
+    >>> bool(np.diff(mesh.x[:, 10]).min() < 0.6 / 20)  # finer in the layer
+    True
+    """
+
+    def __init__(
+        self,
+        monitor: Monitor | None = None,
+        method: Whole | Stochastic | Schwarz | Fixed | None = None,
+        relaxation: float | Mapping[str, float] = 1.0,
+        form: Literal["conservative", "gradient"] = "conservative",
+    ) -> None:
+        method = Whole() if method is None else method
+        if not isinstance(method, (Whole, Stochastic, Schwarz, Fixed)):
+            raise ValueError(f"`method` is {method!r}, but must be Whole(), Stochastic(…), Schwarz(…) or Fixed()")
+        if isinstance(monitor, (str, type)):
+            raise ValueError(
+                f"`monitor` is {monitor!r}, but must be Arclength(…), RootGradient(), Given(), an array or a function"
+            )
+        if isinstance(relaxation, Mapping) and "prediction" in relaxation:
+            raise ValueError("a prediction of the mesh belongs to studies; give relaxation={'steps': …} alone")
+        self.monitor: Monitor = RootGradient() if monitor is None else monitor
+        self._method, self._relaxation, self._form = method, relaxation, form
+        self._begin()
+
+    def _begin(self) -> None:
+        monitor = self.monitor if isinstance(self.monitor, _Kind) else Given()
+        mesh = {"generator": self._method._table(), "relaxation": self._relaxation, "form": self._form}
+        self._native = _driftmesh.Generator(_toml.document({"monitor": monitor._table(), "mesh": mesh}))
+        self._made_for = monitor
+        self._told = "{}"
+
+    def step(self, mesh: Mesh, u: ArrayLike | None, dt: float) -> Mesh:
+        """The mesh at the end of a time step.
+
+        Args:
+            mesh: The mesh now, of a box.
+            u: The solution on it, shape (nx + 1, ny + 1); None where the monitor is a density.
+            dt: Length of the step, in the unit of ``relaxation``, above 0.
+
+        Raises:
+            ValueError: Wrong shapes or values.
+            driftmesh.MeshError: The mesh is or would be folded, a system was not solved.
+
+        >>> from driftmesh import Mesh, MeshGenerator
+        >>> mesh = Mesh.uniform(cells=(8, 8))
+        >>> MeshGenerator(monitor=1 + mesh.x).step(mesh, None, dt=0.1).quality().min_scaled_jacobian < 1
+        True
+        """
+        if not isinstance(mesh, Mesh):
+            raise ValueError(f"`mesh` is of type {type(mesh).__name__}, but must be a driftmesh.Mesh")
+        dt = positive("dt", dt)
+        mesh._check_box()
+        if isinstance(self.monitor, _Kind):
+            if self.monitor != self._made_for:
+                self._begin()
+            if u is None:
+                raise ValueError(f"`u` is None, but the monitor {self.monitor} looks at it")
+            name, values = "u", finite("u", u, mesh.shape)
+        else:
+            if not isinstance(self._made_for, Given):
+                self._begin()
+            given = self.monitor(mesh, u) if callable(self.monitor) else self.monitor
+            name, values = "density", finite("density", given, mesh.shape)
+        if isinstance(self._made_for, Given) and not (values > 0).all():
+            place = tuple(int(k) for k in np.argwhere(~(values > 0))[0])
+            raise ValueError(f"the density is {values[place]} at index {place}, but must be above 0")
+        nodes, self._told = self._native.step(mesh._given(), periodic_values(name, values, mesh), dt)
+        return Mesh._of(nodes, mesh)
+
+    @property
+    def last(self) -> dict[str, Any]:
+        """What the last step cost (``work``), and how well its subdomains fit together (``interface``), as in a study's
+        ``summary.json``; empty before the first."""
+        told: dict[str, Any] = json.loads(self._told)
+        return told
+
+    def __repr__(self) -> str:
+        monitor = self.monitor if isinstance(self.monitor, _Kind) else "a density"
+        return f"MeshGenerator(monitor={monitor}, method={self._method}, relaxation={self._relaxation}, form={self._form!r})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.monitor, self._method, self._relaxation, self._form)

@@ -1,0 +1,255 @@
+"""One dimension: meshes that equidistribute a density, and every Schwarz method for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _driftmesh, _toml
+from ._arrays import Floats, count, finite, pair, real, scalar
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: M(x) > 0: a function of an array of places, a formula of x, a table ``[density]`` of a study, values of M at equal
+#: distances over the domain, or a pair of arrays, places and values.
+Density: TypeAlias = "Callable[[Floats], ArrayLike] | str | Mapping[str, str] | ArrayLike | tuple[ArrayLike, ArrayLike]"
+Faces = Literal["trapezoid", "midpoint", "exact"]
+
+
+def equidistribute(
+    density: Density,
+    cells: int,
+    *,
+    domain: Sequence[float] = (0.0, 1.0),
+    face_density: Faces | None = None,
+) -> Floats:
+    """The mesh on which every cell has the same share of ∫M.
+
+    Args:
+        density: M(x) > 0: a function of an array of places; a formula such as ``"x^2 + 1"``; a table such as
+            ``{"kind": "arclength", "of": "tanh(20*x)"}``; values at equal distances over the domain, or a pair of arrays
+            (places, values), both taken as piecewise linear.
+        cells: Number of cells, at least 2.
+        domain: Ends of the line, in the unit of length.
+        face_density: How M is averaged over a cell: ``"trapezoid"``, ``"midpoint"`` or ``"exact"`` (∫M). Where nothing is
+            said, the exact integral for arrays, which may be rough from cell to cell, and the trapezoid else.
+
+    Returns:
+        The nodes, shape (cells + 1,), in order from end to end.
+
+    Raises:
+        ValueError: Wrong shapes or values; a density that is not finite and positive somewhere
+            (:class:`driftmesh.errors.LineDensity`).
+        driftmesh.errors.NewtonStalled: The nonlinear solve did not converge.
+
+    >>> from driftmesh import equidistribute
+    >>> x = equidistribute(lambda x: x**2 + 1, 100)
+    >>> round(float(x[50]), 4)  # 0.59607… in the continuum
+    0.5961
+    """
+    ends = _ends(domain)
+    given, faces = _density(density, ends, face_density)
+    settings = _toml.document({"equidistribution": {"face_density": faces}})
+    return _driftmesh.equidistribute(given, _cells(cells), ends, settings)
+
+
+@dataclass(frozen=True)
+class SchwarzResult:
+    """How a Schwarz iteration went; entry n of every history belongs to iterate n, entry 0 to the start.
+
+    Attributes:
+        mesh: The glued mesh of the last iterate, shape (cells + 1,).
+        reference: The discrete mesh of the whole line.
+        error: Largest distance of a node of any subdomain from it.
+        increment: Largest change since the iterate before.
+        largest_jump: 2 max|u_i − u_{i−1}|, where M is an arc length; else NaN.
+        interpolation_error: Of the piecewise linear interpolant of u, where M is an arc length; else NaN.
+        linear_solves: So far.
+        observed: Contraction in two iterations.
+        predicted: The same by theory, where there is one.
+        bound: An upper bound by theory, where there is one.
+
+    >>> from driftmesh import schwarz
+    >>> result = schwarz("x^2 + 1", 20, overlap=(0.4, 0.6), iterations=3)
+    >>> result.mesh.shape, result.error.shape
+    ((21,), (4,))
+    """
+
+    mesh: Floats
+    reference: Floats
+    error: Floats
+    increment: Floats
+    largest_jump: Floats
+    interpolation_error: Floats
+    linear_solves: Floats
+    observed: float | None
+    predicted: float | None
+    bound: float | None
+
+    @property
+    def iterations(self) -> int:
+        """Iterations done."""
+        return len(self.error) - 1
+
+    def plot(self, ax: Axes | None = None, **line: Any) -> Axes:
+        """Draws the error over the iterations; needs matplotlib. ``line`` goes to ``Axes.semilogy``."""
+        from . import plot
+
+        return plot.convergence(self.error, ax, **line)
+
+
+def schwarz(
+    density: Density,
+    cells: int,
+    *,
+    method: Literal["classical", "optimal", "optimized"] = "classical",
+    overlap: Sequence[float] | None = None,
+    intervals: Sequence[Sequence[float]] | None = None,
+    cut: float | None = None,
+    cuts: Sequence[float] | None = None,
+    subdomains: int | None = None,
+    overlap_cells: int | None = None,
+    sweep: Literal["parallel", "alternating"] | None = None,
+    linearized: bool | None = None,
+    coarse: Literal["none", "galerkin"] | None = None,
+    robin: float | Literal["auto", "lagged"] | None = None,
+    integral: Literal["exact"] | Mapping[str, int] | None = None,
+    iterations: int | None = None,
+    tolerance: float | None = None,
+    measure: Literal["error", "increment"] = "error",
+    start: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
+    domain: Sequence[float] = (0.0, 1.0),
+    face_density: Faces | None = None,
+) -> SchwarzResult:
+    """Equidistributes subdomain by subdomain and iterates until they agree. Words as in a study of kind
+    ``equidistribution``.
+
+    Args:
+        density: As for :func:`equidistribute`.
+        cells: Number of cells of the whole line.
+        method: ``"classical"`` (overlapping subdomains), ``"optimal"`` or ``"optimized"`` (subdomains that meet).
+        overlap: (α, β): two subdomains [0, β] and [α, 1] in ξ. This, or exactly one of the next four; every end is a node.
+        intervals: Any that overlap, [first, last] each.
+        cut: Two that meet.
+        cuts: Any that meet.
+        subdomains: So many of equal width, ``overlap_cells`` shared by neighbours.
+        overlap_cells: Goes with ``subdomains``.
+        sweep: Classical: ``"parallel"`` or ``"alternating"``.
+        linearized: Classical: M of the iterate before, one linear solve a subdomain.
+        coarse: Classical: ``"galerkin"`` makes the count independent of the number of subdomains.
+        robin: Optimized: p, ``"auto"`` or ``"lagged"``.
+        integral: Optimal: ``"exact"`` or ``{"trapezoid": panels}``.
+        iterations: So many; at most so many with a tolerance, 500 where nothing is said.
+        tolerance: Of ``measure``; 1e-10 where neither is given.
+        measure: ``"error"`` against the discrete mesh of the whole line, or ``"increment"``.
+        start: The first mesh, shape (cells + 1,), or a function of ξ from 0 to 1 that gives it; equal cells by default.
+        domain: Ends of the line.
+        face_density: As for :func:`equidistribute`.
+
+    Raises:
+        ValueError: Wrong shapes or values, subdomains that do not fit.
+        driftmesh.errors.NotConverged: A tolerance was asked for and missed; its ``result`` is how far it came.
+
+    >>> from driftmesh import schwarz
+    >>> result = schwarz("x^2 + 1", 100, overlap=(0.4, 0.6))
+    >>> result.iterations, round(result.predicted, 4)
+    (53, 0.4444)
+    """
+    ends = _ends(domain)
+    n = _cells(cells)
+    table = {
+        "method": method,
+        "overlap": overlap,
+        "intervals": intervals,
+        "cut": cut,
+        "cuts": cuts,
+        "subdomains": subdomains,
+        "overlap_cells": overlap_cells,
+        "sweep": sweep,
+        "linearized": linearized,
+        "coarse": coarse,
+        "robin": robin,
+        "integral": integral,
+    }
+    stop = {"iterations": iterations, "tolerance": tolerance, "measure": measure}
+    given, faces = _density(density, ends, face_density)
+    settings = _toml.document({"equidistribution": {"face_density": faces}, "schwarz": table, "stop": stop})
+    columns, meshes, rates, missed = _driftmesh.schwarz(given, n, ends, settings, _start(start, n, ends))
+    result = SchwarzResult(*meshes, *columns, *rates)
+    if missed is not None:
+        missed.result = result
+        raise missed
+    return result
+
+
+def _cells(cells: int) -> int:
+    if count("cells", cells) < 2:
+        raise ValueError(f"`cells` is {cells}, but must be 2 or more")
+    return int(cells)
+
+
+def _ends(domain: Sequence[float]) -> tuple[float, float]:
+    try:
+        first, second = domain
+    except (TypeError, ValueError):
+        raise ValueError(f"`domain` is {domain!r}, but must be the two ends of the line") from None
+    low, high = scalar("domain", first), scalar("domain", second)
+    if not low < high:
+        raise ValueError(f"`domain` is ({low}, {high}), but must go from left to right")
+    return low, high
+
+
+def _start(start: Any, cells: int, ends: tuple[float, float]) -> list[float] | None:
+    if start is None:
+        return None
+    if callable(start):
+        xi = np.linspace(0.0, 1.0, cells + 1)
+        start = ends[0] + (ends[1] - ends[0]) * finite("start", start(xi), xi.shape, "ξ")
+    mesh: list[float] = finite("start", start, (cells + 1,), "the line").tolist()
+    return mesh
+
+
+def _density(density: Any, ends: tuple[float, float], faces: Faces | None) -> tuple[Any, Faces]:
+    """A density as the library takes it: a kind and a formula, places and values, or a function; and its mean over a cell."""
+    if isinstance(density, str):
+        return ("formula", density), faces or "trapezoid"
+    if isinstance(density, Mapping):
+        keys = {"formula": "value", "arclength": "of"}
+        kind = density.get("kind", "formula")
+        if set(density) - {"kind"} != {keys.get(kind)}:
+            raise ValueError(f"`density` is {dict(density)}, but must be a table such as {{'kind': 'arclength', 'of': 'x^2'}}")
+        return (kind, density[keys[kind]]), faces or "trapezoid"
+    if not callable(density):
+        return _sampled(density, ends), faces or "exact"
+
+    def function(places: Floats) -> Floats:
+        values = real("density", density(places))
+        if values.shape not in ((), places.shape):
+            raise ValueError(f"the density has shape {values.shape}, but was asked for places of shape {places.shape}")
+        return np.ascontiguousarray(np.broadcast_to(values, places.shape))
+
+    return function, faces or "trapezoid"
+
+
+def _sampled(density: Any, ends: tuple[float, float]) -> tuple[list[float], list[float]]:
+    if isinstance(density, tuple):
+        given, samples = pair("density", density)
+        places = finite("places of the density", given)
+        values = finite("density", samples, places.shape, "its array of places")
+        if places.ndim != 1 or len(places) < 2 or not (np.diff(places) > 0).all():
+            raise ValueError("the places of the density must be one array of two or more that grow from left to right")
+        if places[0] > ends[0] or places[-1] < ends[1]:
+            raise ValueError(f"the density is known from {places[0]} to {places[-1]}, but the line goes from {ends[0]} to {ends[1]}")
+    else:
+        values = finite("density", density)
+        if values.ndim != 1 or len(values) < 2:
+            raise ValueError(f"`density` has shape {values.shape}, but must be one array of two values or more")
+        places = np.linspace(*ends, len(values))
+    if not (values > 0).all():
+        raise ValueError(f"`density` is {values.min()} at index {values.argmin()}, but must be above 0")
+    return places.tolist(), values.tolist()

@@ -1,0 +1,320 @@
+"""Studies: run one, open what it left."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+import sys
+import warnings
+import xml.etree.ElementTree as ElementTree
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from . import _driftmesh, _toml
+from ._arrays import Floats
+from .errors import MeshError
+from .mesh import Mesh
+
+if TYPE_CHECKING:
+    from matplotlib.animation import FuncAnimation
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A state of a run, read from its file when it is first looked at.
+
+    Attributes:
+        t: Time.
+        path: The ``.vtu`` file, which ParaView, PyVista and meshio open too.
+        shape: (nx + 1, ny + 1).
+
+    See :class:`Run` for an example.
+    """
+
+    t: float
+    path: Path
+    shape: tuple[int, int]
+
+    @cached_property
+    def _arrays(self) -> dict[str, Floats]:
+        root = ElementTree.parse(self.path).getroot()
+        arrays = {}
+        for element in root.iterfind(".//Points/DataArray"):
+            arrays["points"] = _decoded(element).reshape(*self.shape, 3)
+        for element in root.iterfind(".//PointData/DataArray"):
+            values = _decoded(element)
+            arrays[element.attrib["Name"]] = values.reshape(*self.shape, -1).squeeze(-1) if values.size == np.prod(
+                self.shape
+            ) else values.reshape(*self.shape, 3)[..., :2]
+        return arrays
+
+    @property
+    def x(self) -> Floats:
+        """x of the nodes, shape (nx + 1, ny + 1)."""
+        return np.ascontiguousarray(self._arrays["points"][..., 0])
+
+    @property
+    def y(self) -> Floats:
+        """y of the nodes."""
+        return np.ascontiguousarray(self._arrays["points"][..., 1])
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh, closing nodes of periodic axes included."""
+        return Mesh(self.x, self.y)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the nodal fields: the unknowns first."""
+        return [name for name in self._arrays if name != "points"]
+
+    def __getitem__(self, name: str) -> Floats:
+        """A nodal field by name: shape (nx + 1, ny + 1), with two components behind that for a vector."""
+        if name not in self.names:
+            raise KeyError(f"{name!r}; this frame has {', '.join(self.names)}")
+        return self._arrays[name]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run left behind.
+
+    Attributes:
+        directory: The run directory, with ``report.html``, pictures and everything below as files.
+        summary: ``summary.json``.
+        history: Columns of ``history.csv`` by name, one entry a step (NaN where there is no number); empty for kinds
+            without time.
+        final: Arrays of ``final.npz`` by name: the last mesh and the unknowns on it.
+        frames: States over time.
+
+    >>> import tempfile
+    >>> from driftmesh import run
+    >>> study = {
+    ...     "study": {"name": "bump", "kind": "moving-mesh"},
+    ...     "grid": {"cells": [12, 12]},
+    ...     "time": {"start": 0, "end": 0.01, "step": 0.005},
+    ...     "pde": {
+    ...         "kind": "formula",
+    ...         "unknowns": ["u"],
+    ...         "diffusivity": {"u": 0.01},
+    ...         "initial": {"u": "exp(-20*((x - 0.5)^2 + (y - 0.5)^2))"},
+    ...         "boundary": {"u": "no-flux"},
+    ...     },
+    ...     "output": {"report": False},
+    ... }
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     result = run(study, out=out)
+    ...     result.status, result.frames[-1].names, result.frames[-1]["u"].shape
+    ('completed', ['u', 'rho', 'mesh velocity'], (13, 13))
+    """
+
+    directory: Path
+    summary: dict[str, Any]
+    history: dict[str, Floats]
+    final: dict[str, Floats]
+    frames: list[Frame] = field(repr=False)
+
+    @property
+    def status(self) -> str:
+        """``completed``, ``failed``, ``interrupted``, ``not-converged`` or ``running``."""
+        return str(self.summary["status"])
+
+    @property
+    def mesh(self) -> Mesh:
+        """The last mesh, of kinds in two dimensions."""
+        return Mesh(self.final["x"], self.final["y"])
+
+    def plot(self, path: str | PathLike[str] | None = None, ax: Axes | None = None) -> Axes:
+        """Draws the last state: the mesh over its first unknown, or the convergence of a Schwarz iteration. Needs matplotlib.
+
+        Args:
+            path: Where to save the picture, if anywhere.
+            ax: Where to draw; a new figure where nothing is said.
+        """
+        from . import plot
+
+        return plot.run(self, path, ax)
+
+    def animate(self, path: str | PathLike[str] | None = None, field: str | None = None) -> FuncAnimation:
+        """The frames as a matplotlib animation of a nodal field, the first unknown by default. Needs matplotlib.
+
+        Args:
+            path: Where to save it, if anywhere: ``.gif``, or what else matplotlib can write here.
+            field: Name of the field.
+        """
+        from . import plot
+
+        return plot.animation(self, path, field)
+
+
+def load(directory: str | PathLike[str]) -> Run:
+    """Opens the directory of a run: finished, failed or interrupted.
+
+    Args:
+        directory: As given to :func:`run`, or to the program.
+
+    Raises:
+        FileNotFoundError: It has no ``summary.json``.
+
+    >>> from driftmesh import load
+    >>> load("no/such/run")
+    Traceback (most recent call last):
+    FileNotFoundError: no/such/run is no run directory: it has no summary.json
+    """
+    path = Path(directory)
+    summary = path / "summary.json"
+    if not summary.is_file():
+        raise FileNotFoundError(f"{path} is no run directory: it has no summary.json")
+    final: dict[str, Floats] = {}
+    if (path / "final.npz").is_file():
+        with np.load(path / "final.npz") as arrays:
+            final = {name: arrays[name] for name in arrays.files}
+    return Run(path, json.loads(summary.read_text("utf-8")), _table(path / "history.csv"), final, _frames(path, final))
+
+
+def run(
+    study: str | PathLike[str] | Mapping[str, Any],
+    out: str | PathLike[str] | None = None,
+    set: Mapping[str, Any] | None = None,
+    progress: bool = False,
+) -> Run:
+    """Runs a study.
+
+    Args:
+        study: A study file, or the same as a dict of tables.
+        out: Directory for the results; ``out/<study name>`` where nothing is said. One that a run of ours wrote is
+            replaced, any other that is not empty is refused.
+        set: Settings on top: dotted keys and values, such as ``{"time.step": 5e-4}``.
+        progress: Shows a bar, in terminals and notebooks.
+
+    Raises:
+        driftmesh.StudyError: A mistake in the study: its line, a caret, the nearest key. Nothing is written then.
+        driftmesh.MeshError: The computation failed; ``result`` and ``directory`` have everything up to the last good state.
+        OSError: What cannot be read or written; :class:`FileExistsError` for a directory with something else in it.
+        KeyboardInterrupt: Ctrl-C, which ends the run with its step and leaves the last good state in the run directory.
+
+    >>> import tempfile
+    >>> from driftmesh import run
+    >>> study = {
+    ...     "study": {"name": "front", "kind": "moving-mesh"},
+    ...     "grid": {"cells": [16, 16]},
+    ...     "time": {"start": 0.25, "end": 0.3, "step": 0.01},
+    ...     "pde": {"kind": "burgers", "viscosity": 0.005},
+    ... }
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     result = run(study, out=out, set={"time.step": 5e-3})
+    >>> result.summary["work"]["steps"], result.history["t"].shape
+    (10, (11,))
+    """
+    if isinstance(study, Mapping):
+        given: tuple[Path | None, str, str] = None, "the study", _toml.document(study)
+    else:
+        if not Path(study).exists():
+            raise FileNotFoundError(f"cannot read {study}: there is no such file")
+        given = Path(study), "", ""
+    if not isinstance(set, Mapping | None):
+        raise TypeError(f"`set` is {set!r}, but must be a dict of dotted keys and values")
+    assignments = [f"{name}={_toml.value(value)}" for name, value in (set or {}).items()]
+    name = _driftmesh.check(*given, assignments)
+    directory = Path("out") / name if out is None else Path(out)
+    with _bar(name, progress) as told:
+        try:
+            error, ended = _driftmesh.run(*given, assignments, directory, told)
+        except MeshError as failure:
+            error, ended = failure, True
+    if isinstance(error, MeshError):
+        error.directory = directory
+        if (directory / "summary.json").is_file():
+            error.result = load(directory)
+        raise error
+    if error is not None:
+        if not isinstance(error, KeyboardInterrupt):
+            raise error
+        raise KeyboardInterrupt(_interrupted(directory, ended)) from None
+    result = load(directory)
+    for warning in result.summary.get("warnings", ()):
+        warnings.warn(warning, RuntimeWarning, stacklevel=2)
+    return result
+
+
+def _interrupted(directory: Path, ended: bool) -> str:
+    """What a run that was told to stop leaves."""
+    if not ended:
+        return f"what is being computed goes on in the background and is left in {directory} when it ends"
+    summary = json.loads((directory / "summary.json").read_text("utf-8"))
+    if summary["status"] == "interrupted":
+        message = summary["error"]["message"]
+        if not (directory / "final.npz").is_file():
+            return f"{message}, before the first step"
+        return f"{message}; the last good state is in {directory}"
+    return f"the run had just ended ({summary['status']}); it is in {directory}"
+
+
+class _Told(Protocol):
+    def __call__(self, share: float, t: float, step: int) -> None: ...
+
+
+@contextmanager
+def _bar(name: str, wanted: bool) -> Iterator[_Told | None]:
+    """A progress bar of tqdm, fed with the share of the run that is done."""
+    if not wanted:
+        yield None
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of widgets that a notebook lacks: there is a bar of text then
+        from tqdm.auto import tqdm
+    form = "{desc} {percentage:3.0f} %|{bar}| {elapsed}<{remaining}"
+    with tqdm(total=1.0, desc=name, bar_format=form, file=sys.stderr, mininterval=0.1) as bar:
+        seen = -1
+
+        def told(share: float, t: float, step: int) -> None:
+            nonlocal seen
+            if step != seen:
+                seen = step
+                bar.set_description_str(f"{name}: t = {t:.4f}, step {step}", refresh=False)
+                bar.update(max(share - bar.n, 0.0))
+
+        yield told
+        bar.update(max(1.0 - bar.n, 0.0))
+
+
+def _table(path: Path) -> dict[str, Floats]:
+    """A table of numbers by column; an empty field is NaN."""
+    if not path.is_file():
+        return {}
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = csv.reader(file)
+        names = next(rows, [])
+        # a run that was killed may leave half a row
+        values = [[float(entry) if entry else np.nan for entry in row] for row in rows if len(row) == len(names)]
+    columns = np.array(values, dtype=np.float64).reshape(-1, len(names)).T
+    return {name: np.ascontiguousarray(column) for name, column in zip(names, columns, strict=True)}
+
+
+def _frames(directory: Path, final: Mapping[str, Floats]) -> list[Frame]:
+    index = directory / "run.pvd"
+    x = final.get("x")
+    if not index.is_file() or x is None or x.ndim != 2:
+        return []
+    entries: Sequence[ElementTree.Element] = ElementTree.parse(index).getroot().findall(".//DataSet")
+    shape = (x.shape[0], x.shape[1])
+    return [Frame(float(entry.attrib["timestep"]), directory / entry.attrib["file"], shape) for entry in entries]
+
+
+def _decoded(element: ElementTree.Element) -> Floats:
+    """An array of a ``.vtu`` file as we write it: a header of four sizes and one compressed block, both in base64."""
+    text = "".join((element.text or "").split())
+    header = 4 * ((4 * 8 + 2) // 3)
+    block = zlib.decompress(base64.b64decode(text[header:]))
+    types = {"Float64": "<f8", "Int64": "<i8", "Int32": "<i4", "UInt8": "u1"}
+    return np.frombuffer(block, dtype=types[element.attrib["type"]]).astype(np.float64)

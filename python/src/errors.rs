@@ -1,0 +1,51 @@
+use driftmesh::{Error, Failure};
+use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
+use pyo3::prelude::*;
+
+/// An error of the library as the exception that a Python user expects, with the remedy below the message.
+pub fn raised(py: Python<'_>, error: &Error, help: Option<String>) -> PyErr {
+    let help = match error {
+        Error::ForeignDirectory { .. } => Some("name another directory with `out`, or empty this one".into()),
+        Error::Busy { .. } => Some("wait for it to end, or name another directory with `out`".into()),
+        _ => help.or_else(|| error.help()),
+    };
+    let text = help.as_ref().map_or(error.to_string(), |help| format!("{error}\n  help: {help}"));
+    match error {
+        Error::Failed { failure, moment } => {
+            let place = (moment.map(|m| m.t), moment.map(|m| m.step));
+            numerical(py, failure, text, place).unwrap_or_else(|error| error)
+        }
+        Error::Study(_) | Error::Formula { .. } => mistake(py, text).unwrap_or_else(|error| error),
+        Error::Invalid { .. } => PyValueError::new_err(text),
+        Error::ForeignDirectory { .. } => PyFileExistsError::new_err(text),
+        _ => PyOSError::new_err(text),
+    }
+}
+
+/// `driftmesh.errors.MeshFolded` and its siblings, named after the failure.
+fn numerical(
+    py: Python<'_>,
+    failure: &Failure,
+    text: String,
+    (t, step): (Option<f64>, Option<usize>),
+) -> PyResult<PyErr> {
+    let class: String = failure.name().split('-').map(capital).collect();
+    let error = py.import("driftmesh.errors")?.getattr(class.as_str())?.call1((text,))?;
+    error.setattr("t", t)?;
+    error.setattr("step", step)?;
+    Ok(PyErr::from_value(error))
+}
+
+fn mistake(py: Python<'_>, text: String) -> PyResult<PyErr> {
+    Ok(PyErr::from_value(py.import("driftmesh.errors")?.getattr("StudyError")?.call1((text,))?))
+}
+
+fn capital(word: &str) -> String {
+    let mut letters = word.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// An error of the library without a study.
+pub fn plain(py: Python<'_>, error: impl Into<Error>) -> PyErr {
+    raised(py, &error.into(), None)
+}

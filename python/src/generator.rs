@@ -1,0 +1,94 @@
+use crate::errors::plain;
+use crate::mesh::{Given, nodal, nodes};
+use crate::threads::compute;
+use driftmesh::Failure;
+use driftmesh::density::{Monitor, MonitorKind};
+use driftmesh::geometry::check_unfolded;
+use driftmesh::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde};
+use driftmesh::study::{MeshForm, MeshTable, Source};
+use numpy::{PyArray3, PyReadonlyArray2};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::{Mutex, TryLockError};
+
+/// The tables of a study that move a mesh.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Settings {
+    monitor: MonitorKind,
+    mesh: MeshTable,
+}
+
+/// What a step cost, and how well its subdomains fit together.
+#[derive(Serialize)]
+struct Told {
+    work: driftmesh::Work,
+    interface: Option<driftmesh::meshing::Interface>,
+}
+
+/// A mesh generator with its monitor and what it remembers from step to step.
+#[pyclass(frozen, module = "driftmesh._driftmesh")]
+pub struct Generator {
+    equation: Mmpde,
+    kind: GeneratorKind,
+    parts: Mutex<Parts>,
+}
+
+struct Parts {
+    monitor: Box<dyn Monitor>,
+    generator: Box<dyn MeshGenerator>,
+}
+
+#[pymethods]
+impl Generator {
+    #[new]
+    fn new(py: Python<'_>, settings: &str) -> PyResult<Self> {
+        let raise = |error| plain(py, error);
+        let Settings { monitor, mesh } = Source::new("settings", settings).parse().map_err(raise)?;
+        monitor.check().map_err(|error| raise(error.within("monitor")))?;
+        let form = match mesh.form {
+            MeshForm::Gradient => Form::Gradient(monitor.gradient()),
+            MeshForm::Conservative => Form::Conservative,
+        };
+        let equation = Mmpde { relaxation: mesh.relaxation, form };
+        equation.check().map_err(|error| raise(error.within("mesh")))?;
+        let parts = Parts {
+            monitor: monitor.into_monitor(&[]).map_err(raise)?,
+            generator: mesh.generator.clone().into_generator(),
+        };
+        Ok(Self { equation, kind: mesh.generator, parts: Mutex::new(parts) })
+    }
+
+    /// The nodes after a step, and what it cost as JSON.
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        mesh: Given<'py>,
+        u: PyReadonlyArray2<'py, f64>,
+        dt: f64,
+    ) -> PyResult<(Bound<'py, PyArray3<f64>>, String)> {
+        let mesh = mesh.mesh(py)?;
+        let u = nodal(&mesh, &u)?;
+        self.kind.check(mesh.lattice()).map_err(|error| plain(py, error.within("mesh.generator")))?;
+        let mut parts = self.parts.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => PyRuntimeError::new_err("this generator is at work in another thread; use two"),
+            TryLockError::Poisoned(_) => {
+                PyRuntimeError::new_err("this generator broke in an earlier step; make a new one")
+            }
+        })?;
+        let (parts, equation) = (&mut *parts, self.equation);
+        let moved = compute(py, move || {
+            let Parts { monitor, generator } = parts;
+            check_unfolded(&mesh)?;
+            let rho = monitor.density(&mesh, &u, None)?;
+            let moved = generator.step(&equation, &mesh, &rho, dt)?;
+            check_unfolded(&moved.mesh)?;
+            Ok::<_, Failure>(moved)
+        })?;
+        let moved = moved.map_err(|failure| plain(py, failure))?;
+        let told = Told { work: moved.work, interface: moved.interface };
+        let told = serde_json::to_string(&told).map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+        Ok((nodes(py, &moved.mesh)?, told))
+    }
+}

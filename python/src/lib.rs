@@ -1,0 +1,29 @@
+//! The native half of the Python package: arrays to library types and back, errors to exceptions.
+//!
+//! What it exports is private to the package; `driftmesh/*.py` checks shapes and values and gives them names.
+
+mod errors;
+mod generator;
+mod line;
+mod mesh;
+mod stencils;
+mod study;
+mod threads;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _driftmesh {
+    #[pymodule_export]
+    use super::generator::Generator;
+    #[pymodule_export]
+    use super::line::{equidistribute, schwarz};
+    #[pymodule_export]
+    use super::mesh::{areas, quality, transfer, uniform};
+    #[pymodule_export]
+    use super::stencils::stencils;
+    #[pymodule_export]
+    use super::study::{check, run};
+    #[pymodule_export]
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
+}

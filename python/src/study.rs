@@ -1,0 +1,111 @@
+use crate::errors::raised;
+use crate::threads::{BRIEFLY, Ended, PATIENCE, interruptible};
+use driftmesh::error::Moment;
+use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, State};
+use driftmesh::study::{Source, Study};
+use driftmesh::{Error, Result};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What the thread that computes tells, and what it is told.
+#[derive(Default)]
+struct Seen {
+    /// Share of the run, time and step; nothing of a study that cannot be watched.
+    progress: Mutex<Option<(f64, f64, usize)>>,
+    stop: AtomicBool,
+}
+
+impl Seen {
+    fn progress(&self) -> MutexGuard<'_, Option<(f64, f64, usize)>> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+struct Watcher(Arc<Seen>);
+
+impl Watcher {
+    fn saw(&self, share: f64, state: &State) -> Result<()> {
+        *self.0.progress() = Some((share, state.t, state.step));
+        match self.0.stop.load(Ordering::Relaxed) {
+            true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
+            false => Ok(()),
+        }
+    }
+}
+
+impl Observer for Watcher {
+    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
+        match event {
+            Event::Finished => Ok(()),
+            _ => self.saw(snapshot.share, snapshot.state),
+        }
+    }
+
+    fn adapting(&mut self, state: &State) -> Result<()> {
+        self.saw(0.0, state)
+    }
+}
+
+/// A study from a file, or from text where `origin` names it, with assignments `KEY=VALUE` on top.
+fn read(path: Option<PathBuf>, origin: &str, text: &str, set: &[String]) -> Result<Study> {
+    let mut source = match path {
+        Some(path) => Source::read(&path)?,
+        None => Source::new(origin, text),
+    };
+    set.iter().try_for_each(|assignment| source.set(assignment))?;
+    Study::from_source(&source)
+}
+
+/// The name of a study that has no mistake.
+#[pyfunction]
+#[pyo3(signature = (path, origin, text, set))]
+pub fn check(py: Python<'_>, path: Option<PathBuf>, origin: &str, text: &str, set: Vec<String>) -> PyResult<String> {
+    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raised(py, &error, None))?;
+    Ok(study.name().into())
+}
+
+/// Runs a study into a directory. `told(share, t, step)` is called every now and then.
+///
+/// Returns what was raised in Python or by the study, and whether the run has ended: a study that cannot be stopped
+/// half-way goes on in the background.
+#[pyfunction]
+#[pyo3(signature = (path, origin, text, set, out, told))]
+#[allow(clippy::too_many_arguments)] // four of them are one study
+pub fn run(
+    py: Python<'_>,
+    path: Option<PathBuf>,
+    origin: &str,
+    text: &str,
+    set: Vec<String>,
+    out: PathBuf,
+    told: Option<Py<PyAny>>,
+) -> PyResult<(Option<PyErr>, bool)> {
+    let raise = |error: &Error| raised(py, error, None);
+    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raise(&error))?;
+    RunDirectory::check(&out).map_err(|error| raise(&error))?;
+    let seen = Arc::new(Seen::default());
+    let (study, theirs) = (Arc::new(study), seen.clone());
+    let computing = study.clone();
+    let ended = interruptible(
+        py,
+        move || computing.run(&out, &mut [&mut Watcher(theirs)]),
+        || {
+            seen.stop.store(true, Ordering::Relaxed);
+            if seen.progress().is_some() { PATIENCE } else { BRIEFLY }
+        },
+        |py| {
+            let progress = *seen.progress();
+            told.iter().zip(progress).try_for_each(|(told, progress)| told.call1(py, progress).map(|_| ()))
+        },
+    )?;
+    Ok(match ended {
+        Ended::Itself(outcome) => match outcome {
+            Ok(None) => (None, true),
+            Ok(Some(error)) => (Some(raised(py, &error, study.remedy(&error))), true),
+            Err(error) => return Err(raised(py, &error, study.remedy(&error))),
+        },
+        Ended::Stopped(error, outcome) => (Some(error), outcome.is_some()),
+    })
+}

@@ -1,0 +1,186 @@
+"""Moving a mesh to somebody's data."""
+
+import copy
+import multiprocessing
+import pickle
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from driftmesh import (
+    Arclength,
+    Fixed,
+    Given,
+    GridWalk,
+    Interpolation,
+    Mesh,
+    MeshGenerator,
+    MonteCarlo,
+    ResidualWalk,
+    RootGradient,
+    Schwarz,
+    Stochastic,
+    Whole,
+)
+from driftmesh.errors import MeshFolded
+
+
+def layer(mesh):
+    return np.tanh(20 * (mesh.x + mesh.y - 1))
+
+
+def follow(generator, steps=10, cells=(24, 24), dt=0.01):
+    mesh = Mesh.uniform(cells=cells)
+    for _ in range(steps):
+        mesh = generator.step(mesh, layer(mesh), dt)
+    return mesh
+
+
+def test_the_mesh_goes_where_the_layer_is():
+    mesh = follow(MeshGenerator(monitor=Arclength(relative=30, smoothing=2), relaxation=0.1), steps=40)
+    shortest = np.hypot(np.diff(np.diagonal(mesh.x)), np.diff(np.diagonal(mesh.y)))
+    assert shortest.argmin() in (11, 12) and shortest.min() < 0.5 * shortest.max()
+    assert mesh.quality().min_scaled_jacobian > 0
+
+
+def test_monitors_by_name_by_array_and_by_function_are_the_same():
+    mesh = Mesh.uniform(cells=(12, 12))
+    rho = 1 + 9 * np.exp(-30 * (mesh.x - 0.5) ** 2)
+    ways = [
+        MeshGenerator(monitor=Given()).step(mesh, rho, 0.05),
+        MeshGenerator(monitor=rho).step(mesh, None, 0.05),
+        MeshGenerator(monitor=lambda mesh, u: 1 + 9 * np.exp(-30 * (mesh.x - u) ** 2)).step(mesh, 0.5, 0.05),
+        MeshGenerator(monitor=7 * rho).step(mesh, None, 0.05),
+    ]
+    assert ways[0] == ways[1] == ways[2] != mesh
+    np.testing.assert_allclose(ways[3].x, ways[0].x, atol=1e-13)
+    assert MeshGenerator(monitor=np.full(mesh.shape, 3)).step(mesh, None, 1.0).x == pytest.approx(mesh.x)
+    generator = MeshGenerator(monitor=rho)
+    generator.step(mesh, None, 0.05)
+    generator.monitor = RootGradient()
+    assert generator.step(mesh, layer(mesh), 0.05) == MeshGenerator().step(mesh, layer(mesh), 0.05)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        Schwarz(subdomains=(2, 2)),
+        Stochastic(subdomains=(2, 3), seed=3),
+        Stochastic(subdomains=(2, 2), estimator=ResidualWalk(sweeps=20, walks=4, smoother="jacobi")),
+        Stochastic(subdomains=(2, 2), estimator=GridWalk(walks=200, increment=True), interface=Interpolation(sample=9)),
+        Stochastic(subdomains=(2, 2), estimator=MonteCarlo(paths=2000, substeps=10, control_variate=True)),
+    ],
+)
+def test_subdomains_give_the_mesh_of_the_whole_domain(method):
+    """Within six standard errors; paths are continuous in time and have a bias besides."""
+    whole, divided, again = (MeshGenerator(Arclength(), m, form="gradient") for m in (Whole(), method, method))
+    mesh = follow(divided, steps=1, dt=1e-3)
+    interface = divided.last["interface"]
+    bias = 1e-3 if isinstance(getattr(method, "estimator", None), MonteCarlo) else 1e-9
+    assert interface["points"] > 0
+    assert np.abs(mesh.x - follow(whole, steps=1, dt=1e-3).x).max() < 6 * (interface["standard_error"] or 0) + bias
+    assert mesh == follow(again, steps=1, dt=1e-3)
+
+
+def test_a_mesh_may_stay():
+    assert follow(MeshGenerator(method=Fixed())) == Mesh.uniform(cells=(24, 24))
+
+
+def test_periodic_meshes_stay_closed():
+    mesh = Mesh.uniform(cells=(16, 12), lower=(-1, 0), periodic=(True, True))
+    generator = MeshGenerator(relaxation=0.1)
+    for step in range(5):
+        mesh = generator.step(mesh, np.sin(np.pi * (mesh.x - 0.1 * step)) + np.sin(2 * np.pi * mesh.y), 0.02)
+    np.testing.assert_array_equal(mesh.x[-1], mesh.x[0] + 2)
+    np.testing.assert_array_equal(mesh.y[:, -1], mesh.y[:, 0] + 1)
+    assert mesh != Mesh.uniform(cells=(16, 12), lower=(-1, 0), periodic=(True, True))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.sampled_from(["f4", "f8", ">f8", "i4", "?"]), st.sampled_from(["C", "F"]), st.booleans())
+def test_dtype_order_and_strides_do_not_matter(dtype, order, backwards):
+    mesh = Mesh.uniform(cells=(10, 8))
+    u = np.array(10 * layer(mesh), dtype=dtype, order=order)
+    given = u[::-1].copy(order=order)[::-1] if backwards else u
+    expected = MeshGenerator(relaxation=0.1).step(mesh, u.astype(float).tolist(), 0.01)
+    assert MeshGenerator(relaxation=0.1).step(mesh, given, 0.01) == expected
+
+
+def square():
+    return Mesh.uniform(cells=(8, 8))
+
+
+def sheared():
+    mesh = square()
+    return mesh.moved(mesh.x + 0.3 * mesh.y, mesh.y)
+
+
+@pytest.mark.parametrize(
+    ("step", "words"),
+    [
+        (lambda: MeshGenerator().step(square(), np.zeros((8, 8)), 0.1), r"\(8, 8\).*\(9, 9\)"),
+        (lambda: MeshGenerator().step(square(), np.full((9, 9), np.nan), 0.1), r"nan at index \(0, 0\)"),
+        (lambda: MeshGenerator().step(square(), None, 0.1), "`u` is None"),
+        (lambda: MeshGenerator().step(square().x, square().x, 0.1), "ndarray"),
+        (lambda: MeshGenerator().step(square(), square().x, 0), "`dt` is 0"),
+        (lambda: MeshGenerator().step(square(), square().x, -1e-3), "`dt` is -0.001"),
+        (lambda: MeshGenerator().step(square(), square().x, np.nan), "`dt` is nan"),
+        (lambda: MeshGenerator().step(square(), square().x, "soon"), "`dt` is 'soon'"),
+        (lambda: MeshGenerator().step(sheared(), square().x, 0.1), "does not fill its box"),
+        (lambda: MeshGenerator(Given()).step(square(), square().x, 0.1), r"density is 0.0 at index \(0, 0\)"),
+        (lambda: MeshGenerator(np.ones((3, 3))).step(square(), None, 0.1), r"\(3, 3\).*\(9, 9\)"),
+        (lambda: MeshGenerator(relaxation=0), "relaxation"),
+        (lambda: MeshGenerator(relaxation={"steps": 1}), "relaxation.steps"),
+        (lambda: MeshGenerator(relaxation={"steps": 40, "prediction": 0.2}), "prediction"),
+        (lambda: MeshGenerator(form="implicit"), "known here: gradient, conservative|unknown"),
+        (lambda: MeshGenerator(method="whole"), "must be Whole"),
+        (lambda: MeshGenerator(Arclength), "must be Arclength"),
+        (lambda: MeshGenerator("auto"), "must be Arclength"),
+        (lambda: Arclength(relative=1, absolute=1), "not both"),
+        (lambda: MeshGenerator(Arclength(relative=-1)), "monitor.strength.relative"),
+        (lambda: MeshGenerator(Arclength(smoothing=-1)), "smoothing"),
+        (lambda: MeshGenerator(method=Schwarz(subdomains=(9, 9))).step(square(), square().x, 0.1), "subdomains"),
+    ],
+)
+def test_wrong_shapes_and_values_are_named(step, words):
+    with pytest.raises(ValueError, match=words):
+        step()
+
+
+def test_a_folded_mesh_is_an_error_with_a_remedy():
+    mesh = square()
+    x = mesh.x.copy()
+    x[4, 4] = 0.9
+    with pytest.raises(MeshFolded, match=r"the mesh folded: cell \(.*\n +help: "):
+        MeshGenerator().step(mesh.moved(x, mesh.y), mesh.x, 0.1)
+
+
+def test_a_generator_copies_its_settings():
+    generator = MeshGenerator(Arclength(absolute=3), Stochastic(subdomains=(2, 2), seed=5), relaxation={"steps": 30})
+    follow(generator, steps=2)
+    fresh = follow(MeshGenerator(Arclength(absolute=3), Stochastic(subdomains=(2, 2), seed=5), relaxation={"steps": 30}))
+    assert follow(pickle.loads(pickle.dumps(generator))) == follow(copy.deepcopy(generator)) == fresh
+
+
+def test_other_threads_go_on_meanwhile():
+    """The interpreter is free during a step, and two generators work side by side."""
+    found = {}
+    threads = [threading.Thread(target=lambda k=k: found.update({k: follow(MeshGenerator(relaxation=0.1))})) for k in range(3)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert found[0] == found[1] == found[2] == follow(MeshGenerator(relaxation=0.1))
+
+
+def large(_):
+    """On so many nodes all threads of the library take part."""
+    return float(follow(MeshGenerator(relaxation=0.1), steps=1, cells=(150, 150)).x.sum())
+
+
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_forked_processes_have_threads_of_their_own():
+    here = large(0)
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(large, range(2)).get(timeout=60) == [here, here]
