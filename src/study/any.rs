@@ -62,6 +62,16 @@ impl Study {
         }
     }
 
+    /// The study as a file, every default filled in.
+    pub fn to_toml(&self) -> String {
+        match self {
+            Self::MovingMesh(study) => study.to_toml(),
+            Self::Poisson(study) => study.to_toml(),
+            Self::Stefan(study) => study.to_toml(),
+            Self::Equidistribution(study) => study.to_toml(),
+        }
+    }
+
     /// Its name.
     pub fn name(&self) -> &str {
         match self {
