@@ -27,6 +27,7 @@ pub use schwarz::{Coarse, Method, Robin, Sweep};
 use crate::error::{Error, Failure, Result};
 use crate::parallel;
 use chain::{Chain, End, Step};
+use schemars::JsonSchema;
 use schwarz::{Iteration, Pieces};
 use serde::{Deserialize, Serialize};
 
@@ -68,7 +69,7 @@ pub struct Stop {
 }
 
 /// What tells that an iteration has converged.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Measure {
     /// The distance to the discrete single-domain mesh.

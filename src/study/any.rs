@@ -1,7 +1,10 @@
+use super::moving_mesh::Header;
 use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
 use crate::error::{Error, Result};
 use crate::simulation::Observer;
+use schemars::generate::SchemaSettings;
 use serde::Deserialize;
+use serde_json::json;
 use std::path::Path;
 
 /// A study of any kind.
@@ -39,6 +42,31 @@ impl Study {
             Ok(StudyKind::Equidistribution) => EquidistributionStudy::from_source(source).map(Self::Equidistribution),
             _ => MovingMesh::from_source(source).map(Self::MovingMesh),
         }
+    }
+
+    /// The JSON Schema of a study file, for editors.
+    pub fn schema() -> serde_json::Value {
+        let mut generator = SchemaSettings::draft2020_12().for_deserialize().into_generator();
+        let kinds = [
+            ("moving-mesh", generator.subschema_for::<MovingMesh>()),
+            ("poisson", generator.subschema_for::<PoissonStudy>()),
+            ("stefan", generator.subschema_for::<StefanStudy>()),
+            ("equidistribution", generator.subschema_for::<EquidistributionStudy>()),
+        ];
+        // the kind decides, so that an editor complains of what is wrong in it and not of four kinds
+        let each = kinds.map(|(kind, schema)| {
+            let named = json!({ "properties": { "study": { "properties": { "kind": { "const": kind } } } } });
+            json!({ "if": named, "then": schema })
+        });
+        json!({
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": "A study of driftmesh",
+            "type": "object",
+            "required": ["study"],
+            "properties": { "study": generator.subschema_for::<Header>() },
+            "allOf": each,
+            "$defs": generator.take_definitions(true),
+        })
     }
 
     /// Runs it into a directory, and says why it ended early, if it did. Observers watch what goes step by step.

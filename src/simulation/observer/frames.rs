@@ -5,13 +5,14 @@ use crate::geometry::{Mesh, cell_jacobians, cell_qualities};
 use crate::meshing::Decomposition;
 use crate::simulation::State;
 use crate::simulation::report::write_file;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
 /// When frames are written; the first and the last state are always among them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FramesAt {
     /// After so many steps each.
