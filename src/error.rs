@@ -346,7 +346,7 @@ impl Failure {
                 "mend density.value or density.of: iterates of Robin conditions may leave the domain"
             }
             Self::LineStalled { .. } => {
-                "refine grid.cells, smooth the density where it jumps or peaks within a cell, or begin nearer with start.mesh"
+                "refine grid.cells; where the density jumps or peaks within a cell smooth it, or set equidistribution.face_density to \"exact\"; or begin nearer with start.mesh"
             }
             Self::NotConverged { .. } => {
                 "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"galerkin\""
