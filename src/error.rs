@@ -180,9 +180,9 @@ pub enum Failure {
         cells: [usize; 2],
     },
     /// The density of a line is not finite and positive, or its derivative not finite.
-    #[error("{what} is {value:e} at x = {x}, t = {t}; M must be finite and above 0, and dM/dx finite")]
+    #[error("{what} is {value:e} at x = {x}, t = {t}; {}", line_rule(what, *value))]
     LineDensity {
-        /// `M` or `dM/dx`.
+        /// `M`, `dM/dx` or `u_x`.
         what: &'static str,
         /// What it is.
         value: f64,
@@ -214,6 +214,8 @@ pub enum Failure {
         tolerance: f64,
         /// What is known about this case.
         advice: String,
+        /// What cures it there.
+        remedy: &'static str,
     },
     /// The sides of a mesh touch or cross each other, although no cell is folded.
     #[error("the mesh touches itself: its sides meet at x = {}, y = {}, in cells ({}, {}) and ({}, {})", short(x[0]), short(x[1]), cells[0][0], cells[0][1], cells[1][0], cells[1][1])]
@@ -343,11 +345,12 @@ impl Failure {
             }
             Self::Subdomains { .. } => "give every axis between one subdomain and one a cell",
             Self::LineDensity { .. } => {
-                "mend density.value or density.of: iterates of Robin conditions may leave the domain"
+                "mend density.value or density.of; with conditions of Robin's kind M is asked for outside the domain too"
             }
             Self::LineStalled { .. } => {
                 "refine grid.cells; where the density jumps or peaks within a cell smooth it, or set equidistribution.face_density to \"exact\"; or begin nearer with start.mesh"
             }
+            Self::NotConverged { remedy, .. } if !remedy.is_empty() => remedy,
             Self::NotConverged { .. } => {
                 "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"galerkin\""
             }
@@ -477,6 +480,18 @@ fn noisy(noise: Option<f64>) -> String {
 fn given_as(values: &[(String, f64)]) -> String {
     let values: Vec<String> = values.iter().map(|(name, value)| format!("{name} = {}", short(*value))).collect();
     if values.is_empty() { String::new() } else { format!(", where {}", values.join(", ")) }
+}
+
+/// What a density of a line breaks.
+pub(crate) fn line_rule(what: &str, value: f64) -> &'static str {
+    match what {
+        "M" if value > 0.0 && value.is_finite() => {
+            "it must be above 0 by more than 1e-14 of its largest on the line, which is rounding"
+        }
+        "M" => "it must be finite and above 0 on the whole line",
+        "u_x" => "u jumps there, and no mesh resolves a jump",
+        _ => "it must be bounded on the whole line",
+    }
 }
 
 /// A coordinate in a few characters, whatever its size.

@@ -88,6 +88,59 @@ fn other_lines() {
     assert!(run("boundary-layer", &[]).1["warnings"].is_null());
 }
 
+/// What is said of an iteration that misses its tolerance is true: one that swings is not said to contract, whenever it ends;
+/// rounding is named; the remedy is one of the method.
+#[test]
+fn advice_is_true() {
+    let said = |study: &str, set: &[&str]| {
+        let failure = run(study, set).0.failure.unwrap();
+        (failure.to_string(), failure.help().unwrap())
+    };
+    for count in [100, 101, 150, 601, 1000, 1001] {
+        let (said, _) = said("schwarz-not-converged", &[&format!("stop.iterations={count}")]);
+        assert!(said.contains("need not converge") && !said.contains("more would do"), "{said}");
+    }
+    let square = ["stop.tolerance=1e-10", "density.kind=formula", "density.value=\"x^2 + 1\""];
+    let (slow, _) = said("table-8-1-nonlinear", &[&square[..], &["stop.iterations=100"]].concat());
+    assert!(slow.contains("contracts by 0.852") && slow.contains("about 1"), "{slow}");
+    let (rounding, help) =
+        said("table-8-1-nonlinear", &[&square[1..], &["stop.tolerance=1e-20", "stop.iterations=500"]].concat());
+    assert!(rounding.contains("that is rounding") && help == "raise stop.tolerance", "{rounding}");
+    let (_, help) = said(
+        "table-8-1-nonlinear",
+        &[&square[..], &["schwarz={ method = \"optimized\", cut = 0.5, robin = 0.01 }"]].concat(),
+    );
+    assert!(help.contains("lagged") && !help.contains("overlap"), "{help}");
+}
+
+/// Given ends stay to the last bit, also where M falls to 1e-11 of its largest there.
+#[test]
+fn ends_stay() {
+    for value in ["exp(-100*(x-0.5)^2)", "1e-12+exp(-100*(x-0.5)^2)", "1+1e10*exp(-1000*(x-0.5)^2)", "exp(-20*x)"] {
+        let set = format!("density={{ kind = \"formula\", value = \"{value}\" }}");
+        let set = [set.as_str(), "schwarz.overlap=[0.45, 0.55]", "stop.tolerance=1e-10", "stop.iterations=300"];
+        let mesh = run("table-8-1-nonlinear", &set).1["mesh"].clone();
+        assert_eq!((mesh[0].as_f64().unwrap(), mesh[100].as_f64().unwrap()), (0.0, 1.0), "{value}");
+    }
+    run("moving-front-1d", &["density={ kind = \"arclength\", of = \"tanh(30*(x - 0.3 - t))\" }"]);
+}
+
+/// The quality is against the mesh that is, however thin the layer.
+#[test]
+fn thin_layers() {
+    for k in ["1e3", "1e4"] {
+        let set = format!("density={{ kind = \"arclength\", of = \"tanh({k}*(x-0.3012345))\" }}");
+        let summary = run("boundary-layer", &[&set, "equidistribution.face_density=\"exact\""]).1;
+        let quality = &summary["quality"];
+        assert!(quality["error_linf"].as_f64().unwrap() < 1e-10 && summary["warnings"].is_null(), "{summary}");
+        assert!((quality["equidistribution"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{quality}");
+    }
+    // a hole in M between the nodes is found in the end
+    let hole = "density={ kind = \"formula\", value = \"if(abs(x - 0.31415926) < 1e-4, -1, 1)\" }";
+    let (finished, summary) = run("boundary-layer", &[hole]);
+    assert!(finished.failure.unwrap().to_string().contains("M is -1e0 at x = 0.314") && summary["status"] == "failed");
+}
+
 #[test]
 fn subdomains() {
     let (_, summary) = run("schwarz-coarse", &[]);
@@ -204,6 +257,15 @@ fn bad_settings_are_refused() {
         (schwarz("intervals = [[0.0, 0.6], [0.3, 0.9], [0.5, 1.0]]"), &["are no neighbours"]),
         (schwarz("intervals = [[0.1, 0.6], [0.5, 1.0]]"), &["must begin at 0"]),
         (schwarz("subdomains = 0"), &["schwarz.subdomains"]),
+        (schwarz("method = \"optimal\"\ncuts = [0.7, 0.3]"), &["schwarz.cuts", "runs from right to left"]),
+        (
+            schwarz("method = \"optimal\"\ncut = 0.5\nintegral = { trapezoid = 1000000000 }"),
+            &["1000000 panels at most"],
+        ),
+        (m("1 + t*x"), &["density.value", "must not depend on t without [time]"]),
+        (m("exp(-50*x)"), &["density.value", "above 0 by more than 1e-14 of its largest"]),
+        ("[density]\nkind = \"arclength\"\nof = \"if(x < 0.3, 0, 1)\"\n".into(), &["density.of", "u jumps there"]),
+        (format!("{M}[output]\nanimation = true\n"), &["output.animation", "no frames"]),
         (schwarz("subdomains = 200\noverlap_cells = 1"), &["schwarz.subdomains", "100 cells"]),
         (schwarz("subdomains = 3\noverlap_cells = 2"), &["must be whole", "98 and 101"]),
         (schwarz("subdomains = 50\noverlap_cells = 100"), &["no wider than its overlap"]),

@@ -225,7 +225,7 @@ impl Chain<'_> {
             // an iterate of conditions on the flux may run backwards, and pass through no order on its way
             let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
             for (ordered, way, share) in ways(free) {
-                let tried: Vec<f64> = match way {
+                let mut tried: Vec<f64> = match way {
                     Way::Straight => x.iter().zip(&change).map(|(x, c)| x - share * c).collect(),
                     Way::Curved => match path.get_or_insert_with(|| self.path(&x, &change)) {
                         Some((path, changes)) => {
@@ -234,6 +234,12 @@ impl Chain<'_> {
                         None => continue,
                     },
                 };
+                // given ends stay to the last bit
+                for (end, node) in ends.into_iter().zip([0, x.len() - 1]) {
+                    if let End::Value(given) = end {
+                        tried[node] = given;
+                    }
+                }
                 if !ordered || tried.windows(2).all(|x| x[1] > x[0]) || free && tried.windows(2).all(|x| x[1] < x[0]) {
                     let (r, m) = self.linearised(&tried, ends, step)?;
                     if norm(&r) < before.max(rounding) || largest <= 1e-9 * size {

@@ -99,6 +99,8 @@ const PLACES_AROUND: usize = 20;
 const LOOKS: usize = 9;
 /// A slope that still grows by so much over the last looks, which narrow 10⁴ times, has no bound.
 const UNBOUNDED: f64 = 1.5;
+/// What is left of a change between places, however near, where u jumps.
+const STILL_A_JUMP: f64 = 0.5;
 /// A smallest M below this share of the largest is rounding.
 const VANISHING: f64 = 1e-14;
 
@@ -240,12 +242,35 @@ impl LineDensity {
         if low <= VANISHING * high {
             return Err(Failure::LineDensity { what: "M", value: low, x, t });
         }
+        if let Some(x) = self.jump(t, [a, b]) {
+            return Err(Failure::LineDensity { what: "u_x", value: f64::INFINITY, x, t });
+        }
         let slopes = self.looked(t, [a, b], |[_, slope]| slope.abs())?;
         let [x, value] = last(&slopes);
         if value > UNBOUNDED * slopes[LOOKS - 5][1] {
             return Err(Failure::LineDensity { what: "dM/dx", value: f64::INFINITY, x, t });
         }
         Ok([low, high])
+    }
+
+    /// Where u jumps: between two places, however near.
+    fn jump(&self, t: f64, [mut a, mut b]: [f64; 2]) -> Option<f64> {
+        let mut first = None;
+        loop {
+            let cells = if first.is_none() { PLACES } else { 2 };
+            let places: Vec<f64> = (0..=cells).map(|k| a + (b - a) * k as f64 / cells as f64).collect();
+            let u = self.followed(t, &places)?;
+            let change = |k: usize| (u[k + 1] - u[k]).abs();
+            let most = (0..cells).fold(0, |most, k| if change(k) > change(most) { k } else { most });
+            let size = *first.get_or_insert(change(most));
+            if !(change(most) > STILL_A_JUMP * size) {
+                return None;
+            }
+            (a, b) = (places[most], places[most + 1]);
+            if b - a <= 4.0 * f64::EPSILON * a.abs().max(b.abs()).max(f64::MIN_POSITIVE) {
+                return Some(a);
+            }
+        }
     }
 
     /// Where something is largest, and how large, look by look.

@@ -137,25 +137,59 @@ impl History {
     /// What to say where the tolerance was missed.
     pub fn missed(&self, method: Method, stop: Stop) -> Option<Failure> {
         let tolerance = stop.tolerance.filter(|_| !self.converged)? * (self.mesh[self.mesh.len() - 1] - self.mesh[0]);
-        let last = stop.measure.of(&self.iterates[self.count()]);
+        let measured: Vec<f64> = self.iterates.iter().map(|iterate| stop.measure.of(iterate)).collect();
+        let (count, last) = (self.count(), measured[self.count()]);
+        let size = self.mesh.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        let rounding = IS_ROUNDING * size;
         let linearized = matches!(method, Method::Classical { linearized: true, .. });
-        let advice = match self.observed {
-            Some(rate) if rate < CONTRACTS => {
-                let more = 2.0 * (tolerance / last).ln() / rate.ln();
+        let advice = match contraction(&measured) {
+            _ if last <= rounding => {
+                format!("; that is rounding, which no iteration lowers: ask for {rounding:.0e} or more")
+            }
+            Some(rate) => {
+                let more = 2.0 * (tolerance.max(rounding) / last).ln() / rate.ln();
                 format!("; it contracts by {rate:.4} in two iterations: about {more:.0} more would do")
             }
-            _ if linearized => {
+            None if linearized => {
                 "; the linearised iteration need not converge where M varies much over the overlap".into()
             }
-            _ => "; it does not contract".into(),
+            None => "; it does not contract".into(),
+        };
+        let remedy = match method {
+            _ if last <= rounding => "raise stop.tolerance",
+            Method::Classical { linearized: true, .. } => {
+                "set schwarz.linearized to false, schwarz.sweep to \"alternating\" or schwarz.coarse to \"galerkin\", or give more overlap"
+            }
+            Method::Classical { coarse: Coarse::Galerkin, .. } => {
+                "raise stop.iterations where it contracts; else give more overlap, or more grid.cells"
+            }
+            Method::Classical { .. } => {
+                "raise stop.iterations where it contracts, give more overlap, or set schwarz.coarse to \"galerkin\""
+            }
+            Method::Optimized { robin: Robin::Value(_) } => {
+                "raise stop.iterations where it contracts; else set schwarz.robin to \"auto\" or \"lagged\""
+            }
+            Method::Optimized { .. } | Method::Optimal { .. } => {
+                "raise stop.iterations where it contracts; else set equidistribution.face_density to \"exact\", or more grid.cells"
+            }
         };
         let measure = stop.measure.name();
-        Some(Failure::NotConverged { measure, last, iterations: self.count(), tolerance, advice })
+        Some(Failure::NotConverged { measure, last, iterations: count, tolerance, advice, remedy })
     }
 }
 
-/// A contraction nearer to 1 is none.
-const CONTRACTS: f64 = 0.9999;
+/// The factor of two iterations over the last half of them, where all of the last quarter are below all of the second: an
+/// iteration that only swings may fall for a while.
+fn contraction(measured: &[f64]) -> Option<f64> {
+    let count = measured.len() - 1;
+    let (first, middle) = (1.max(count / 4), 1.max(count / 2));
+    let lowest = measured[first..=middle].iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = measured[(count - count / 4).max(middle + 1).min(count)..].iter().copied().fold(0.0, f64::max);
+    (count > 1 && highest < lowest).then(|| (measured[count] / measured[middle]).powf(2.0 / (count - middle) as f64))
+}
+
+/// Errors below this share of the largest coordinate are of rounding.
+const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Iterates with errors below this share of the line's length are rounding.
 const ROUNDING: f64 = 1e-11;
 /// Contractions that count for the observed rate.
@@ -211,31 +245,45 @@ impl Line {
 
     /// The continuous mesh at some ξ: ∫ M up to x(ξ) is ξ times that over the line.
     ///
+    /// `between` are places from end to end between which M is integrated, such as the nodes of a mesh: quadrature sees what
+    /// they resolve.
+    ///
     /// # Errors
     /// [`Failure::LineDensity`].
-    pub fn exact(&self, t: f64, xi: &[f64]) -> Result<Vec<f64>, Failure> {
-        let [a, b] = self.ends;
-        let whole = self.density.integral(t, a, b)?;
-        xi.iter()
-            .map(|xi| {
-                let (mut low, mut high, mut x) = (a, b, a + (b - a) * xi);
-                for _ in 0..200 {
-                    let off = self.density.integral(t, a, x)? - xi * whole;
-                    if off > 0.0 {
-                        high = x
-                    } else {
-                        low = x
-                    }
-                    let newton = x - off / self.density.at(t, x)?[0];
-                    let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-                    if (next - x).abs() <= 2.0 * f64::EPSILON * (b - a) {
-                        return Ok(next);
-                    }
-                    x = next;
+    pub fn exact(&self, t: f64, between: &[f64], xi: &[f64]) -> Result<Vec<f64>, Failure> {
+        let mut sum = 0.0;
+        let mut up_to = vec![0.0];
+        for ends in between.windows(2) {
+            sum += self.density.integral(t, ends[0], ends[1])?;
+            up_to.push(sum);
+        }
+        let length = self.ends[1] - self.ends[0];
+        let place = |xi: &f64| {
+            let k = up_to.partition_point(|at| *at <= xi * sum).clamp(1, between.len() - 1) - 1;
+            let (wanted, [mut low, mut high]) = (xi * sum - up_to[k], [between[k], between[k + 1]]);
+            let mut x = low + (high - low) * (wanted / (up_to[k + 1] - up_to[k])).clamp(0.0, 1.0);
+            for _ in 0..200 {
+                let off = self.density.integral(t, between[k], x)? - wanted;
+                *(if off > 0.0 { &mut high } else { &mut low }) = x;
+                let newton = x - off / self.density.at(t, x)?[0];
+                let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+                if (next - x).abs() <= 2.0 * f64::EPSILON * length {
+                    return Ok(next);
                 }
-                Ok(x)
-            })
-            .collect()
+                x = next;
+            }
+            Ok(x)
+        };
+        xi.iter().map(place).collect()
+    }
+
+    /// ∫M over each cell of a mesh, in its own way of averaging M over a cell.
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`].
+    pub fn shares(&self, t: f64, mesh: &[f64]) -> Result<Vec<f64>, Failure> {
+        let chain = self.chain(t);
+        Ok(chain.fluxes(mesh)?.into_iter().map(|flux| flux * chain.h).collect())
     }
 
     /// Iterates between pieces, from a start, at time t.

@@ -31,7 +31,7 @@ pub fn node(key: &str, xi: f64, cells: usize) -> Result<usize> {
 pub fn equal(cells: usize, subdomains: usize, overlap: usize) -> Result<Vec<[usize; 2]>> {
     let invalid = |rule: String| Err(Error::invalid("subdomains", subdomains, rule));
     if subdomains == 0 || subdomains > cells {
-        return invalid(format!("must be from 1 to one for each two of the {cells} cells"));
+        return invalid(format!("must be between 1 and the number of cells, {cells}"));
     }
     let shared = overlap.saturating_mul(subdomains - 1);
     let all = cells.saturating_add(shared);
@@ -61,12 +61,22 @@ pub fn check(key: &str, ranges: &[[usize; 2]], cells: usize, method: Method) -> 
     let shown =
         |range: &[usize; 2]| format!("[{}, {}]", range[0] as f64 / cells as f64, range[1] as f64 / cells as f64);
     let all = || ranges.iter().map(shown).collect::<Vec<_>>().join(", ");
-    let invalid = |rule: String| Err(Error::invalid(key, if ranges.len() < 9 { all() } else { "given".into() }, rule));
+    let invalid = |rule: String| {
+        let value = match ranges.len() {
+            0 => "[]".into(),
+            1..9 => all(),
+            _ => "given".into(),
+        };
+        Err(Error::invalid(key, value, rule))
+    };
     let [Some(first), Some(last)] = [ranges.first(), ranges.last()] else {
         return invalid("there must be a subdomain".into());
     };
     if first[0] != 0 || last[1] != cells {
         return invalid("the first subdomain must begin at 0, and the last end at 1".into());
+    }
+    if let Some(turned) = ranges.iter().find(|[first, last]| last < first) {
+        return invalid(format!("{} runs from right to left; give them in order", shown(turned)));
     }
     if let Some(thin) = ranges.iter().find(|[first, last]| *last < first + 2) {
         return invalid(format!("the subdomain {} has no node inside; use fewer of them, or more cells", shown(thin)));

@@ -8,7 +8,7 @@ use serde::Serialize;
 /// |---|---|---|
 /// | classical, I pieces | ρ(A)², A the matrix that maps errors of ∫M at the ends of pieces to the next (6.4); (α/β)(1−β)/(1−α) for two (theorem 3.2) | theorem 6.5, for equal pieces |
 /// | alternating, two pieces | its square: it contracts so much in each iteration | |
-/// | optimal | 0 after I iterations (theorem 4.1) | |
+/// | optimal | 0 after I iterations with exact integrals over cells (theorem 4.1) | 0 for two |
 /// | optimised, two pieces | \|p − m/α\|\|p − m/(1−α)\| / ((p + m/α)(p + m/(1−α))), m = M(x(α)) | (5.7) |
 /// | in time, two pieces | | theorem 7.2 |
 ///
@@ -33,7 +33,7 @@ impl Prediction {
         let count = ranges.len();
         let xi = |node: usize| node as f64 / line.cells as f64;
         let extremes = || line.density.extremes(t, line.ends);
-        Ok(match (method, ratio) {
+        let Self { predicted, bound } = match (method, ratio) {
             (Method::Classical { linearized: true, .. }, _) => Self::default(),
             (Method::Classical { coarse: super::Coarse::Galerkin, .. }, _) => Self::default(),
             (Method::Classical { .. }, Some(ratio)) if count == 2 => {
@@ -62,7 +62,7 @@ impl Prediction {
                 });
                 Self { predicted, bound }
             }
-            (Method::Optimal { .. }, None) => Self { predicted: Some(0.0), bound: Some(0.0) },
+            (Method::Optimal { .. }, None) => Self { predicted: Some(0.0), bound: (count == 2).then_some(0.0) },
             (Method::Optimized { robin }, None) if count == 2 => {
                 let cut = ranges[0][1];
                 let alpha = xi(cut);
@@ -88,7 +88,10 @@ impl Prediction {
                 }
             }
             (Method::Optimized { .. }, None) => Self::default(),
-        })
+        };
+        // conditions out of all proportion have a rate of 0/0
+        let [predicted, bound] = [predicted, bound].map(|rate| rate.filter(|rate| rate.is_finite()));
+        Ok(Self { predicted, bound })
     }
 }
 

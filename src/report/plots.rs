@@ -8,16 +8,19 @@ struct Group {
     title: &'static str,
     label: &'static str,
     scale: Scale,
+    /// Of studies of a line, or of the others.
+    line: bool,
     /// Columns, with what the legend says.
     columns: &'static [(&'static str, &'static str)],
 }
 
-const GROUPS: [Group; 7] = [
+const GROUPS: [Group; 9] = [
     Group {
         name: "error",
         title: "Error over time",
         label: "error (units of u)",
         scale: Scale::Logarithmic,
+        line: false,
         columns: &[("error_linf", "largest error of u"), ("error_l2", "root mean square error of u")],
     },
     Group {
@@ -25,6 +28,7 @@ const GROUPS: [Group; 7] = [
         title: "Error of the front over time",
         label: "error of the height (units of y)",
         scale: Scale::Logarithmic,
+        line: false,
         columns: &[("front_error_linf", "largest error of the front")],
     },
     Group {
@@ -32,6 +36,7 @@ const GROUPS: [Group; 7] = [
         title: "Position of the front",
         label: "height (units of y)",
         scale: Scale::Linear,
+        line: false,
         columns: &[("front_mean", "mean"), ("front_min", "lowest point"), ("front_max", "highest point")],
     },
     Group {
@@ -39,6 +44,7 @@ const GROUPS: [Group; 7] = [
         title: "Quality of the mesh over time",
         label: "Q and scaled Jacobian (dimensionless)",
         scale: Scale::Logarithmic,
+        line: false,
         columns: &[("q_max", "largest Q"), ("q_mean", "mean Q"), ("min_scaled_jacobian", "smallest corner Jacobian")],
     },
     Group {
@@ -46,18 +52,31 @@ const GROUPS: [Group; 7] = [
         title: "Contraction of a Schwarz iteration",
         label: "factor an iteration (dimensionless)",
         scale: Scale::Linear,
-        columns: &[
-            ("contraction_observed", "observed"),
-            ("contraction_predicted", "predicted bound"),
-            ("observed_rate", "observed, two iterations"),
-            ("bound", "predicted bound"),
-        ],
+        line: false,
+        columns: &[("contraction_observed", "observed"), ("contraction_predicted", "predicted bound")],
+    },
+    Group {
+        name: "error",
+        title: "Left of the distance to the single-domain mesh",
+        label: "distance (units of x)",
+        scale: Scale::Logarithmic,
+        line: true,
+        columns: &[("error_linf", "largest over the subdomains")],
+    },
+    Group {
+        name: "contraction",
+        title: "Contraction of a Schwarz iteration",
+        label: "factor in two iterations (dimensionless)",
+        scale: Scale::Linear,
+        line: true,
+        columns: &[("observed_rate", "observed"), ("bound", "bound")],
     },
     Group {
         name: "energy",
         title: "Missing in the balance of heat",
         label: "share (dimensionless)",
         scale: Scale::Logarithmic,
+        line: false,
         columns: &[
             ("energy_imbalance", "fluxes by weighted residual"),
             ("energy_imbalance_by_differences", "fluxes by differences"),
@@ -68,6 +87,7 @@ const GROUPS: [Group; 7] = [
         title: "Length of the time steps",
         label: "step (units of t)",
         scale: Scale::Logarithmic,
+        line: false,
         columns: &[("dt", "step"), ("step_limit", "longest stable step")],
     },
 ];
@@ -79,6 +99,7 @@ pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
     let column = |name: &str| run.history.iter().find(|column| column.name == name);
     let Some(t) = column("t") else { return Vec::new() };
     let study = run.word("study");
+    let line = run.word("kind") == "equidistribution";
     let drawn = |group: &Group| {
         let curves: Vec<Curve> = (group.columns.iter())
             .filter_map(|(name, words)| Some(curve(words, t, column(name)?, group.scale)))
@@ -86,7 +107,7 @@ pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
             .collect();
         // steps that never change are in the study
         let changes = |curve: &Curve| curve.points.iter().any(|p| (p[1] / curve.points[0][1] - 1.0).abs() > 1e-6);
-        let worth = !curves.is_empty() && (group.name != "steps" || curves.iter().any(changes));
+        let worth = group.line == line && !curves.is_empty() && (group.name != "steps" || curves.iter().any(changes));
         worth.then(|| {
             let figure = Figure {
                 title: format!("{study}: {}", group.title),

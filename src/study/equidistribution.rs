@@ -3,7 +3,8 @@
 use super::mapped::parse;
 use super::{Header, Output, Source};
 use crate::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Measure, Method, Robin, Stop, Sweep, pieces};
-use crate::error::{Error, Failure, Result};
+use crate::error::{Error, Failure, Result, line_rule};
+use crate::formula::Formula;
 use crate::kind::kinds;
 use crate::setting::{fixed, pair};
 use crate::simulation::{FramesAt, Schedule};
@@ -256,6 +257,8 @@ const MAX_ITERATIONS: usize = 1_000_000;
 const BYTES_PER_CELL: u128 = 1000;
 /// Meshes kept of a run in time where nothing is said.
 const FRAMES_BY_DEFAULT: usize = 100;
+/// Panels of an integral.
+const MOST_PANELS: usize = 1_000_000;
 
 impl EquidistributionStudy {
     /// Reads and checks a study, every default filled in.
@@ -275,11 +278,11 @@ impl EquidistributionStudy {
     pub fn resolve(&mut self) -> Result<()> {
         self.study.check_name()?;
         let LineDomain { lower: [a], upper: [b] } = self.domain;
-        if !(a.is_finite() && b.is_finite() && a < b) {
+        if !(a.is_finite() && b.is_finite() && a < b && (b - a).is_normal()) {
             return Err(Error::invalid(
                 "domain.upper",
-                format!("[{b}]"),
-                format!("must lie above domain.lower = [{a}]"),
+                format!("[{b:?}]"),
+                format!("must lie above domain.lower = [{a:?}]"),
             ));
         }
         let [cells] = self.grid.cells;
@@ -287,6 +290,10 @@ impl EquidistributionStudy {
             return Err(Error::invalid("grid.cells", format!("[{cells}]"), "must be 2 or more"));
         }
         super::memory::check_memory(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
+        if self.output.animation {
+            let rule = "studies of a line have no frames; mesh.png shows the paths of nodes. Leave it out";
+            return Err(Error::invalid("output.animation", true, rule));
+        }
         self.resolve_time()?;
         self.check_density()?;
         if let Some(schwarz) = &mut self.schwarz {
@@ -318,16 +325,19 @@ impl EquidistributionStudy {
     /// Refuses a density that is not positive everywhere, at the first and the last time.
     fn check_density(&self) -> Result<()> {
         let density = self.density.density().map_err(|error| error.within("density"))?;
+        let (key, text) = self.density.setting();
+        if self.time.is_none() && Formula::parse(text, &["x", "t"]).is_ok_and(|formula| formula.depends_on(1)) {
+            let rule = "must not depend on t without [time]; add it, or write a number for t";
+            return Err(Error::invalid(key, format!("{text:?}"), rule));
+        }
         let ends = self.line(density.clone()).ends;
         let times = self.time.map_or([0.0; 2], |time| [time.start, time.end]);
         for t in times {
             if let Err(failure) = density.extremes(t, ends) {
-                let (key, text) = self.density.setting();
                 let rule = match failure {
                     Failure::LineDensity { what, value, x, t } => {
                         let when = if self.time.is_some() { format!(", t = {t}") } else { String::new() };
-                        let rule = if what == "M" { "it must be finite and above 0" } else { "it must be bounded" };
-                        format!("{what} is {value:.1e} at x = {x}{when}; {rule} on the whole line")
+                        format!("{what} is {value:.1e} at x = {x}{when}; {}", line_rule(what, value))
                     }
                     other => other.to_string(),
                 };
@@ -374,7 +384,8 @@ impl EquidistributionStudy {
         let key = "start.mesh.formula";
         let formula = parse(key, text, &["xi"])?;
         let [first, last] = [0.0, 1.0].map(|xi| formula.eval(&[xi]));
-        if (first, last) != (0.0, 1.0) {
+        // mapped() sets the ends; sines of multiples of pi are rounded
+        if !(first.abs() <= 1e-12 && (last - 1.0).abs() <= 1e-12) {
             let rule = format!("must go from 0 to 1, but is {first} at xi = 0 and {last} at xi = 1");
             return Err(Error::invalid(key, format!("{text:?}"), rule));
         }
@@ -475,7 +486,15 @@ impl SchwarzTable {
                 return Err(Error::invalid("method", format!("\"{:?}\"", self.method).to_lowercase(), rule));
             }
             Optimal => {
-                if *self.integral.get_or_insert_default() == Integral::Trapezoid(0) {
+                let integral = *self.integral.get_or_insert_default();
+                if matches!(integral, Integral::Trapezoid(n) if n > MOST_PANELS) {
+                    return Err(Error::invalid(
+                        "integral.trapezoid",
+                        format!("{integral:?}"),
+                        format!("takes {MOST_PANELS} panels at most"),
+                    ));
+                }
+                if integral == Integral::Trapezoid(0) {
                     return Err(Error::invalid("integral.trapezoid", 0, "must be 1 panel or more"));
                 }
             }

@@ -1,7 +1,7 @@
 //! Studies of kind `equidistribution`: how they run, and what they leave.
 
 use super::EquidistributionStudy;
-use crate::equidistribution::{History, Iterate, Line};
+use crate::equidistribution::{FaceDensity, History, Iterate, Line};
 use crate::error::{Error, Moment, Result};
 use crate::report;
 use crate::simulation::{Curve, Failed, Figure, Parallel, RunDirectory, Scale, status};
@@ -171,8 +171,9 @@ pub struct StepRow {
     pub bound: Option<f64>,
 }
 
-/// Nodes compared with the continuous mesh.
+/// Nodes compared with the continuous mesh, and cells over which M is integrated to round-off.
 const COMPARED: usize = 1000;
+const EXACTLY: usize = 100_000;
 /// Places at which the density is looked at, and a share of ∫M that tells of a layer unseen.
 const PLACES: usize = 20_000;
 const NOTICEABLE: f64 = 0.2;
@@ -242,13 +243,12 @@ impl EquidistributionStudy {
         directory.write_summary(&summary)?;
         let mut evolution = Evolution::default();
         let clock = Instant::now();
-        let failure = match study.compute(&line, &mut evolution) {
-            Err(error) if !error.is_failure() => return Err(error),
-            outcome => outcome.err(),
-        };
+        let failure = study.compute(&line, &mut evolution).err();
         summary.seconds.mesh = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        summary.tell(&study, &line, &evolution);
+        // what the density turns out to be between the nodes may be a failure of its own
+        let told = summary.tell(&study, &line, &evolution);
+        let failure = failure.or(told.err());
         summary.failure = failure.as_ref().map(Failed::from);
         summary.status = status(failure.as_ref()).into();
         keep(&study, &line, &directory, &evolution)?;
@@ -310,15 +310,26 @@ impl Evolution {
 }
 
 impl EquidistributionSummary {
-    fn tell(&mut self, study: &EquidistributionStudy, line: &Line, evolution: &Evolution) {
+    fn tell(&mut self, study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Result<()> {
         self.work = LineWork { steps: evolution.done, linear_solves: evolution.linear_solves };
         self.mesh = evolution.mesh().to_vec();
         let t = evolution.steps.last().map_or_else(|| *evolution.times.last().unwrap_or(&0.0), |step| step.t);
-        // a mesh of which nothing can be told is one of a failed run, which says so
-        self.quality = LineQuality::of(line, t, &self.mesh, study.time.is_none()).ok();
-        self.warnings = unseen(line, t, &self.mesh).into_iter().collect();
         let tolerance = study.until().tolerance;
-        let Some(history) = &evolution.last else { return };
+        if let Some(history) = &evolution.last {
+            self.tell_iterations(study, evolution, history, tolerance);
+        }
+        self.quality = Some(LineQuality::of(line, t, &self.mesh, study.time.is_none())?);
+        self.warnings = unseen(line, t, &self.mesh)?.into_iter().collect();
+        Ok(())
+    }
+
+    fn tell_iterations(
+        &mut self,
+        study: &EquidistributionStudy,
+        evolution: &Evolution,
+        history: &History,
+        tolerance: Option<f64>,
+    ) {
         self.iterations = history.iterates.iter().enumerate().map(|(n, it)| NumberedIterate::new(n, it)).collect();
         let prediction = history.prediction;
         self.rate =
@@ -345,16 +356,16 @@ impl NumberedIterate {
 
 impl LineQuality {
     fn of(line: &Line, t: f64, mesh: &[f64], steady: bool) -> Result<Self> {
-        let m = line.density.at_each(t, mesh)?;
-        let share = |i: usize| 0.5 * (m[i][0] + m[i + 1][0]) * (mesh[i + 1] - mesh[i]);
-        let shares: Vec<f64> = (0..line.cells).map(share).collect();
+        // exact integrals, unless there are so many cells that each is as good as its trapezoid
+        let face = if line.cells <= EXACTLY { FaceDensity::Exact } else { FaceDensity::Trapezoid };
+        let shares = Line { face, ..line.clone() }.shares(t, mesh)?;
         let mean = shares.iter().sum::<f64>() / line.cells as f64;
         let shortest = mesh.windows(2).map(|x| x[1] - x[0]).fold(f64::INFINITY, f64::min);
         let compared = |cells: usize| -> Result<f64> {
-            let every = cells.div_ceil(COMPARED);
-            let nodes: Vec<usize> = (0..=cells).step_by(every).collect();
+            let nodes: Vec<usize> = thinned(cells + 1, COMPARED).collect();
             let xi: Vec<f64> = nodes.iter().map(|&i| i as f64 / cells as f64).collect();
-            let exact = line.exact(t, &xi)?;
+            let between: Vec<f64> = thinned(cells + 1, EXACTLY).map(|i| mesh[i]).collect();
+            let exact = line.exact(t, &between, &xi)?;
             Ok(nodes.iter().zip(exact).map(|(&i, exact)| (mesh[i] - exact).abs()).fold(0.0, f64::max))
         };
         Ok(Self {
@@ -366,20 +377,24 @@ impl LineQuality {
 }
 
 /// Says so where the cells see another density than there is: a layer between two nodes is none to them.
-fn unseen(line: &Line, t: f64, mesh: &[f64]) -> Option<String> {
+fn unseen(line: &Line, t: f64, mesh: &[f64]) -> Result<Option<String>> {
     let [a, b] = line.ends;
-    let sum = |x: &[f64]| -> Option<f64> {
-        let m = line.density.at_each(t, x).ok()?;
-        Some((1..x.len()).map(|i| 0.5 * (m[i - 1][0] + m[i][0]) * (x[i] - x[i - 1])).sum())
+    let seen: f64 = line.shares(t, mesh)?.iter().sum();
+    let mut places: Vec<f64> = (0..=PLACES).map(|k| a + (b - a) * k as f64 / PLACES as f64).collect();
+    places.extend(thinned(mesh.len(), PLACES).map(|i| mesh[i]));
+    places.sort_by(f64::total_cmp);
+    let m = line.density.at_each(t, &places)?;
+    let there: f64 = match line.density.followed(t, &places) {
+        // chords are no longer than the arc, and no layer is too thin for them
+        Some(u) => (1..u.len()).map(|i| (places[i] - places[i - 1]).hypot(u[i] - u[i - 1])).sum(),
+        None => (1..m.len()).map(|i| 0.5 * (m[i - 1][0] + m[i][0]) * (places[i] - places[i - 1])).sum(),
     };
-    let places: Vec<f64> = (0..=PLACES).map(|k| a + (b - a) * k as f64 / PLACES as f64).collect();
-    let [seen, there] = [sum(mesh)?, sum(&places)?];
-    ((seen - there).abs() > NOTICEABLE * there).then(|| {
+    Ok(((seen - there).abs() > NOTICEABLE * there).then(|| {
         format!(
             "the cells see another density than there is: ∫M is {seen:.3} over them and {there:.3} in truth; refine grid.cells, \
              or begin with a start.mesh that has nodes where M is large"
         )
-    })
+    }))
 }
 
 /// Writes the history, the arrays and the pictures.
@@ -487,9 +502,9 @@ fn convergence(title: &str, history: &History) -> Figure {
         Some(Curve { name: format!("{name}, {rate:.4} in two"), points, plain: true, ..Curve::default() })
     };
     let mut curves = vec![Curve { name: "error".into(), points, ..Curve::default() }];
-    // a bound holds from the start, what is predicted in the end
+    // what is predicted holds in the end, a bound from the start, for even iterates and odd ones apart
     curves.extend(line("predicted", history.prediction.predicted, errors[last]));
-    curves.extend(line("bound", history.prediction.bound, errors[0]));
+    curves.extend(line("bound", history.prediction.bound, [0.0, errors[0][1].max(errors[1.min(last)][1])]));
     Figure {
         title: format!("{title}, convergence"),
         labels: ["iterations".into(), "distance to the single-domain mesh".into()],

@@ -252,7 +252,7 @@ impl Source {
             };
             let span = if whole { last_line(&self.pieces[0].text) } else { span };
             let help = match whole {
-                true => format!("add [{missing}] with its keys; studies/burgers-b-stochastic.toml has every table"),
+                true => format!("add [{missing}] with its keys; the studies of the same kind in studies/ have one"),
                 false => format!("add {missing} = …"),
             };
             return self.diagnostic(&message, span, Some(help));
