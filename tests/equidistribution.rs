@@ -107,8 +107,8 @@ fn advice_is_true() {
         said("table-8-1-nonlinear", &[&square[1..], &["stop.tolerance=1e-20", "stop.iterations=500"]].concat());
     assert!(rounding.contains("that is rounding") && help == "raise stop.tolerance", "{rounding}");
     let (_, help) = said(
-        "table-8-1-nonlinear",
-        &[&square[..], &["schwarz={ method = \"optimized\", cut = 0.5, robin = 0.01 }"]].concat(),
+        "schwarz-robin",
+        &[&square[..], &["schwarz.cuts=[0.5]", "schwarz.robin=0.01"]].concat(),
     );
     assert!(help.contains("lagged") && !help.contains("overlap"), "{help}");
 }
@@ -266,7 +266,7 @@ fn bad_settings_are_refused() {
         (m("exp(-50*x)"), &["density.value", "above 0 by more than 1e-14 of its largest"]),
         ("[density]\nkind = \"arclength\"\nof = \"if(x < 0.3, 0, 1)\"\n".into(), &["density.of", "u jumps there"]),
         (format!("{M}[output]\nanimation = true\n"), &["output.animation", "no frames"]),
-        (schwarz("subdomains = 200\noverlap_cells = 1"), &["schwarz.subdomains", "100 cells"]),
+        (schwarz("subdomains = 200\noverlap_cells = 1"), &["schwarz.subdomains", "number of cells, 100"]),
         (schwarz("subdomains = 3\noverlap_cells = 2"), &["must be whole", "98 and 101"]),
         (schwarz("subdomains = 50\noverlap_cells = 100"), &["no wider than its overlap"]),
         (schwarz("overlap = [0.4, 0.6]\noverlap_cells = 3"), &["goes with schwarz.subdomains only"]),

@@ -46,7 +46,7 @@ impl List {
             }
         }
         if self.topic.is_none_or(|only| only == Topic::Errors) {
-            say("errors (error.name in summary.json)");
+            say("errors (error.kind in summary.json)");
             Failure::all().for_each(|[name, what, _]| say(format_args!("  {name:<19}{what}")));
         }
         Ok(ExitCode::SUCCESS)
