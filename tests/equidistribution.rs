@@ -106,10 +106,7 @@ fn advice_is_true() {
     let (rounding, help) =
         said("table-8-1-nonlinear", &[&square[1..], &["stop.tolerance=1e-20", "stop.iterations=500"]].concat());
     assert!(rounding.contains("that is rounding") && help == "raise stop.tolerance", "{rounding}");
-    let (_, help) = said(
-        "schwarz-robin",
-        &[&square[..], &["schwarz.cuts=[0.5]", "schwarz.robin=0.01"]].concat(),
-    );
+    let (_, help) = said("schwarz-robin", &[&square[..], &["schwarz.subdomains=2", "schwarz.robin=0.01"]].concat());
     assert!(help.contains("lagged") && !help.contains("overlap"), "{help}");
 }
 
