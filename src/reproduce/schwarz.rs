@@ -177,7 +177,7 @@ pub fn table_8_1(_: Options) -> Result<Rerun> {
 
 pub fn figure_8_1(_: Options) -> Result<Rerun> {
     let mut table = Table::new(
-        "Figure 8.1: parallel nonlinear Schwarz on two subdomains of 100 cells",
+        "Figure 8.1: parallel nonlinear Schwarz, 100 cells in two subdomains",
         &["M", "overlap", "predicted", "observed", "iterations to 1e-10", "elsewhere", "verdict"],
     );
     let mut pictures = Vec::new();

@@ -185,7 +185,7 @@ impl MethodName {
     /// Name and description of every method.
     pub const KINDS: &[(&str, &str)] = &[
         ("classical", "overlapping subdomains with each other's values at their ends"),
-        ("optimal", "the flux of the rest of the domain at cuts: as many iterations as subdomains"),
+        ("optimal", "the flux of the rest of the domain at cuts: with exact faces as many iterations as subdomains"),
         ("optimized", "F ± p x at cuts, with p given, \"auto\" or \"lagged\""),
     ];
 }
