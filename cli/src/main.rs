@@ -2,6 +2,7 @@
 
 mod check;
 mod equidistribution;
+mod interrupts;
 mod list;
 mod poisson;
 mod progress;
@@ -63,6 +64,7 @@ impl StudyArgs {
 }
 
 fn main() -> ExitCode {
+    interrupts::outlive_file_limits();
     let outcome = match Cli::parse().verb {
         Verb::Run(run) => run.execute(),
         Verb::Check(check) => check.execute(),

@@ -2,7 +2,7 @@ use crate::errors::raised;
 use crate::threads::{BRIEFLY, Ended, PATIENCE, interruptible};
 use driftmesh::error::Moment;
 use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, State};
-use driftmesh::study::{Source, Study};
+use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -90,7 +90,7 @@ pub fn run(
     let computing = study.clone();
     let ended = interruptible(
         py,
-        move || computing.run(&out, &mut [&mut Watcher(theirs)]),
+        move || computing.run(&out, Begin::Anew, &mut [&mut Watcher(theirs)]),
         || {
             seen.stop.store(true, Ordering::Relaxed);
             if seen.progress().is_some() { PATIENCE } else { BRIEFLY }
