@@ -5,14 +5,17 @@
 //! study file through `help`.
 
 use std::path::PathBuf;
+use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
 /// `Result` with the library's own [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// A numerical failure inside one step. It never carries a time: the loop that knows it adds it ([`Error::Failed`]).
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, EnumIter, EnumMessage, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Failure {
     /// A mesh cell has a corner whose Jacobian is not positive.
+    #[strum(serialize = "mesh-folded")]
     #[error("the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {}, y = {}{}", cell[0], cell[1], short(x[0]), short(x[1]), noisy(*noise))]
     Folded {
         /// Indices of the cell along ξ and η.
@@ -291,34 +294,13 @@ pub enum Failure {
 impl Failure {
     /// Short name of the variant, for `summary.json`.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Folded { .. } => "mesh-folded",
-            Self::NonFinite { .. } => "non-finite",
-            Self::Formula { .. } => "formula",
-            Self::NotPositive { .. } => "not-positive",
-            Self::NotPeriodic { .. } => "not-periodic",
-            Self::NotUniform { .. } => "not-uniform",
-            Self::ManySubsteps { .. } => "many-substeps",
-            Self::NewtonStalled { .. } => "newton-stalled",
-            Self::VanishingStep { .. } => "vanishing-step",
-            Self::LinearStalled { .. } => "linear-stalled",
-            Self::SteepDensity { .. } => "steep-density",
-            Self::LongWalks { .. } => "long-walks",
-            Self::NoisyInterface { .. } => "noisy-interface",
-            Self::SchwarzStalled { .. } => "schwarz-stalled",
-            Self::Subdomains { .. } => "subdomains",
-            Self::LineDensity { .. } => "line-density",
-            Self::LineStalled { .. } => "line-stalled",
-            Self::NotConverged { .. } => "not-converged",
-            Self::SelfTouching { .. } => "self-touching",
-            Self::DegenerateStencil { .. } => "degenerate-stencil",
-            Self::FrontOutside { .. } => "front-outside",
-            Self::VanishingPhase { .. } => "vanishing-phase",
-            Self::NotAGraph { .. } => "not-a-graph",
-            Self::FrontUnstable { .. } => "front-unstable",
-            Self::WrongSide { .. } => "wrong-side",
-            Self::WrongLength { .. } => "wrong-length",
-        }
+        self.into()
+    }
+
+    /// Name, meaning and remedy of every failure, in the order of this enum.
+    pub fn all() -> impl Iterator<Item = [&'static str; 3]> {
+        // a failure of nothing: names, meanings and remedies are those of the variant
+        Self::iter().map(|failure| [failure.name(), failure.get_documentation().unwrap_or_default(), failure.help()])
     }
 
     /// The keys of a study that may cure it.
@@ -341,7 +323,7 @@ impl Failure {
             Self::NotUniform { .. } => "set mesh.generator to { kind = \"fixed\" }, or leave time.stepper out",
             Self::ManySubsteps { .. } => "leave time.stepper out, or lower grid.cells or pde.viscosity",
             Self::VanishingStep { .. } => {
-                "refine grid.cells where layers form that the mesh does not resolve (pde.flux = \"energy\" keeps Burgers' equation stable meanwhile), smooth a jump in pde.boundary, raise mesh.relaxation if the mesh is restless, or give time.step as a number"
+                "refine grid.cells where layers form that the mesh does not resolve (pde.flux = \"energy\" keeps Burgers' equation stable meanwhile), smooth what jumps in time or from a side to the initial solution, raise mesh.relaxation if the mesh is restless, or give time.step as a number"
             }
             Self::NewtonStalled { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
             Self::LinearStalled { .. } => {
@@ -364,7 +346,7 @@ impl Failure {
                 "mend density.value or density.of: iterates of Robin conditions may leave the domain"
             }
             Self::LineStalled { .. } => {
-                "refine grid.cells, smooth the density where it jumps or peaks within a cell, or begin nearer with start.mesh"
+                "refine grid.cells; where the density jumps or peaks within a cell smooth it, or set equidistribution.face_density to \"exact\"; or begin nearer with start.mesh"
             }
             Self::NotConverged { .. } => {
                 "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"galerkin\""

@@ -30,6 +30,22 @@ macro_rules! kinds {
             }
         }
 
+        impl schemars::JsonSchema for $enum {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($enum).into()
+            }
+
+            fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                #[derive(schemars::JsonSchema)]
+                #[schemars(tag = "kind")]
+                #[allow(dead_code, clippy::large_enum_variant)] // only its form is asked for
+                enum Tagged {
+                    $(#[doc = $line] #[schemars(rename = $kind)] $type($type),)+
+                }
+                Tagged::json_schema(generator)
+            }
+        }
+
         impl serde::Serialize for $enum {
             fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 #[derive(serde::Serialize)]

@@ -2,6 +2,7 @@
 
 use driftmesh::density::{Arclength, Given, Monitor};
 use driftmesh::equidistribution::{Coarse, Line, LineDensity, Measure, Method, Stop, Sweep};
+use driftmesh::error::Unfit;
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
@@ -9,6 +10,14 @@ use driftmesh::physics::{Burgers, Convection, FormulaPde, Motion, Physics, Presc
 use driftmesh::simulation::{RunDirectory, Schedule};
 use driftmesh::study::{MovingMesh, Source};
 use driftmesh::{Error, Failure};
+use std::collections::BTreeSet;
+use std::sync::Mutex;
+
+#[path = "../examples/errors.rs"]
+mod reference;
+
+/// Names of the failures that were triggered.
+static TRIGGERED: Mutex<BTreeSet<&str>> = Mutex::new(BTreeSet::new());
 
 fn mesh() -> Mesh<2> {
     Mesh::uniform(Lattice::bounded([8, 8]).unwrap(), [0.0; 2], [1.0; 2]).unwrap()
@@ -17,6 +26,9 @@ fn mesh() -> Mesh<2> {
 /// The message, the remedy and the exit status of an error.
 fn assert_says(error: impl Into<Error>, message: &[&str], help: Option<&str>, failure: bool) {
     let error = error.into();
+    if let Error::Failed { failure, .. } = &error {
+        TRIGGERED.lock().unwrap().insert(failure.name());
+    }
     for part in message {
         assert!(error.to_string().contains(part), "{part:?} is not in {error}");
     }
@@ -132,6 +144,15 @@ fn newton_stalled() {
     let error = burgers.step(motion, &u).unwrap_err();
     assert_eq!(error.name(), "newton-stalled");
     assert_says(error, &["Newton's method stalled: residual", "iterations"], Some("time.step"), true);
+}
+
+#[test]
+fn vanishing_step() {
+    let text = "[study]\nname = \"jump\"\nkind = \"moving-mesh\"\n[grid]\ncells = [8, 8]\n[time]\nstart = 0\nend = 1\n\
+                [pde]\nkind = \"prescribed\"\nu = \"if(t < 0.5, x, 2*x)\"";
+    let study = MovingMesh::from_source(&Source::new("jump.toml", text)).unwrap();
+    let (_, failure) = driftmesh::study::compute(&study).unwrap();
+    assert_says(failure.unwrap(), &["at t = 0.5", "time steps shrank to"], Some("time.step"), true);
 }
 
 #[test]
@@ -260,6 +281,23 @@ fn unreadable() {
     assert_says(error, &["cannot read no/such/study.toml"], None, false);
 }
 
+/// Each file is named with what is wrong with it, and the remedy depends on that.
+#[test]
+fn unfit_checkpoints() {
+    let error = |unfit: Unfit| Error::Checkpoint { refused: vec![("out/checkpoint.0".into(), unfit)] };
+    let other = Unfit::Study { key: "time.step".into(), was: "0.01".into(), is: "not given".into() };
+    let said =
+        "cannot go on: out/checkpoint.0: it belongs to a study in which `time.step` is 0.01; here it is not given";
+    assert_says(error(other), &[said], Some("study.toml"), false);
+    let version = Unfit::Version { found: "0.0.9".into() };
+    assert_says(error(version), &["it was written by driftmesh 0.0.9, and this is"], Some("that version"), false);
+    assert_says(error(Unfit::Foreign), &["it is no checkpoint"], Some("leave --resume out"), false);
+    let damaged = Unfit::Damaged("its checksum does not match".into());
+    assert_says(error(damaged), &["it is damaged: its checksum"], Some("leave --resume out"), false);
+    let beside = Unfit::Beside { file: "history.csv".into(), reason: "it is short".into() };
+    assert_says(error(beside), &["history.csv does not go with it: it is short"], Some("leave --resume out"), false);
+}
+
 #[test]
 fn unwritable_busy_and_foreign() {
     let place = tempfile::tempdir().unwrap();
@@ -268,7 +306,12 @@ fn unwritable_busy_and_foreign() {
     assert!(matches!(error, Error::Unwritable { .. } | Error::Unreadable { .. }), "{error}");
     let claimed = RunDirectory::claim(&place.path().join("mine")).unwrap();
     std::fs::remove_dir_all(claimed.path()).unwrap();
-    assert_says(claimed.write("summary.json", b"{}").unwrap_err(), &["cannot write", "summary.json"], None, true);
+    assert_says(
+        claimed.write("summary.json", b"{}").unwrap_err(),
+        &["cannot write", "summary.json"],
+        Some("free some space"),
+        true,
+    );
 
     let held = RunDirectory::claim(&place.path().join("held")).unwrap();
     let error = RunDirectory::claim(held.path()).unwrap_err();
@@ -420,4 +463,42 @@ fn interrupted_runs_leave_their_last_state() {
     assert_says(failure, &["interrupted at t = 0.253", "(step 3)"], None, true);
     let summary = std::fs::read_to_string(directory.path().join("summary.json")).unwrap();
     assert!(summary.contains("\"status\": \"interrupted\"") && directory.path().join("final.npz").is_file());
+}
+
+/// No failure is without a test, and the page about them is that of the code.
+#[test]
+fn every_failure_is_triggered_and_documented() {
+    let tests = [
+        folded,
+        non_finite,
+        formula,
+        not_positive,
+        not_periodic,
+        not_uniform,
+        many_substeps,
+        newton_stalled,
+        vanishing_step,
+        linear_stalled,
+        steep_density,
+        noisy_interface,
+        long_walks,
+        schwarz_stalled,
+        subdomains,
+        wrong_length,
+        self_touching,
+        degenerate_stencil,
+        fronts,
+        line_density,
+        line_stalled,
+        not_converged,
+    ];
+    tests.iter().for_each(|trigger| trigger());
+    let triggered = TRIGGERED.lock().unwrap().clone();
+    let missing: Vec<&str> = Failure::all().map(|[name, ..]| name).filter(|name| !triggered.contains(name)).collect();
+    assert!(missing.is_empty(), "no test triggers {missing:?}");
+    let page = include_str!("../docs/errors.md");
+    assert!(
+        page == reference::page(),
+        "docs/errors.md is old: cargo run --release -p driftmesh --example errors > docs/errors.md"
+    );
 }

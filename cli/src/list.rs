@@ -1,6 +1,7 @@
 use crate::terminal::say;
 use clap::{Args, ValueEnum};
 use driftmesh::{
+    Failure,
     density::MonitorKind,
     laplacian::Laplacian,
     meshing::{EstimatorKind, GeneratorKind},
@@ -24,6 +25,7 @@ enum Topic {
     Laplacians,
     Densities,
     Methods,
+    Errors,
 }
 
 impl List {
@@ -42,6 +44,10 @@ impl List {
                 say(format_args!("{title} ({key})"));
                 kinds.iter().for_each(|(name, line)| say(format_args!("  {name:<14}{line}")));
             }
+        }
+        if self.topic.is_none_or(|only| only == Topic::Errors) {
+            say("errors (error.name in summary.json)");
+            Failure::all().for_each(|[name, what, _]| say(format_args!("  {name:<19}{what}")));
         }
         Ok(ExitCode::SUCCESS)
     }

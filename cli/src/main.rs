@@ -9,6 +9,7 @@ mod progress;
 mod report;
 mod reproduce;
 mod run;
+mod schema;
 mod stefan;
 mod terminal;
 
@@ -42,6 +43,11 @@ enum Verb {
     /// (Re)build the HTML report of a finished or interrupted run.
     #[command(after_help = "Example:\n  driftmesh report out/burgers")]
     Report(report::Report),
+    /// Print the JSON Schema of a study file, for editors.
+    #[command(
+        after_help = "Example:\n  driftmesh schema > driftmesh.schema.json   and then, as the first line of a study:\n  #:schema ./driftmesh.schema.json"
+    )]
+    Schema,
 }
 
 /// A study file and what is set on top of it.
@@ -71,6 +77,7 @@ fn main() -> ExitCode {
         Verb::List(list) => list.execute(),
         Verb::Reproduce(reproduce) => reproduce.execute(),
         Verb::Report(report) => report.execute(),
+        Verb::Schema => schema::execute(),
     };
     match outcome {
         Ok(code) => code,

@@ -4,7 +4,7 @@ use clap::Args;
 use driftmesh::Error;
 use driftmesh::meshing::Interface;
 use driftmesh::simulation::{Observer, RunDirectory, Standing, Summary};
-use driftmesh::study::{self, MovingMesh, Study, UniformEquivalent};
+use driftmesh::study::{self, Begin, MovingMesh, Study, UniformEquivalent};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -48,11 +48,12 @@ impl Run {
             (_, false) => {}
         }
         terminal::use_threads(self.threads)?;
+        let begin = if self.resume { Begin::Resumed } else { Begin::Anew };
         match study {
             Study::MovingMesh(study) => self.moving_mesh(&study, &out),
             Study::Poisson(study) => poisson::run(&study, &out, self.quiet),
-            Study::Stefan(study) => stefan::run(&study, &out, self.resume, self.quiet),
-            Study::Equidistribution(study) => equidistribution::run(&study, &out, self.quiet),
+            Study::Stefan(study) => stefan::run(&study, &out, begin, self.quiet),
+            Study::Equidistribution(study) => equidistribution::run(&study, &out, begin, self.quiet),
         }
     }
 
@@ -75,7 +76,10 @@ impl Run {
         finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
         if !self.quiet {
             terminal::say(table(&finished.summary));
-            if let Some(line) = uniform(study, &finished.summary)? {
+            // whoever interrupted the run does not wait for others
+            if !matches!(finished.failure, Some(Error::Interrupted(_)))
+                && let Some(line) = uniform(study, &finished.summary)?
+            {
                 terminal::say(line);
             }
             terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));

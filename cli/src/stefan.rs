@@ -3,21 +3,21 @@ use crate::progress::Progress;
 use crate::run::remedy;
 use crate::terminal;
 use driftmesh::simulation::Observer;
-use driftmesh::study::{StefanStudy, StefanSummary};
+use driftmesh::study::{Begin, StefanStudy, StefanSummary};
 use std::path::Path;
 use std::process::ExitCode;
 
 /// Runs a study of kind `stefan`.
-pub fn run(study: &StefanStudy, out: &Path, resume: bool, quiet: bool) -> driftmesh::Result<ExitCode> {
+pub fn run(study: &StefanStudy, out: &Path, begin: Begin, quiet: bool) -> driftmesh::Result<ExitCode> {
     let mut progress = Progress::new();
     let mut interrupts = Interrupts::listen();
     let mut watchers: Vec<&mut dyn Observer> = vec![&mut interrupts];
     if !quiet {
         watchers.push(&mut progress);
     }
-    let finished = match resume {
-        true => study.resume(out, &mut watchers),
-        false => study.run(out, &mut watchers),
+    let finished = match begin {
+        Begin::Anew => study.run(out, &mut watchers),
+        Begin::Resumed => study.resume(out, &mut watchers),
     };
     progress.clear();
     let finished = finished?;

@@ -112,6 +112,10 @@ class LineDensity(MeshError, ValueError):
     """The density of a line is not finite and positive, or its derivative not finite."""
 
 
+class LineStalled(MeshError):
+    """Newton's method found no nodes of a line, or of a subdomain of it."""
+
+
 class NotConverged(MeshError):
     """An iteration between subdomains of a line did not converge."""
 

@@ -45,7 +45,7 @@ def equidistribute(
     Raises:
         ValueError: Wrong shapes or values; a density that is not finite and positive somewhere
             (:class:`driftmesh.errors.LineDensity`).
-        driftmesh.errors.NewtonStalled: The nonlinear solve did not converge.
+        driftmesh.errors.LineStalled: The nonlinear solve did not converge.
 
     >>> from driftmesh import equidistribute
     >>> x = equidistribute(lambda x: x**2 + 1, 100)

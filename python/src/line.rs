@@ -90,7 +90,7 @@ impl Shared {
         }
         match ended {
             Ended::Itself(result) => result.map_err(|error| match &error {
-                Error::Failed { failure: Failure::NewtonStalled { .. }, .. } => {
+                Error::Failed { failure: Failure::LineStalled { .. }, .. } => {
                     raised(py, &error, Some("set face_density to \"exact\": rough densities need it".into()))
                 }
                 _ => plain(py, error),

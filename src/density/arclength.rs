@@ -2,6 +2,7 @@ use super::{MAX_SMOOTHING, Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::Mesh;
 use crate::numerics::difference::{Gradient, Metrics};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Arc-length density
@@ -27,7 +28,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// # Source
 /// Huang and Russell, *Adaptive Moving Mesh Methods*, Springer (2011).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Arclength {
     /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
@@ -43,7 +44,7 @@ pub struct Arclength {
 }
 
 /// How α is chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Strength {
     /// α = this / max |∇u|², the maximum over all nodes; no unit.

@@ -2,12 +2,13 @@ use super::{MAX_SMOOTHING, Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::Mesh;
 use crate::numerics::difference::Gradient;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The first unknown, or what is followed in its place, is the density itself: a prescribed ρ, or a depth of water
 ///
 /// It must be positive everywhere; `smoothing` passes of the filter [`smooth`] follow.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Given {
     /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is

@@ -2,6 +2,7 @@ use super::{Monitor, smoothing::smooth_values};
 use crate::error::{Failure, Result};
 use crate::geometry::Mesh;
 use crate::numerics::{larger, sum};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The root of the slope, over its mean: no number to set
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// with ∇u in each mesh cell, then round(8 (N/41²)) passes of the (1 2 1)⊗(1 2 1)/16 filter over cells, at least one, N
 /// the number of nodes. A layer of any width then gets the same share of the nodes, about half of them: the mean of the
 /// root falls with the width as fast as its largest value grows. Where u is constant, ρ = 1.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RootGradient {
     /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is

@@ -1,10 +1,11 @@
 use super::LineDensity;
 use super::path::Path;
 use crate::error::Failure;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How M is averaged over a cell.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FaceDensity {
     /// The mean of both ends.

@@ -90,8 +90,9 @@ const KRONROD: [[f64; 3]; 8] = [
     [0.207_784_955_007_898_47, 0.204_432_940_075_298_89, 0.0],
     [0.0, 0.209_482_141_084_727_82, 0.417_959_183_673_469_4],
 ];
-/// Halvings beyond which what is left is taken as rounding.
-const DEEPEST: usize = 12;
+/// Halvings beyond which what is left is taken as rounding, and pieces beyond which it is not followed.
+const DEEPEST: usize = 48;
+const MOST_PIECES: usize = 4096;
 /// Places at which extremes are looked for first, and then around the best of them, so many times.
 const PLACES: usize = 2000;
 const PLACES_AROUND: usize = 20;
@@ -261,32 +262,53 @@ impl LineDensity {
         Ok(looks)
     }
 
-    /// ∫ M from a to b, to round-off: the rule of Gauss and Kronrod, halved where its error estimate asks for it.
+    /// ∫ M from a to b, to round-off: the rule of Gauss and Kronrod, halved where its error estimate asks for it. Where M
+    /// jumps, that is down to the last bit; what swings more often than can be followed is taken as it is.
     ///
     /// # Errors
     /// As [`at_each`](Self::at_each).
     pub fn integral(&self, t: f64, a: f64, b: f64) -> Result<f64, Failure> {
-        match &self.kind {
-            Kind::Samples(samples) => Ok(samples.up_to(b) - samples.up_to(a)),
-            _ => self.piece(t, a, b, DEEPEST),
+        if let Kind::Samples(samples) = &self.kind {
+            return Ok(samples.up_to(b) - samples.up_to(a));
         }
-    }
-
-    fn piece(&self, t: f64, a: f64, b: f64, depth: usize) -> Result<f64, Failure> {
-        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-        let places: Vec<f64> = KRONROD.iter().flat_map(|[x, ..]| [middle - half * x, middle + half * x]).collect();
-        let values = self.at_each(t, &places)?;
-        let (mut fine, mut coarse) = (0.0, 0.0);
-        for ([x, kronrod, gauss], pair) in KRONROD.iter().zip(values.chunks_exact(2)) {
-            let sum = if *x == 0.0 { pair[0][0] } else { pair[0][0] + pair[1][0] };
-            fine += kronrod * sum;
-            coarse += gauss * sum;
+        let mut sum = 0.0;
+        let mut unsure = vec![[a, b]];
+        for level in 0..=DEEPEST {
+            let last = level == DEEPEST || unsure.len() > MOST_PIECES;
+            let around = |[a, b]: &[f64; 2]| (0.5 * (a + b), 0.5 * (b - a));
+            let places = unsure.iter().flat_map(|piece| {
+                let (middle, half) = around(piece);
+                let inside = KRONROD.into_iter().flat_map(move |[x, ..]| [middle - half * x, middle + half * x]);
+                inside.chain(*piece)
+            });
+            let values = self.at_each(t, &places.collect::<Vec<f64>>())?;
+            let mut halves = Vec::new();
+            for (piece, values) in unsure.iter().zip(values.chunks_exact(2 * KRONROD.len() + 2)) {
+                let (mut fine, mut coarse) = (0.0, 0.0);
+                let (values, ends) = values.split_at(2 * KRONROD.len());
+                let [low, high] = values.iter().fold([f64::INFINITY, 0.0_f64], |[l, h], m| [l.min(m[0]), h.max(m[0])]);
+                // a jump beyond the outermost places is none to the rule
+                let jumps =
+                    ends.iter().zip(values).any(|(end, next)| (end[0] - next[0]).abs() > high - low + 1e-10 * high);
+                for ([x, kronrod, gauss], pair) in KRONROD.iter().zip(values.chunks_exact(2)) {
+                    let sum = if *x == 0.0 { pair[0][0] } else { pair[0][0] + pair[1][0] };
+                    fine += kronrod * sum;
+                    coarse += gauss * sum;
+                }
+                let (middle, half) = around(piece);
+                // the difference bounds the error of the coarse rule, which is far larger
+                if last || !jumps && (fine - coarse).abs() <= 1e-10 * fine.abs() {
+                    sum += half * fine;
+                } else {
+                    halves.extend([[piece[0], middle], [middle, piece[1]]]);
+                }
+            }
+            if halves.is_empty() {
+                break;
+            }
+            unsure = halves;
         }
-        // the difference bounds the error of the coarse rule, which is far larger
-        if depth == 0 || (fine - coarse).abs() <= 1e-10 * fine.abs() {
-            return Ok(half * fine);
-        }
-        Ok(self.piece(t, a, middle, depth - 1)? + self.piece(t, middle, b, depth - 1)?)
+        Ok(sum)
     }
 }
 

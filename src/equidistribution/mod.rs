@@ -27,6 +27,7 @@ pub use schwarz::{Coarse, Method, Robin, Sweep};
 use crate::error::{Error, Failure, Result};
 use crate::parallel;
 use chain::{Chain, End, Step};
+use schemars::JsonSchema;
 use schwarz::{Iteration, Pieces};
 use serde::{Deserialize, Serialize};
 
@@ -68,7 +69,7 @@ pub struct Stop {
 }
 
 /// What tells that an iteration has converged.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Measure {
     /// The distance to the discrete single-domain mesh.
@@ -79,7 +80,7 @@ pub enum Measure {
 }
 
 /// One iterate; the first is the start.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iterate {
     /// The largest distance of a node of any piece from the discrete single-domain mesh.
     pub error: f64,
@@ -94,7 +95,7 @@ pub struct Iterate {
 }
 
 /// How an iteration went.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct History {
     /// The start and every iterate.
     pub iterates: Vec<Iterate>,

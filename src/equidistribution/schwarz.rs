@@ -2,7 +2,9 @@ use super::chain::{Chain, End, Law, Step};
 use super::coarse;
 use crate::error::Failure;
 use crate::parallel;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::borrow::Cow;
 use std::fmt;
 
 /// How subdomains of a line exchange what they know.
@@ -30,7 +32,7 @@ pub enum Method {
 }
 
 /// The order in which pieces are solved.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Sweep {
     /// All from the last iterate.
@@ -41,7 +43,7 @@ pub enum Sweep {
 }
 
 /// What is done between sweeps.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Coarse {
     /// Nothing.
@@ -69,6 +71,16 @@ impl Serialize for Robin {
             Self::Auto => serializer.serialize_str("auto"),
             Self::Lagged => serializer.serialize_str("lagged"),
         }
+    }
+}
+
+impl JsonSchema for Robin {
+    fn schema_name() -> Cow<'static, str> {
+        "Robin".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [{ "type": "number" }, { "enum": ["auto", "lagged"] }] })
     }
 }
 

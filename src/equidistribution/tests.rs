@@ -49,6 +49,25 @@ fn exact_meshes() {
     assert!((layer().integral(0.0, 0.0, 1.0).unwrap() - 1.83362100753).abs() < 1e-11);
 }
 
+/// Where M jumps, exact integrals have the nodes of the continuous mesh.
+#[test]
+fn a_density_may_jump() {
+    for (left, right) in [(1.0, 20.0), (100.0, 1.0), (1.0, 50.0)] {
+        let density = LineDensity::formula(&format!("if(x < 0.3, {left}, {right})")).unwrap();
+        let up_to_jump = 0.3 * left;
+        let whole = up_to_jump + 0.7 * right;
+        let line = line(density, 100, FaceDensity::Exact);
+        assert!((line.density.integral(0.0, 0.0, 1.0).unwrap() / whole - 1.0).abs() < 1e-14);
+        let place = |g: f64| if g < up_to_jump { g / left } else { 0.3 + (g - up_to_jump) / right };
+        let mesh = line.solve(0.0, &line.uniform(), None).unwrap().0;
+        let xi: Vec<f64> = (0..=100).map(|i| i as f64 / 100.0).collect();
+        for found in [mesh, line.exact(0.0, &xi).unwrap()] {
+            let off = found.iter().zip(&xi).map(|(x, xi)| (x - place(xi * whole)).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-10, "{left}, {right}: off by {off:e}");
+        }
+    }
+}
+
 /// Second order by trapezoids, half their error by midpoints, and round-off by exact integrals.
 #[test]
 fn discrete_meshes_converge() {

@@ -21,6 +21,7 @@ pub use stencils::{NearDegenerate, Stencils};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Mesh, Patch, check_unfolded, padded};
 use crate::parallel;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the weights of a node follow from its neighbours.
@@ -47,7 +48,7 @@ pub enum Laplacian {
 }
 
 /// The polynomials of [`Laplacian::Published`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Polynomials {
     /// As the slides print them: three of them are not harmonic.
@@ -58,7 +59,7 @@ pub enum Polynomials {
 }
 
 /// The unit of length of [`Laplacian::Published`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Scaling {
     /// That of the coordinates.

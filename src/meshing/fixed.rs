@@ -2,10 +2,11 @@ use super::{MeshGenerator, Mmpde, Moved};
 use crate::error::{Failure, Result};
 use crate::geometry::Mesh;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The mesh does not move.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fixed {}
 

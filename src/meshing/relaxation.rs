@@ -1,4 +1,5 @@
 use crate::error::{Error, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// τ of the mesh equation: how long the mesh takes to follow its density across the domain
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(Relaxation::Time(0.5).over(1e-3), 0.5);
 /// assert_eq!(Relaxation::steps(25.0).over(1e-3), 0.025);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a number, or a table such as { steps = 25 }")]
 pub enum Relaxation {
     /// In units of time.
@@ -28,7 +29,7 @@ pub enum Relaxation {
 /// ```
 ///
 /// and the lag behind a density that moves evenly vanishes: an observer, with gain γ.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Steps {
     /// τ over Δt.

@@ -7,6 +7,7 @@ use crate::numerics::linear::Robust;
 use crate::parallel;
 use crate::setting::pair;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -24,7 +25,7 @@ use std::time::Instant;
 ///
 /// # Source
 /// Gander, *Schwarz methods over the course of time* (2008); Gander and Haynes (2012) for mesh equations.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Schwarz {
     /// Along each axis.

@@ -4,13 +4,14 @@ use crate::error::{Failure, Result, Unfit};
 use crate::geometry::{Mesh, Patch};
 use crate::kept::{Kept, check_nodal};
 use crate::numerics::linear::{Pcg, Robust};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One implicit solve of the mesh equation on the whole domain: the sides first, then all other nodes at once
 ///
 /// The gradient form is solved to round-off. The conservative form is solved by conjugate gradients from the mesh that
 /// the last step would lead to if it went on, to a hundredth of the shortest edge or better.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Whole {
     #[serde(skip)]

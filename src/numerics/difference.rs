@@ -1,6 +1,7 @@
 //! Second-order differences on the lattice, and the metrics of a mesh that follow from them.
 
 use crate::geometry::{Lattice, Mesh};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Derivative along one axis of the lattice at every node
@@ -53,7 +54,7 @@ pub fn derivative<const D: usize, const K: usize>(
 }
 
 /// How ∇_ξρ/ρ is differenced.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Gradient {
     /// Central differences of ρ over ρ.

@@ -8,6 +8,7 @@ use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use crate::numerics::{larger, sum};
 use crate::parallel;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Burgers' equation with a travelling oblique front
@@ -31,7 +32,7 @@ use serde::{Deserialize, Serialize};
 /// # Source
 /// (4.1) of Bihlo, Haynes and Walsh (2015), whose diffusion has the wrong sign in print and whose exact solution has
 /// t₀ where t must stand.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Burgers {
     /// ν.
@@ -61,7 +62,7 @@ pub struct Burgers {
 }
 
 /// Form of the convection term.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Convection {
     /// (u²/2)_x + (u²/2)_y.
@@ -74,7 +75,7 @@ pub enum Convection {
 }
 
 /// What passes a face between values a and b, over N_x + N_y, in the flux form.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum BurgersFlux {
     /// ½ a b: keeps Σ A ln u too, and is the most accurate of the three in thin fronts. u may undershoot a little.

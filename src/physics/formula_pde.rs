@@ -2,7 +2,8 @@ use super::formula_law::FormulaLaw;
 use super::{Physics, formula, mistaken};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::setting::{text_pairs, texts};
+use crate::setting::{Text, text_pairs, texts};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -49,28 +50,34 @@ use std::collections::BTreeMap;
 /// # Source
 /// Hundsdorfer and Verwer, *Numerical Solution of Time-Dependent Advection-Diffusion-Reaction Equations*, Springer
 /// (2003), for the scheme on a mesh at rest.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FormulaPde {
     /// Their names, at most [`MAX_UNKNOWNS`].
     pub unknowns: Vec<String>,
     /// F along x and along y.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "text_pairs")]
+    #[schemars(with = "BTreeMap<String, [Text; 2]>")]
     pub flux: BTreeMap<String, [String; 2]>,
     /// D.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    #[schemars(with = "BTreeMap<String, Text>")]
     pub diffusivity: BTreeMap<String, String>,
     /// S.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    #[schemars(with = "BTreeMap<String, Text>")]
     pub source: BTreeMap<String, String>,
     /// u at the start.
     #[serde(deserialize_with = "texts")]
+    #[schemars(with = "BTreeMap<String, Text>")]
     pub initial: BTreeMap<String, String>,
     /// u on bounded sides, or `"no-flux"`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    #[schemars(with = "BTreeMap<String, Text>")]
     pub boundary: BTreeMap<String, String>,
     /// u, where it is known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
+    #[schemars(with = "BTreeMap<String, Text>")]
     pub exact: BTreeMap<String, String>,
 }
 

@@ -3,12 +3,13 @@ use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
 use crate::geometry::{Field, Mesh};
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// No equation: the solution, or the mesh density itself, is a formula of x, y and t
 ///
 /// The mesh then follows `u` with its exact gradient, or `rho` as it is. Exactly one of the two is given.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Prescribed {
     /// The solution.

@@ -7,13 +7,14 @@ use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Field, Mesh, check_unfolded};
 use crate::kept::{Kept, check_nodal, encoded};
 use crate::physics::Physics;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_bytes::ByteBuf;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// `output.checkpoint`: when a checkpoint is written.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CheckpointsAt {
     /// After so many steps each.
@@ -142,7 +143,7 @@ impl Checkpoints {
             match std::fs::read(&path) {
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
                 Err(error) => return Err(Error::Unreadable { path, reason: error.to_string() }),
-                Ok(bytes) => match opened(&bytes, &self.study) {
+                Ok(bytes) => match opened(&bytes).and_then(|bytes| meant(bytes, &self.study)) {
                     Ok((step, content)) => found.push(Found { slot, step, content }),
                     Err(unfit) => refused.push((path, unfit)),
                 },
@@ -163,6 +164,12 @@ impl Checkpoints {
             }
         }
         if refused.is_empty() { Ok(None) } else { Err(Error::Checkpoint { refused }) }
+    }
+
+    /// The step and the content of a checkpoint of this study from the bytes behind its checksum.
+    pub(crate) fn read<C: DeserializeOwned>(&self, bytes: &[u8]) -> Result<(usize, C), Unfit> {
+        let (step, content) = meant(bytes, &self.study)?;
+        Ok((step, decoded(&content)?))
     }
 
     /// Refuses another study than the one whose text is given.
@@ -207,28 +214,32 @@ fn differing(was: &toml::Table, is: &toml::Table, path: &str) -> Option<(String,
 /// A checkpoint as the bytes of its file.
 fn sealed(study: &toml::Table, step: usize, content: &impl Serialize) -> Vec<u8> {
     let content = ByteBuf::from(encoded(content));
-    let sealed = encoded(&Sealed { program: env!("CARGO_PKG_VERSION").into(), study: study.to_string(), step, content });
+    let sealed =
+        encoded(&Sealed { program: env!("CARGO_PKG_VERSION").into(), study: study.to_string(), step, content });
     [MAGIC, blake3::hash(&sealed).as_bytes(), &sealed].concat()
 }
 
-/// The step and the content of the bytes of a file, if they are whole and meant for this program and study.
-fn opened(bytes: &[u8], study: &toml::Table) -> Result<(usize, ByteBuf), Unfit> {
+/// The bytes behind the checksum of a file, if that is right.
+fn opened(bytes: &[u8]) -> Result<&[u8], Unfit> {
     let sealed = bytes.strip_prefix(MAGIC).ok_or(Unfit::Foreign)?;
-    let Some((checksum, rest)) = sealed.split_at_checked(CHECKSUM) else {
-        return Err(Unfit::Damaged("it ends early".into()));
-    };
-    if blake3::hash(rest) != *<&[u8; CHECKSUM]>::try_from(checksum).expect("the length was split off") {
-        return Err(Unfit::Damaged("its checksum does not match".into()));
+    let (checksum, rest) = sealed.split_first_chunk::<CHECKSUM>().ok_or(Unfit::Damaged("it ends early".into()))?;
+    match blake3::hash(rest) == *checksum {
+        true => Ok(rest),
+        false => Err(Unfit::Damaged("its checksum does not match".into())),
     }
-    let Sealed { program, study: text, step, content } = decoded(rest)?;
+}
+
+/// The step and the content of these, if they are meant for this program and study.
+fn meant(bytes: &[u8], study: &toml::Table) -> Result<(usize, ByteBuf), Unfit> {
+    let Sealed { program, study: text, step, content } = decoded(bytes)?;
     if program != env!("CARGO_PKG_VERSION") {
         return Err(Unfit::Version { found: program });
     }
     let was = text.parse().map_err(|error: toml::de::Error| Unfit::Damaged(error.message().into()))?;
-    if let Some((key, was, is)) = differing(&was, study, "") {
-        return Err(Unfit::Study { key, was, is });
+    match differing(&was, study, "") {
+        Some((key, was, is)) => Err(Unfit::Study { key, was, is }),
+        None => Ok((step, content)),
     }
-    Ok((step, content))
 }
 
 /// A value from any bytes: nothing is allocated that they do not hold.
@@ -290,6 +301,9 @@ impl Checkpoint {
         }
         if !schedule.meets(*step, *t) {
             return damaged(format!("its step {step} at t = {t} is none of the run"));
+        }
+        if ![course.mass_at_start, course.seconds].iter().all(|v| v.is_finite()) {
+            return damaged(format!("its mass {} or its seconds {} cannot be", course.mass_at_start, course.seconds));
         }
         if course.pace.as_ref().map(Pace::is_sound) != schedule.is_automatic().then_some(true) {
             return damaged("its time steps are none of the run".into());

@@ -6,6 +6,7 @@ use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
 use crate::meshing::{Interface, Mmpde};
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How mesh and physics alternate within one time step
@@ -16,7 +17,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// # Source
 /// Section 5 of Bihlo, Haynes and Walsh (2015).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Coupling {
     /// k ≥ 1.

@@ -85,7 +85,11 @@ impl Pace {
     ///
     /// # Errors
     /// What a step failed with, or [`Failure::VanishingStep`], where the next would be too short.
-    pub(super) fn judge(&mut self, before: &State, step: Result<Advanced, Failure>) -> Result<Option<Advanced>, Failure> {
+    pub(super) fn judge(
+        &mut self,
+        before: &State,
+        step: Result<Advanced, Failure>,
+    ) -> Result<Option<Advanced>, Failure> {
         let step = match step {
             Ok(step) => step,
             Err(failure) => {

@@ -8,10 +8,11 @@ use crate::laplacian::Laplacian;
 use crate::numerics::larger;
 use crate::numerics::linear::Robust;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How temperatures get to the new mesh.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Transfer {
     /// By a term −w ∂u/∂y in the heat equation on the new mesh.
@@ -22,7 +23,7 @@ pub enum Transfer {
 }
 
 /// From which temperatures the front moves.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Stepping {
     /// Those at the start of the step; steps are limited.
@@ -33,7 +34,7 @@ pub enum Stepping {
 }
 
 /// What holds on the sides.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Sides {
     /// Nothing flows through; mesh and temperatures are mirrored.

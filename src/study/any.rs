@@ -1,7 +1,10 @@
+use super::moving_mesh::Header;
 use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Unfit};
 use crate::simulation::{Checkpoints, CheckpointsAt, Observer, RunDirectory, Standing};
+use schemars::generate::SchemaSettings;
 use serde::Deserialize;
+use serde_json::json;
 use std::path::Path;
 
 /// Where a run begins.
@@ -50,6 +53,31 @@ impl Study {
         }
     }
 
+    /// The JSON Schema of a study file, for editors.
+    pub fn schema() -> serde_json::Value {
+        let mut generator = SchemaSettings::draft2020_12().for_deserialize().into_generator();
+        let kinds = [
+            ("moving-mesh", generator.subschema_for::<MovingMesh>()),
+            ("poisson", generator.subschema_for::<PoissonStudy>()),
+            ("stefan", generator.subschema_for::<StefanStudy>()),
+            ("equidistribution", generator.subschema_for::<EquidistributionStudy>()),
+        ];
+        // the kind decides, so that an editor complains of what is wrong in it and not of four kinds
+        let each = kinds.map(|(kind, schema)| {
+            let named = json!({ "properties": { "study": { "properties": { "kind": { "const": kind } } } } });
+            json!({ "if": named, "then": schema })
+        });
+        json!({
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": "A study of driftmesh",
+            "type": "object",
+            "required": ["study"],
+            "properties": { "study": generator.subschema_for::<Header>() },
+            "allOf": each,
+            "$defs": generator.take_definitions(true),
+        })
+    }
+
     /// Runs it into a directory, and says why it ended early, if it did. Observers watch what goes step by step.
     ///
     /// # Errors
@@ -61,7 +89,7 @@ impl Study {
             (Self::Stefan(study), Begin::Anew) => study.run(directory, watchers)?.failure,
             (Self::Stefan(study), Begin::Resumed) => study.resume(directory, watchers)?.failure,
             (Self::Poisson(study), _) => study.run(directory).map(|_| None)?,
-            (Self::Equidistribution(study), _) => study.run(directory)?.failure,
+            (Self::Equidistribution(study), _) => study.run_from(directory, watchers, begin)?.failure,
         })
     }
 
@@ -81,13 +109,17 @@ impl Study {
         Ok(standing)
     }
 
-    /// The study as a file, every default filled in.
-    pub fn to_toml(&self) -> String {
+    /// The step of a checkpoint of this study, from the bytes behind its checksum: whatever they are, what a run could not go
+    /// on from is refused, and nothing is allocated that they do not fill.
+    ///
+    /// # Errors
+    /// [`Unfit`] with what is wrong.
+    pub fn decode(&self, bytes: &[u8]) -> Result<usize, Unfit> {
         match self {
-            Self::MovingMesh(study) => study.to_toml(),
-            Self::Poisson(study) => study.to_toml(),
-            Self::Stefan(study) => study.to_toml(),
-            Self::Equidistribution(study) => study.to_toml(),
+            Self::MovingMesh(study) => super::run::decode(study, bytes),
+            Self::Stefan(study) => study.decode(bytes),
+            Self::Equidistribution(study) => study.decode(bytes),
+            Self::Poisson(_) => Err(Unfit::Foreign),
         }
     }
 
@@ -96,6 +128,16 @@ impl Study {
         match self {
             Self::MovingMesh(study) => study.remedy(error),
             _ => error.help(),
+        }
+    }
+
+    /// The study as a file, every default filled in.
+    pub fn to_toml(&self) -> String {
+        match self {
+            Self::MovingMesh(study) => study.to_toml(),
+            Self::Poisson(study) => study.to_toml(),
+            Self::Stefan(study) => study.to_toml(),
+            Self::Equidistribution(study) => study.to_toml(),
         }
     }
 

@@ -7,10 +7,11 @@ use crate::error::{Error, Failure, Result};
 use crate::kind::kinds;
 use crate::setting::{fixed, pair};
 use crate::simulation::{FramesAt, Schedule};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A study of kind `equidistribution`: a mesh on a line, and the Schwarz methods for it.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EquidistributionStudy {
     /// `[study]`.
@@ -43,7 +44,7 @@ pub struct EquidistributionStudy {
 }
 
 /// `[domain]`: the ends of the line.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LineDomain {
     /// Where it begins.
@@ -61,7 +62,7 @@ impl Default for LineDomain {
 }
 
 /// `[grid]`.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineGrid {
     /// Cells of the line.
@@ -78,7 +79,7 @@ kinds! {
 }
 
 /// `[density]` of kind `formula`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineFormula {
     /// M.
@@ -86,7 +87,7 @@ pub struct LineFormula {
 }
 
 /// `[density]` of kind `arclength`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineArclength {
     /// u.
@@ -114,7 +115,7 @@ impl LineDensityKind {
 }
 
 /// `[equidistribution]`.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Discretization {
     /// Mean of M over a cell.
@@ -122,7 +123,7 @@ pub struct Discretization {
 }
 
 /// `[schwarz]`: a method with its options, and one way to divide the line.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SchwarzTable {
     /// What is exchanged.
@@ -163,11 +164,11 @@ pub struct SchwarzTable {
 }
 
 /// Two places in ξ.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 pub struct Interval(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 
 /// What subdomains exchange.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum MethodName {
     /// Values.
@@ -189,7 +190,7 @@ impl MethodName {
 }
 
 /// How S₁ and S₂ are integrated.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Integral {
     /// To round-off.
@@ -200,7 +201,7 @@ pub enum Integral {
 }
 
 /// `[start]`.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Start {
     /// The first mesh; equidistributed where the mesh moves, else uniform.
@@ -209,7 +210,7 @@ pub struct Start {
 }
 
 /// The first mesh.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FirstMesh {
     /// Equal cells.
@@ -221,7 +222,7 @@ pub enum FirstMesh {
 }
 
 /// `[stop]`.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StopTable {
     /// So many; at most so many where there is a tolerance.
@@ -235,7 +236,7 @@ pub struct StopTable {
 }
 
 /// `[time]`: x_t = (1/τ)(M x_ξ)_ξ by backward Euler.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineTime {
     /// Time of the first mesh.

@@ -1,17 +1,17 @@
 //! Studies of kind `stefan`: how they run, and what they leave.
 
-use super::any::Begin;
 use super::StefanStudy;
+use super::any::Begin;
 use super::stefan::Prepared;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::geometry::{Field, quality};
 use crate::kept::{Kept, check_nodal};
 use crate::report;
 use crate::simulation::{
-    Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, RunDirectory, Schedule, Snapshot, State, WorkTotal,
-    draw, draw_curves, final_arrays, reopened, status, synced,
+    Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, RunDirectory, Schedule, Snapshot, State,
+    WorkTotal, draw, draw_curves, final_arrays, reopened, status, synced,
 };
-use crate::stefan::{Front, FrontState, LOWER, Problem, Stepping, UPPER};
+use crate::stefan::{Energy, Front, FrontState, LOWER, Problem, Stepping, UPPER};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -163,6 +163,10 @@ impl FrontCheckpoint {
             let nodes = columns.x().len() * (columns.rows(phase) + 1);
             check_nodal("temperature", state.u[phase].as_chunks::<1>().0, nodes)?;
         }
+        let Energy { start, now, inflow, inflow_by_differences } = state.energy;
+        let times: Vec<[f64; 1]> = self.fronts.iter().map(|(t, _)| [*t]).collect();
+        check_nodal("energy", &[[start, now, inflow, inflow_by_differences]], 1)?;
+        check_nodal("times of fronts", &times, times.len())?;
         match schedule.meets(state.step, state.t) {
             true => Ok(()),
             false => Err(Unfit::Damaged(format!("its step {} at t = {} is none of the run", state.step, state.t))),
@@ -251,7 +255,8 @@ impl StefanStudy {
             Begin::Anew => None,
             Begin::Resumed => checkpoints.resume(|found: FrontCheckpoint| {
                 found.check(&prepared)?;
-                let picture = pictured(&prepared.front, &found.state).map_err(|error| Unfit::Damaged(error.to_string()))?;
+                let picture =
+                    pictured(&prepared.front, &found.state).map_err(|error| Unfit::Damaged(error.to_string()))?;
                 let tables = Tables::resume(path, &found.kept)?;
                 let frames = Frames::resume(path, prepared.frames.clone(), [1, 1], &picture, &found.kept)?;
                 Ok((found, tables, frames))
@@ -276,28 +281,29 @@ impl StefanStudy {
         let before = summary.seconds.wall;
         let wall = || before + clock.elapsed().as_secs_f64();
         let failure = {
-            let mut leave = |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState, so_far: &StefanSummary| {
-                if let Some(row) = row {
-                    tables.write(row, &state.front)?;
-                    collect(&mut fronts, snapshot.share, state);
-                }
-                frames.observe(event, snapshot)?;
-                watchers.iter_mut().try_for_each(|watcher| watcher.observe(event, snapshot))?;
-                let ends = event != Event::Finished && watchers.iter().any(|watcher| watcher.interrupts());
-                if ends || event != Event::Finished && checkpoints.due(state.step) {
-                    let mut kept = Kept::default();
-                    tables.keep(&mut kept)?;
-                    frames.keep(&mut kept)?;
-                    let StefanSummary { seconds, work, reports, warnings, .. } = so_far.clone();
-                    let (state, fronts) = (state.clone(), fronts.clone());
-                    let found = FrontCheckpoint { state, seconds, work, reports, warnings, fronts, kept };
-                    checkpoints.write(found.state.step, &found)?;
-                }
-                match ends {
-                    true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
-                    false => Ok(()),
-                }
-            };
+            let mut leave =
+                |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState, so_far: &StefanSummary| {
+                    if let Some(row) = row {
+                        tables.write(row, &state.front)?;
+                        collect(&mut fronts, snapshot.share, state);
+                    }
+                    frames.observe(event, snapshot)?;
+                    watchers.iter_mut().try_for_each(|watcher| watcher.observe(event, snapshot))?;
+                    let ends = event != Event::Finished && watchers.iter().any(|watcher| watcher.interrupts());
+                    if ends || event != Event::Finished && checkpoints.due(state.step) {
+                        let mut kept = Kept::default();
+                        tables.keep(&mut kept)?;
+                        frames.keep(&mut kept)?;
+                        let StefanSummary { seconds, work, reports, warnings, .. } = so_far.clone();
+                        let (state, fronts) = (state.clone(), fronts.clone());
+                        let found = FrontCheckpoint { state, seconds, work, reports, warnings, fronts, kept };
+                        checkpoints.write(found.state.step, &found)?;
+                    }
+                    match ends {
+                        true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
+                        false => Ok(()),
+                    }
+                };
             go(&mut prepared, &mut summary, event, &wall, &mut leave).err()
         };
         let output = Instant::now();
@@ -323,6 +329,15 @@ impl StefanStudy {
             (Err(error), None) => Err(error),
             _ => Ok(finished),
         }
+    }
+
+    /// See [`Study::decode`](super::Study::decode).
+    pub(super) fn decode(&self, bytes: &[u8]) -> Result<usize, Unfit> {
+        let damaged = |error: Error| Unfit::Damaged(error.to_string());
+        let checkpoints = Checkpoints::new(Path::new(""), self.output.checkpoint, &self.to_toml()).map_err(damaged)?;
+        let (step, found) = checkpoints.read::<FrontCheckpoint>(bytes)?;
+        found.check(&self.prepare().map_err(damaged)?)?;
+        Ok(step)
     }
 
     /// Runs the study without leaving anything on disk.

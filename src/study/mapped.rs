@@ -3,11 +3,12 @@ use crate::formula::{Formula, Mistake};
 use crate::geometry::{Lattice, Mesh, check_simple, check_unfolded};
 use crate::random::{Philox, uniform};
 use crate::setting::pair;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// `[domain]` of a study of kind `poisson`: between two curves, or the image of the unit square.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MappedDomain {
     /// From the left to the right side, with `bottom` and `top`.
@@ -28,11 +29,11 @@ pub struct MappedDomain {
 }
 
 /// Two numbers, the lower one first.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 pub struct Ends(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 
 /// x and y as formulas of s and r in the unit square.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mapping {
     /// x(s, r).
@@ -42,7 +43,7 @@ pub struct Mapping {
 }
 
 /// A distortion of the unit square: `perturb` with `seed`, or `shear`.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Distort {
     /// Each node inside moves by up to this share of a cell along each axis, at random.
@@ -57,7 +58,7 @@ pub struct Distort {
 }
 
 /// A side of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
     /// s = 0.
@@ -83,7 +84,7 @@ impl Side {
 }
 
 /// `grid.grading`: smaller cells toward a side, by `power` or by `ratio`.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grading {
     /// Where cells are smallest.

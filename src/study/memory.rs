@@ -7,7 +7,9 @@ use crate::error::{Error, Result};
 pub fn check_memory(nodes: u128, bytes_per_node: u128, cells: &[usize]) -> Result<()> {
     let there = sysinfo::System::new().map_or(u128::MAX, |mut system| {
         system.refresh_memory();
-        u128::from(system.total_memory())
+        // a container may have less than its machine
+        let limit = system.cgroup_limits().map_or(u64::MAX, |limits| limits.total_memory);
+        u128::from(system.total_memory().min(limit))
     });
     let needed = nodes.saturating_mul(bytes_per_node);
     if needed <= there {

@@ -6,10 +6,11 @@ use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNI
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
 use crate::simulation::{CheckpointsAt, Coupling, FramesAt, Observer, Record, Schedule, Simulation, State, timed};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MovingMesh {
     /// `[study]`.
@@ -38,7 +39,7 @@ pub struct MovingMesh {
 }
 
 /// `[compare]`: the same study with another generator, as a reference for the mesh.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Compare {
     /// How the mesh of the reference moves.
@@ -46,7 +47,7 @@ pub struct Compare {
 }
 
 /// `[study]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
     /// Letters, digits, `-`, `_` and `.`; names the run directory.
@@ -72,7 +73,7 @@ impl Header {
 }
 
 /// What a study is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyKind {
     /// A PDE in two dimensions on a moving mesh.
@@ -86,7 +87,7 @@ pub enum StudyKind {
 }
 
 /// `[domain]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Domain {
     /// Lower corner of the box.
@@ -107,7 +108,7 @@ impl Default for Domain {
 }
 
 /// `[grid]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// Cells along each axis.
@@ -116,7 +117,7 @@ pub struct Grid {
 }
 
 /// `[time]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
     /// Time of the initial state.
@@ -138,7 +139,7 @@ pub struct Time {
 }
 
 /// A stepper other than the equation's own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Stepper {
     /// Explicit, for Burgers' equation on a uniform mesh that stays; substeps of `time.step` are as long as is stable.
@@ -146,7 +147,7 @@ pub enum Stepper {
 }
 
 /// `[mesh]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable {
     /// τ of the mesh equation.
@@ -175,7 +176,7 @@ impl Default for MeshTable {
 }
 
 /// Form of the mesh equation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum MeshForm {
     /// As published: x_t = (1/τ)(∇ρ/ρ·∇x + ∇²x), with `monitor.gradient`.
@@ -185,7 +186,7 @@ pub enum MeshForm {
 }
 
 /// The mesh at the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum StartMesh {
     /// Equal cells.
@@ -195,7 +196,7 @@ pub enum StartMesh {
 }
 
 /// `[output]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
     /// When frames are written; about twenty of them where nothing is said.

@@ -10,12 +10,13 @@ use crate::setting::pair;
 use crate::simulation::{Failed, Frames, FramesAt, Parallel, Picture, RunDirectory, State, draw, final_arrays};
 use crate::study::Source;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
 /// A study of kind `poisson`: Δu = f on a structured mesh of any shape.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoissonStudy {
     /// `[study]`.
@@ -45,7 +46,7 @@ pub struct PoissonStudy {
 }
 
 /// `[grid]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GradedGrid {
     /// Cells along s and r.
@@ -57,7 +58,7 @@ pub struct GradedGrid {
 }
 
 /// `[exact]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExactSolution {
     /// The solution, a formula of x and y.
@@ -65,7 +66,7 @@ pub struct ExactSolution {
 }
 
 /// `[equation]`: formulas of x and y.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Equation {
     /// f of Δu = f.
@@ -80,7 +81,7 @@ pub struct Equation {
 }
 
 /// `[sides]`.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sides {
     /// Sides where the normal derivative is given instead of the value.
@@ -88,7 +89,7 @@ pub struct Sides {
 }
 
 /// `[solver]`.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverTable {
     /// How the system is solved.
@@ -96,7 +97,7 @@ pub struct SolverTable {
 }
 
 /// How the system is solved.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SolverKind {
     /// Sparse LU.
@@ -107,7 +108,7 @@ pub enum SolverKind {
 }
 
 /// `[laplacian]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LaplacianTable {
     /// One of [`Laplacian::KINDS`].

@@ -107,10 +107,7 @@ fn run_from(
         record.seconds.output += spent;
         record.seconds.wall += spent;
         // what went wrong first is what is reported
-        match (failure, kept) {
-            (None, Err(error)) => Err(error),
-            (failure, _) => Ok((state, failure)),
-        }
+        Ok((state, failure.or(kept.err())))
     });
 
     let failure = outcome.as_ref().map_or_else(Some, |(_, failure)| failure.as_ref());
@@ -170,16 +167,30 @@ impl Underway {
         directory: &RunDirectory,
         found: Checkpoint,
     ) -> Result<Self, Unfit> {
-        let mesh = study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
-        let state = found.state(&mesh, simulation.physics.as_ref(), &simulation.schedule)?;
+        let (state, meshes) = accept(study, simulation, &found)?;
         let Checkpoint { record, course, kept, .. } = found;
-        simulation.generator.resume(&mesh, &kept)?;
         let (path, subdomains) = (directory.path(), study.mesh.generator.subdomains());
-        let meshes = Meshes::resume(study, &mesh, &kept)?;
         let history = History::resume(&path.join("history.csv"), &kept)?;
         let frames = Frames::resume(path, study.frames(), subdomains, &state, &kept)?;
         Ok(Self { state, record, course: Some(course), history, frames, meshes })
     }
+}
+
+/// What a checkpoint holds, if the study can go on from it.
+fn accept(study: &MovingMesh, simulation: &mut Simulation, found: &Checkpoint) -> Result<(State, Meshes), Unfit> {
+    let mesh = study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
+    let state = found.state(&mesh, simulation.physics.as_ref(), &simulation.schedule)?;
+    simulation.generator.resume(&mesh, &found.kept)?;
+    Ok((state, Meshes::resume(study, &mesh, &found.kept)?))
+}
+
+/// See [`Study::decode`](super::Study::decode).
+pub(super) fn decode(study: &MovingMesh, bytes: &[u8]) -> Result<usize, Unfit> {
+    let damaged = |error: Error| Unfit::Damaged(error.to_string());
+    let checkpoints = Checkpoints::new(Path::new(""), study.output.checkpoint, &study.to_toml()).map_err(damaged)?;
+    let (step, found) = checkpoints.read(bytes)?;
+    accept(study, &mut study.simulation().map_err(damaged)?, &found)?;
+    Ok(step)
 }
 
 /// Runs a study without leaving anything on disk; a failure after the start ends it early.

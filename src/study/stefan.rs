@@ -10,11 +10,12 @@ use crate::simulation::{FramesAt, Schedule};
 use crate::stefan::{
     Columns, Filter, Front, FrontState, LOWER, Method, Problem, Similarity, Stepping, Transfer, UPPER,
 };
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 
 /// A study of kind `stefan`: two phases and the front between them.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StefanStudy {
     /// `[study]`.
@@ -46,7 +47,7 @@ pub struct StefanStudy {
 }
 
 /// `[domain]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrontDomain {
     /// From the left to the right side.
@@ -61,7 +62,7 @@ pub struct FrontDomain {
 }
 
 /// `[grid]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrontGrid {
     /// Cells across, in the lower and in the upper phase.
@@ -77,7 +78,7 @@ fn grading() -> f64 {
 }
 
 /// `[phase]`.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Phases {
     /// Below the front, warm.
@@ -87,7 +88,7 @@ pub struct Phases {
 }
 
 /// `[phase.lower]` or `[phase.upper]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhaseTable {
     /// D.
@@ -107,7 +108,7 @@ impl Default for PhaseTable {
 }
 
 /// `[front]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FrontTable {
     /// L, the inverse of the latent heat.
@@ -118,6 +119,7 @@ pub struct FrontTable {
     pub transfer: Transfer,
     /// Across the columns.
     #[serde(serialize_with = "write_filter", deserialize_with = "read_filter")]
+    #[schemars(schema_with = "filter_schema")]
     pub filter: Filter,
     /// From which temperatures the front moves.
     pub stepping: Stepping,
@@ -133,6 +135,11 @@ impl Default for FrontTable {
             stepping: Stepping::default(),
         }
     }
+}
+
+fn filter_schema(_: &mut SchemaGenerator) -> Schema {
+    let weights = json_schema!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 });
+    json_schema!({ "anyOf": [{ "const": "none" }, weights] })
 }
 
 fn write_filter<S: Serializer>(filter: &Filter, serializer: S) -> Result<S::Ok, S::Error> {
@@ -163,7 +170,7 @@ fn read_filter<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Filter, D::
 }
 
 /// `[walls]`.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Walls {
     /// What holds on the sides.
@@ -171,7 +178,7 @@ pub struct Walls {
 }
 
 /// `[exact]`: an exact solution.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExactFront {
     /// Which one.
@@ -202,11 +209,11 @@ pub struct ExactFront {
 }
 
 /// A point.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 pub struct Centre(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 
 /// An exact solution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExactKind {
     /// Neumann's similarity solution.
@@ -253,7 +260,7 @@ impl ExactFront {
 }
 
 /// `[time]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrontTime {
     /// Time of the initial state; 0 where nothing is said, and from `[exact]` where there is one.

@@ -1,6 +1,7 @@
 use super::super::{Cut, Decomposition};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Estimates a sample of each cut and interpolates the rest
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// # Source
 /// Section 3.6 of Bihlo, Haynes and Walsh (2015).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interpolation {
     /// Nodes of each cut, crossings not counted.
@@ -22,7 +23,7 @@ pub struct Interpolation {
 }
 
 /// Where the nodes of a sample are.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Placement {
     /// Between two neighbours lies the same ∫ρ dξ along the cut.

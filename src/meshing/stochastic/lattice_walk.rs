@@ -7,6 +7,7 @@ use crate::numerics::linear::{LatticeMatrix, Smoother, relax};
 use crate::parallel;
 use crate::setting::Auto;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Random walks on the lattice, unbiased for the discrete step
@@ -20,7 +21,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// Neither a time step nor an interpolation is left to make an error, only the noise of N walks. It needs weights ≥ 0,
 /// that is |b|h ≤ 2; `monitor.gradient = "safe"` always has them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridWalk {
     /// N, for each point.
@@ -44,7 +45,7 @@ pub struct GridWalk {
 /// follow until no residual, the most that a walk can pay, is above 1 % of the shortest edge of the mesh. Where walks
 /// would take more than 1000 jumps, sweeps are cheaper: they follow to 10⁻⁶ of the edge and no walk is done; this bound
 /// on the error is then given as its standard error.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ResidualWalk {
     /// k.

@@ -21,6 +21,7 @@ use crate::parallel;
 use crate::random::Philox;
 use crate::setting::pair;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -31,7 +32,7 @@ use std::time::Instant;
 ///
 /// # Source
 /// Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation* (2015).
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stochastic {
     /// Along each axis.

@@ -5,6 +5,7 @@ use crate::error::{Error, Failure, Result};
 use crate::parallel;
 use crate::random::normals;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Diffusion paths in the continuous computational domain, as published
@@ -23,7 +24,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// # Source
 /// (3.1)–(3.3) of Bihlo, Haynes and Walsh (2015); Jansons and Lythe (2003) for the exit test.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MonteCarlo {
     /// N, for each point.

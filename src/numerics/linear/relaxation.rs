@@ -1,9 +1,10 @@
 use super::LatticeMatrix;
 use crate::parallel;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How sweeps of relaxation follow each other.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Smoother {
     /// x ← x + .9 D⁻¹(b − A x): after k sweeps, errors that vary over √k nodes are gone.

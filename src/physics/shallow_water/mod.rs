@@ -10,6 +10,7 @@ use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustBlock};
 use crate::numerics::{larger, sum};
 use crate::parallel;
 use crate::work::Work;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The shallow water equations, and a pile of water that collapses
@@ -54,7 +55,7 @@ use serde::{Deserialize, Serialize};
 /// Fjordholm, Mishra and Tadmor, *Well-balanced and energy stable schemes for the shallow water equations with
 /// discontinuous topography* (2011), for F. (4.2) of Bihlo, Haynes and Walsh (2015) for the advective form; the shape of
 /// their pile is not published.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShallowWater {
     /// What is differenced.
@@ -72,7 +73,7 @@ pub struct ShallowWater {
 }
 
 /// Form of the shallow water equations.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum WaterForm {
     /// In h and h u, conserving mass and momentum.

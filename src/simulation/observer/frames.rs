@@ -6,13 +6,14 @@ use crate::kept::{Kept, check_nodal};
 use crate::meshing::Decomposition;
 use crate::simulation::State;
 use crate::simulation::report::{is_frame, write_file};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
 /// When frames are written; the first and the last state are always among them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FramesAt {
     /// After so many steps each.
@@ -160,9 +161,7 @@ impl Frames {
 
     /// The file that puts the frames in time.
     fn series(&self) -> String {
-        let entry = |(t, step): &(f64, usize)| {
-            format!("<DataSet timestep=\"{t}\" file=\"{}\"/>\n", self.name(*step))
-        };
+        let entry = |(t, step): &(f64, usize)| format!("<DataSet timestep=\"{t}\" file=\"{}\"/>\n", self.name(*step));
         let entries: String = self.written.iter().map(entry).collect();
         format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\

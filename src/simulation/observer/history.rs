@@ -114,7 +114,8 @@ impl Observer for History {
 
     fn keep(&mut self, kept: &mut Kept) -> Result<()> {
         let length = synced(self.writer.get_ref());
-        let unwritable = |error: std::io::Error| Error::Unwritable { path: self.path.clone(), reason: error.to_string() };
+        let unwritable =
+            |error: std::io::Error| Error::Unwritable { path: self.path.clone(), reason: error.to_string() };
         kept.put("history", &length.map_err(unwritable)?);
         Ok(())
     }

@@ -1,0 +1,32 @@
+//! The page `docs/errors.md`: every failure that a run may end with, from the code that names it.
+//!
+//!     cargo run --release -p driftmesh --example errors > docs/errors.md
+
+use driftmesh::Failure;
+
+const HEAD: &str = "\
+# How a run may fail
+
+A run that cannot go on ends with exit status 1 and one of the names below: on the terminal with the time, the step and the
+place, in `summary.json` as `error.name` with `\"status\": \"failed\"`. Everything up to the last good state is kept. In Python
+the same name is a class of `driftmesh.errors`, `mesh-folded` being `MeshFolded`. `driftmesh list errors` prints the list.
+
+What is asked for wrongly, a key, a formula, a directory that is not ours, ends with exit status 2 before anything is
+written, and is shown where it stands. A run that was told to end has `\"status\": \"interrupted\"`, one whose disk is full
+names the file that could not be written.
+
+| name | what happened | what helps |
+|---|---|---|
+";
+
+/// The page.
+pub fn page() -> String {
+    let cell = |text: &str| text.replace('|', "\\|");
+    let rows = Failure::all().map(|[name, what, help]| format!("| `{name}` | {} | {} |\n", cell(what), cell(help)));
+    HEAD.to_string() + &rows.collect::<String>()
+}
+
+#[allow(dead_code)] // the test of the page has a `main` of its own
+fn main() {
+    print!("{}", page());
+}
