@@ -8,7 +8,7 @@ use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz,
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use driftmesh::physics::{Burgers, Convection, FormulaPde, Motion, Physics, Prescribed, ShallowWater, UniformBurgers};
 use driftmesh::simulation::{RunDirectory, Schedule};
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Begin, MovingMesh, Source};
 use driftmesh::{Error, Failure};
 use std::collections::BTreeSet;
 use std::sync::Mutex;
@@ -459,7 +459,7 @@ fn interrupted_runs_leave_their_last_state() {
     let directory = tempfile::tempdir().unwrap();
     let source = driftmesh::study::Source::read("studies/burgers-b-conservative.toml".as_ref()).unwrap();
     let study = driftmesh::study::Study::from_source(&source).unwrap();
-    let failure = study.run(directory.path(), &mut [&mut Impatient]).unwrap().unwrap();
+    let failure = study.run(directory.path(), Begin::Anew, &mut [&mut Impatient]).unwrap().unwrap();
     assert_says(failure, &["interrupted at t = 0.253", "(step 3)"], None, true);
     let summary = std::fs::read_to_string(directory.path().join("summary.json")).unwrap();
     assert!(summary.contains("\"status\": \"interrupted\"") && directory.path().join("final.npz").is_file());

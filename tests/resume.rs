@@ -58,7 +58,7 @@ fn untimed(name: &Path, bytes: Vec<u8>) -> Vec<u8> {
     match name.to_str() {
         Some("history.csv") => {
             let text = String::from_utf8(bytes).unwrap();
-            let at = text.lines().next().unwrap().split(',').position(|column| column == "seconds");
+            let at = text.lines().next().unwrap_or_default().split(',').position(|column| column == "seconds");
             let row = |row: &str| {
                 let columns = row.split(',').enumerate().filter(|(column, _)| Some(*column) != at);
                 columns.map(|(_, entry)| entry).collect::<Vec<_>>().join(",")
@@ -298,7 +298,7 @@ fn sealed() -> [(Study, Vec<u8>); 2] {
     [study("burgers", &moving), study("stefan-slides", &front)].map(|study| {
         let out = tempfile::tempdir().unwrap();
         study.run(out.path(), Begin::Anew, &mut [&mut After::steps(4)]).unwrap();
-        let bytes = std::fs::read(out.path().join("checkpoint.0")).unwrap();
+        let bytes = std::fs::read(out.path().join("checkpoint.1")).unwrap();
         let behind = bytes.iter().position(|byte| *byte == b'\n').unwrap() + 1 + 32;
         assert_eq!(study.decode(&bytes[behind..]).unwrap(), 4);
         (study, bytes[behind..].to_vec())
@@ -375,7 +375,7 @@ fn settings_out_of_range_are_refused() {
         ("output.checkpoint.seconds=0", "`output.checkpoint.seconds` is 0, but must be above 0"),
         ("output.checkpoint.seconds=nan", "`output.checkpoint.seconds` is NaN"),
         ("output.checkpoint.seconds=inf", "`output.checkpoint.seconds` is inf"),
-        ("output.checkpoint=60", "write output.checkpoint = { seconds = 60 }"),
+        ("output.checkpoint=60", "write checkpoint = { seconds = 60 }"),
         ("output.checkpoint.minutes=1", "minutes"),
     ] {
         let before = source.clone();

@@ -33,7 +33,9 @@ impl Run {
         RunDirectory::check(&out)?;
         match (study.standing(&out), self.resume) {
             (Ok(Standing::Complete), true) => {
-                terminal::say(format_args!("complete: {} needs nothing more", out.display()));
+                if !self.quiet {
+                    terminal::say(format_args!("complete: {} needs nothing more", out.display()));
+                }
                 return Ok(ExitCode::SUCCESS);
             }
             (standing, true) => {
