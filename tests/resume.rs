@@ -178,8 +178,9 @@ fn lines_go_on() {
         divided.replace("[schwarz]", "").replace("overlap = ", "# ").replace("[stop]", "").replace("tolerance", "# ");
     for text in [divided, whole] {
         let mut source = Source::new("the study", text);
-        ["output.report=false", "output.frames.every=3", "output.checkpoint.steps=2"]
-            .map(|set| source.set(set).unwrap());
+        for set in ["output.report=false", "output.frames.every=3", "output.checkpoint.steps=2"] {
+            source.set(set).unwrap();
+        }
         let study = Study::from_source(&source).unwrap();
         let out = tempfile::tempdir().unwrap();
         let [whole, cut] = ["whole", "cut"].map(|name| out.path().join(name));

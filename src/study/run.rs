@@ -92,7 +92,7 @@ fn run_from(
             Underway::start(&study, &simulation, &directory, &mut record, watchers)
         }
     };
-    let outcome = underway.and_then(|underway| {
+    let outcome = underway.map(|underway| {
         let Underway { mut state, course, mut history, mut frames, mut meshes, .. } = underway;
         let mut observers: Vec<&mut dyn Observer> = vec![&mut history, &mut frames, &mut meshes];
         watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
@@ -107,7 +107,7 @@ fn run_from(
         record.seconds.output += spent;
         record.seconds.wall += spent;
         // what went wrong first is what is reported
-        Ok((state, failure.or(kept.err())))
+        (state, failure.or(kept.err()))
     });
 
     let failure = outcome.as_ref().map_or_else(Some, |(_, failure)| failure.as_ref());
