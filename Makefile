@@ -27,14 +27,16 @@ python: $(VENV)/ready
 	target/fresh/bin/python -m pip install --quiet target/wheels/*.whl
 	target/fresh/bin/python python/tests/readme.py
 
-# Tests that take minutes. None needs to yet: everything runs in `test`.
+# Tests that take minutes: 200 runs are killed, and go on.
 slow: test
+	$(VENV)/bin/python tests/python/kills.py
 
 # Speeds, as ratios measured in one run.
 bench: $(VENV)/ready
 	$(CARGO) bench -p driftmesh --bench case_b
 	$(CARGO) bench -p driftmesh --bench formula
 	$(CARGO) bench -p driftmesh --bench formula_pde
+	$(CARGO) bench -p driftmesh --bench checkpoint
 	$(VENV)/bin/python benches/mesh_solve.py
 	$(VENV)/bin/python benches/stencils.py
 	$(VENV)/bin/python benches/schwarz_line.py

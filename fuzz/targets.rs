@@ -39,3 +39,17 @@ pub fn study(data: &[u8]) {
     let again = again.unwrap_or_else(|error| panic!("{error}\nin {resolved}"));
     assert_eq!(again.to_toml(), resolved);
 }
+
+/// A checkpoint behind its checksum: refused, or of a step of the run.
+pub fn checkpoint(data: &[u8]) {
+    for (name, text) in [("moving", MOVING), ("front", FRONT)] {
+        let study = Study::from_source(&Source::new(name, text)).expect("the study is valid");
+        if let Ok(step) = study.decode(data) {
+            assert!(step <= 1000, "step {step}");
+        }
+    }
+}
+
+/// The studies of the corpus: `driftmesh run` leaves a checkpoint of them when it is interrupted; its first 55 bytes go.
+const MOVING: &str = include_str!("studies/moving.toml");
+const FRONT: &str = include_str!("studies/front.toml");

@@ -437,6 +437,12 @@ pub enum Error {
         /// Why.
         reason: String,
     },
+    /// A run cannot go on: there are checkpoints, but none that will do.
+    #[error("cannot go on: {}", refusals(refused))]
+    Checkpoint {
+        /// Each file with what is wrong with it.
+        refused: Vec<(PathBuf, Unfit)>,
+    },
     /// Another run is writing to the output directory.
     #[error("another run is writing to {}", path.display())]
     Busy {
@@ -459,6 +465,47 @@ pub enum Error {
         /// Something found in it.
         found: String,
     },
+}
+
+/// Why a run cannot go on from a file.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unfit {
+    /// It is of another format.
+    #[error("it is no checkpoint that this program can read")]
+    Foreign,
+    /// Bytes are missing or wrong, or what they say cannot be.
+    #[error("it is damaged: {0}")]
+    Damaged(String),
+    /// Another program wrote it, whose numbers may differ.
+    #[error("it was written by driftmesh {found}, and this is driftmesh {}", env!("CARGO_PKG_VERSION"))]
+    Version {
+        /// The version of the other.
+        found: String,
+    },
+    /// It belongs to other settings.
+    #[error("it belongs to a study in which `{key}` is {was}; here it is {is}")]
+    Study {
+        /// Dotted key of the first setting that differs.
+        key: String,
+        /// Its value there.
+        was: String,
+        /// Its value now.
+        is: String,
+    },
+    /// What the run left beside it does not fit.
+    #[error("{file} does not go with it: {reason}")]
+    Beside {
+        /// The file.
+        file: String,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Files with what is wrong with each.
+fn refusals(refused: &[(PathBuf, Unfit)]) -> String {
+    let each = refused.iter().map(|(path, unfit)| format!("{}: {unfit}", path.display()));
+    each.collect::<Vec<_>>().join("; ")
 }
 
 /// Items in parentheses.
@@ -548,8 +595,23 @@ impl Error {
             Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
             Self::ForeignDirectory { .. } => Some("name another directory with --out, or empty this one".into()),
             Self::NotARun { .. } => Some("name the directory that `driftmesh run` printed behind `run`".into()),
-            Self::Interrupted(_) | Self::Invalid { .. } | Self::Unreadable { .. } | Self::Unwritable { .. } => None,
+            Self::Checkpoint { refused } => Some(match refused.first() {
+                Some((_, Unfit::Study { .. })) => {
+                    "go on with the settings in its study.toml; or leave --resume out to begin anew, or name another directory with --out"
+                }
+                Some((_, Unfit::Version { .. })) => "go on with that version, or leave --resume out to begin anew",
+                _ => "leave --resume out to begin anew",
+            }.into()),
+            Self::Unwritable { .. } => {
+                Some("free some space or mend the permissions there, or name another directory with --out".into())
+            }
+            Self::Interrupted(_) | Self::Invalid { .. } | Self::Unreadable { .. } => None,
         }
+    }
+
+    /// True if what ended a run lies outside it: it may go on from its checkpoint.
+    pub fn is_resumable(&self) -> bool {
+        matches!(self, Self::Interrupted(_) | Self::Unwritable { .. })
     }
 
     /// True if the computation failed (exit status 1), false if what was asked for is wrong (exit status 2).

@@ -43,6 +43,7 @@
 
 pub mod error;
 pub mod formula;
+pub mod kept;
 mod kind;
 mod parallel;
 mod random;

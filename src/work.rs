@@ -1,11 +1,11 @@
 //! What a step cost, counted rather than timed.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Counters of work done, the same on every machine
 ///
 /// They add up: over the parts of a step, and over the steps of a run.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Work {
     /// Right-hand sides solved for, of every size (the sides of the domain included).
     pub linear_solves: usize,

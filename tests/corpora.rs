@@ -16,6 +16,11 @@ fn formulas() {
 }
 
 #[test]
+fn checkpoints() {
+    replay("fuzz/corpus/checkpoint", targets::checkpoint);
+}
+
+#[test]
 fn studies() {
     replay("fuzz/corpus/study", targets::study);
     replay("studies", targets::study);

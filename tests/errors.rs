@@ -2,12 +2,13 @@
 
 use driftmesh::density::{Arclength, Given, Monitor};
 use driftmesh::equidistribution::{Coarse, Line, LineDensity, Measure, Method, Stop, Sweep};
+use driftmesh::error::Unfit;
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use driftmesh::physics::{Burgers, Convection, FormulaPde, Motion, Physics, Prescribed, ShallowWater, UniformBurgers};
 use driftmesh::simulation::{RunDirectory, Schedule};
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Begin, MovingMesh, Source};
 use driftmesh::{Error, Failure};
 use std::collections::BTreeSet;
 use std::sync::Mutex;
@@ -280,6 +281,23 @@ fn unreadable() {
     assert_says(error, &["cannot read no/such/study.toml"], None, false);
 }
 
+/// Each file is named with what is wrong with it, and the remedy depends on that.
+#[test]
+fn unfit_checkpoints() {
+    let error = |unfit: Unfit| Error::Checkpoint { refused: vec![("out/checkpoint.0".into(), unfit)] };
+    let other = Unfit::Study { key: "time.step".into(), was: "0.01".into(), is: "not given".into() };
+    let said =
+        "cannot go on: out/checkpoint.0: it belongs to a study in which `time.step` is 0.01; here it is not given";
+    assert_says(error(other), &[said], Some("study.toml"), false);
+    let version = Unfit::Version { found: "0.0.9".into() };
+    assert_says(error(version), &["it was written by driftmesh 0.0.9, and this is"], Some("that version"), false);
+    assert_says(error(Unfit::Foreign), &["it is no checkpoint"], Some("leave --resume out"), false);
+    let damaged = Unfit::Damaged("its checksum does not match".into());
+    assert_says(error(damaged), &["it is damaged: its checksum"], Some("leave --resume out"), false);
+    let beside = Unfit::Beside { file: "history.csv".into(), reason: "it is short".into() };
+    assert_says(error(beside), &["history.csv does not go with it: it is short"], Some("leave --resume out"), false);
+}
+
 #[test]
 fn unwritable_busy_and_foreign() {
     let place = tempfile::tempdir().unwrap();
@@ -288,7 +306,12 @@ fn unwritable_busy_and_foreign() {
     assert!(matches!(error, Error::Unwritable { .. } | Error::Unreadable { .. }), "{error}");
     let claimed = RunDirectory::claim(&place.path().join("mine")).unwrap();
     std::fs::remove_dir_all(claimed.path()).unwrap();
-    assert_says(claimed.write("summary.json", b"{}").unwrap_err(), &["cannot write", "summary.json"], None, true);
+    assert_says(
+        claimed.write("summary.json", b"{}").unwrap_err(),
+        &["cannot write", "summary.json"],
+        Some("free some space"),
+        true,
+    );
 
     let held = RunDirectory::claim(&place.path().join("held")).unwrap();
     let error = RunDirectory::claim(held.path()).unwrap_err();
@@ -436,7 +459,7 @@ fn interrupted_runs_leave_their_last_state() {
     let directory = tempfile::tempdir().unwrap();
     let source = driftmesh::study::Source::read("studies/burgers-b-conservative.toml".as_ref()).unwrap();
     let study = driftmesh::study::Study::from_source(&source).unwrap();
-    let failure = study.run(directory.path(), &mut [&mut Impatient]).unwrap().unwrap();
+    let failure = study.run(directory.path(), Begin::Anew, &mut [&mut Impatient]).unwrap().unwrap();
     assert_says(failure, &["interrupted at t = 0.253", "(step 3)"], None, true);
     let summary = std::fs::read_to_string(directory.path().join("summary.json")).unwrap();
     assert!(summary.contains("\"status\": \"interrupted\"") && directory.path().join("final.npz").is_file());

@@ -1,11 +1,17 @@
+use crate::interrupts::Interrupts;
+use crate::run::remedy;
 use crate::terminal;
-use driftmesh::study::{EquidistributionStudy, EquidistributionSummary, NumberedIterate};
+use driftmesh::study::{Begin, EquidistributionStudy, EquidistributionSummary, NumberedIterate};
 use std::path::Path;
 use std::process::ExitCode;
 
 /// Runs a study of kind `equidistribution`.
-pub fn run(study: &EquidistributionStudy, out: &Path, quiet: bool) -> driftmesh::Result<ExitCode> {
-    let finished = study.run(out)?;
+pub fn run(study: &EquidistributionStudy, out: &Path, begin: Begin, quiet: bool) -> driftmesh::Result<ExitCode> {
+    let finished = match &study.time {
+        Some(_) => study.run_from(out, &[&mut Interrupts::listen()], begin),
+        // a single solve, which nobody can end half-way, ends with the program
+        None => study.run_from(out, &[], begin),
+    }?;
     finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {
         terminal::say(table(&finished.summary));
@@ -22,7 +28,7 @@ pub fn run(study: &EquidistributionStudy, out: &Path, quiet: bool) -> driftmesh:
         None => Ok(ExitCode::SUCCESS),
         Some(error) => {
             let note = format!("the last mesh and every iteration up to it are in {}", out.display());
-            Ok(terminal::complain(&error, error.help(), Some(note)))
+            Ok(terminal::complain(&error, remedy(&error, out, error.help()), Some(note)))
         }
     }
 }

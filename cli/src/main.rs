@@ -2,6 +2,7 @@
 
 mod check;
 mod equidistribution;
+mod interrupts;
 mod list;
 mod poisson;
 mod progress;
@@ -69,6 +70,7 @@ impl StudyArgs {
 }
 
 fn main() -> ExitCode {
+    interrupts::outlive_file_limits();
     let outcome = match Cli::parse().verb {
         Verb::Run(run) => run.execute(),
         Verb::Check(check) => check.execute(),

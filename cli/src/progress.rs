@@ -39,7 +39,7 @@ impl Observer for Progress {
         let done = (snapshot.share * pieces as f64 + 1e-9) as usize;
         let news = done > std::mem::replace(&mut self.told, done);
         match &self.bar {
-            Some(bar) if event == Event::Started => {
+            Some(bar) if matches!(event, Event::Started | Event::Resumed) => {
                 bar.set_length(pieces as u64);
                 bar.set_message(words());
             }
@@ -48,7 +48,7 @@ impl Observer for Progress {
                 bar.set_message(words());
             }
             Some(bar) if event == Event::Finished => bar.set_message("comparing, drawing and writing the report"),
-            None if event == Event::Stepped && news => {
+            None if event == Event::Resumed || event == Event::Stepped && news => {
                 let _ = writeln!(stderr(), "{}", words());
             }
             _ => {}

@@ -1,8 +1,10 @@
+use crate::interrupts::{self, Interrupts};
 use crate::{StudyArgs, equidistribution, poisson, progress::Progress, stefan, terminal};
 use clap::Args;
+use driftmesh::Error;
 use driftmesh::meshing::Interface;
-use driftmesh::simulation::{Observer, RunDirectory, Summary};
-use driftmesh::study::{self, MovingMesh, Study, UniformEquivalent};
+use driftmesh::simulation::{Observer, RunDirectory, Standing, Summary};
+use driftmesh::study::{self, Begin, MovingMesh, Study, UniformEquivalent};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -16,6 +18,9 @@ pub struct Run {
     /// Threads to use; all cores where nothing is said. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Go on from the newest checkpoint in the directory; from the start where there is none.
+    #[arg(long)]
+    resume: bool,
     /// No progress and no table.
     #[arg(long)]
     quiet: bool,
@@ -26,22 +31,44 @@ impl Run {
         let study = self.study.read()?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(study.name()));
         RunDirectory::check(&out)?;
+        match (study.standing(&out), self.resume) {
+            (Ok(Standing::Complete), true) => {
+                if !self.quiet {
+                    terminal::say(format_args!("complete: {} needs nothing more", out.display()));
+                }
+                return Ok(ExitCode::SUCCESS);
+            }
+            (standing, true) => {
+                if standing? == Standing::Nothing && !self.quiet {
+                    terminal::note(&format!("nothing to go on from in {}: the run begins at its start", out.display()));
+                }
+            }
+            (Ok(Standing::Unfinished), false) => terminal::warn(&format!(
+                "{} holds an unfinished run, which this one replaces; with --resume it would go on",
+                out.display()
+            )),
+            (_, false) => {}
+        }
         terminal::use_threads(self.threads)?;
+        let begin = if self.resume { Begin::Resumed } else { Begin::Anew };
         match study {
             Study::MovingMesh(study) => self.moving_mesh(&study, &out),
             Study::Poisson(study) => poisson::run(&study, &out, self.quiet),
-            Study::Stefan(study) => stefan::run(&study, &out, self.quiet),
-            Study::Equidistribution(study) => equidistribution::run(&study, &out, self.quiet),
+            Study::Stefan(study) => stefan::run(&study, &out, begin, self.quiet),
+            Study::Equidistribution(study) => equidistribution::run(&study, &out, begin, self.quiet),
         }
     }
 
     fn moving_mesh(&self, study: &MovingMesh, out: &Path) -> driftmesh::Result<ExitCode> {
         let mut progress = Progress::new();
-        let finished = if self.quiet {
-            study::run(study, out, &mut [])
-        } else {
-            let watchers: &mut [&mut dyn Observer] = &mut [&mut progress];
-            study::run(study, out, watchers)
+        let mut interrupts = Interrupts::listen();
+        let mut watchers: Vec<&mut dyn Observer> = vec![&mut interrupts];
+        if !self.quiet {
+            watchers.push(&mut progress);
+        }
+        let finished = match self.resume {
+            true => study::resume(study, out, &mut watchers),
+            false => study::run(study, out, &mut watchers),
         };
         progress.clear();
         let finished = match finished {
@@ -51,7 +78,10 @@ impl Run {
         finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
         if !self.quiet {
             terminal::say(table(&finished.summary));
-            if let Some(line) = uniform(study, &finished.summary)? {
+            // whoever interrupted the run does not wait for others
+            if !matches!(finished.failure, Some(Error::Interrupted(_)))
+                && let Some(line) = uniform(study, &finished.summary)?
+            {
                 terminal::say(line);
             }
             terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
@@ -63,15 +93,19 @@ impl Run {
         match finished.failure {
             None => Ok(ExitCode::SUCCESS),
             Some(error) => {
-                let note = format!(
-                    "everything up to the last good state (step {}) is in {}",
-                    finished.state.step,
-                    out.display()
-                );
-                Ok(terminal::complain(&error, study.remedy(&error), Some(note)))
+                let step = finished.state.step;
+                let note = format!("everything up to the last good state (step {step}) is in {}", out.display());
+                Ok(terminal::complain(&error, remedy(&error, out, study.remedy(&error)), Some(note)))
             }
         }
     }
+}
+
+/// The remedy for what ended a run: where it can go on, the command for that.
+pub fn remedy(error: &Error, out: &Path, other: Option<String>) -> Option<String> {
+    let resumable = error.is_resumable() && RunDirectory::standing(out) == Standing::Unfinished;
+    let go_on = resumable.then(|| format!("go on with: {}", interrupts::command()));
+    Some([other, go_on].into_iter().flatten().collect::<Vec<_>>().join("; then ")).filter(|help| !help.is_empty())
 }
 
 /// The uniform meshes with the errors of the reports, where they can be told.

@@ -1,18 +1,23 @@
+use crate::interrupts::Interrupts;
 use crate::progress::Progress;
+use crate::run::remedy;
 use crate::terminal;
 use driftmesh::simulation::Observer;
-use driftmesh::study::{StefanStudy, StefanSummary};
+use driftmesh::study::{Begin, StefanStudy, StefanSummary};
 use std::path::Path;
 use std::process::ExitCode;
 
 /// Runs a study of kind `stefan`.
-pub fn run(study: &StefanStudy, out: &Path, quiet: bool) -> driftmesh::Result<ExitCode> {
+pub fn run(study: &StefanStudy, out: &Path, begin: Begin, quiet: bool) -> driftmesh::Result<ExitCode> {
     let mut progress = Progress::new();
-    let finished = if quiet {
-        study.run(out, &mut [])
-    } else {
-        let watchers: &mut [&mut dyn Observer] = &mut [&mut progress];
-        study.run(out, watchers)
+    let mut interrupts = Interrupts::listen();
+    let mut watchers: Vec<&mut dyn Observer> = vec![&mut interrupts];
+    if !quiet {
+        watchers.push(&mut progress);
+    }
+    let finished = match begin {
+        Begin::Anew => study.run(out, &mut watchers),
+        Begin::Resumed => study.resume(out, &mut watchers),
     };
     progress.clear();
     let finished = finished?;
@@ -31,7 +36,7 @@ pub fn run(study: &StefanStudy, out: &Path, quiet: bool) -> driftmesh::Result<Ex
         Some(error) => {
             let note =
                 format!("everything up to the last good state (step {}) is in {}", finished.state.step, out.display());
-            Ok(terminal::complain(&error, error.help(), Some(note)))
+            Ok(terminal::complain(&error, remedy(&error, out, error.help()), Some(note)))
         }
     }
 }

@@ -14,6 +14,11 @@ pub fn warn(text: &str) {
     let _ = writeln!(stderr(), "warning: {text}");
 }
 
+/// Prints what the user may not expect.
+pub fn note(text: &str) {
+    let _ = writeln!(stderr(), "note: {text}");
+}
+
 /// Prints an error with its remedy and a note, and says how the program ends.
 pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> ExitCode {
     let mut text = format!("error: {error}\n");

@@ -51,6 +51,7 @@ def run(
     text: str,
     set: list[str],
     out: Path,
+    resume: bool,
     told: Callable[[float, float, int], None] | None,
 ) -> tuple[BaseException | None, bool]: ...
 def equidistribute(density: _Density, cells: int, ends: tuple[float, float], settings: str) -> _Floats: ...

@@ -187,6 +187,7 @@ def run(
     out: str | PathLike[str] | None = None,
     set: Mapping[str, Any] | None = None,
     progress: bool = False,
+    resume: bool = False,
 ) -> Run:
     """Runs a study.
 
@@ -196,12 +197,15 @@ def run(
             replaced, any other that is not empty is refused.
         set: Settings on top: dotted keys and values, such as ``{"time.step": 5e-4}``.
         progress: Shows a bar, in terminals and notebooks.
+        resume: Goes on from the newest checkpoint in the directory, to the very bits of a run that nothing disturbed. Where
+            there is none the run begins at its start; one that is complete is opened as it is.
 
     Raises:
         driftmesh.StudyError: A mistake in the study: its line, a caret, the nearest key. Nothing is written then.
         driftmesh.MeshError: The computation failed; ``result`` and ``directory`` have everything up to the last good state.
         OSError: What cannot be read or written; :class:`FileExistsError` for a directory with something else in it.
-        KeyboardInterrupt: Ctrl-C, which ends the run with its step and leaves the last good state in the run directory.
+        KeyboardInterrupt: Ctrl-C, which ends the run with its step and leaves the last good state in the run directory,
+            with a checkpoint for ``resume``.
 
     >>> import tempfile
     >>> from driftmesh import run
@@ -227,9 +231,12 @@ def run(
     assignments = [f"{name}={_toml.value(value)}" for name, value in (set or {}).items()]
     name = _driftmesh.check(*given, assignments)
     directory = Path("out") / name if out is None else Path(out)
+    if not resume and any(directory.glob("checkpoint.[01]")):
+        left = f"{directory} holds an unfinished run, which this one replaces; with resume=True it would go on"
+        warnings.warn(left, RuntimeWarning, stacklevel=2)
     with _bar(name, progress) as told:
         try:
-            error, ended = _driftmesh.run(*given, assignments, directory, told)
+            error, ended = _driftmesh.run(*given, assignments, directory, resume, told)
         except MeshError as failure:
             error, ended = failure, True
     if isinstance(error, MeshError):
@@ -256,7 +263,8 @@ def _interrupted(directory: Path, ended: bool) -> str:
         message = summary["error"]["message"]
         if not (directory / "final.npz").is_file():
             return f"{message}, before the first step"
-        return f"{message}; the last good state is in {directory}"
+        on = "; run(…, resume=True) goes on" if any(directory.glob("checkpoint.[01]")) else ""
+        return f"{message}; the last good state is in {directory}{on}"
     return f"the run had just ended ({summary['status']}); it is in {directory}"
 
 

@@ -7,7 +7,10 @@ pub fn raised(py: Python<'_>, error: &Error, help: Option<String>) -> PyErr {
     let help = match error {
         Error::ForeignDirectory { .. } => Some("name another directory with `out`, or empty this one".into()),
         Error::Busy { .. } => Some("wait for it to end, or name another directory with `out`".into()),
-        _ => help.or_else(|| error.help()),
+        _ => help.or_else(|| error.help()).map(|help| {
+            let ours = [("--out", "`out`"), ("leave --resume out", "leave `resume` out")];
+            ours.into_iter().fold(help, |help, (theirs, ours)| help.replace(theirs, ours))
+        }),
     };
     let text = help.as_ref().map_or(error.to_string(), |help| format!("{error}\n  help: {help}"));
     match error {

@@ -1,8 +1,7 @@
 use crate::errors::raised;
 use crate::threads::{BRIEFLY, Ended, PATIENCE, interruptible};
-use driftmesh::error::Moment;
-use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, State};
-use driftmesh::study::{Source, Study};
+use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, Standing, State};
+use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -26,25 +25,26 @@ impl Seen {
 struct Watcher(Arc<Seen>);
 
 impl Watcher {
-    fn saw(&self, share: f64, state: &State) -> Result<()> {
+    fn saw(&self, share: f64, state: &State) {
         *self.0.progress() = Some((share, state.t, state.step));
-        match self.0.stop.load(Ordering::Relaxed) {
-            true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
-            false => Ok(()),
-        }
     }
 }
 
 impl Observer for Watcher {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        match event {
-            Event::Finished => Ok(()),
-            _ => self.saw(snapshot.share, snapshot.state),
+        if event != Event::Finished {
+            self.saw(snapshot.share, snapshot.state);
         }
+        Ok(())
     }
 
     fn adapting(&mut self, state: &State) -> Result<()> {
-        self.saw(0.0, state)
+        self.saw(0.0, state);
+        Ok(())
+    }
+
+    fn interrupts(&self) -> bool {
+        self.0.stop.load(Ordering::Relaxed)
     }
 }
 
@@ -68,10 +68,12 @@ pub fn check(py: Python<'_>, path: Option<PathBuf>, origin: &str, text: &str, se
 
 /// Runs a study into a directory. `told(share, t, step)` is called every now and then.
 ///
+/// `resume` goes on from the newest checkpoint, and does nothing where the run is complete.
+///
 /// Returns what was raised in Python or by the study, and whether the run has ended: a study that cannot be stopped
 /// half-way goes on in the background.
 #[pyfunction]
-#[pyo3(signature = (path, origin, text, set, out, told))]
+#[pyo3(signature = (path, origin, text, set, out, resume, told))]
 #[allow(clippy::too_many_arguments)] // four of them are one study
 pub fn run(
     py: Python<'_>,
@@ -80,17 +82,22 @@ pub fn run(
     text: &str,
     set: Vec<String>,
     out: PathBuf,
+    resume: bool,
     told: Option<Py<PyAny>>,
 ) -> PyResult<(Option<PyErr>, bool)> {
     let raise = |error: &Error| raised(py, error, None);
     let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raise(&error))?;
     RunDirectory::check(&out).map_err(|error| raise(&error))?;
+    if resume && study.standing(&out).map_err(|error| raise(&error))? == Standing::Complete {
+        return Ok((None, true));
+    }
+    let begin = if resume { Begin::Resumed } else { Begin::Anew };
     let seen = Arc::new(Seen::default());
     let (study, theirs) = (Arc::new(study), seen.clone());
     let computing = study.clone();
     let ended = interruptible(
         py,
-        move || computing.run(&out, &mut [&mut Watcher(theirs)]),
+        move || computing.run(&out, begin, &mut [&mut Watcher(theirs)]),
         || {
             seen.stop.store(true, Ordering::Relaxed);
             if seen.progress().is_some() { PATIENCE } else { BRIEFLY }

@@ -200,6 +200,27 @@ def test_ctrl_c_leaves_the_last_good_state(tmp_path):
     assert result.frames[-1]["u"] == pytest.approx(result.final["u"])
 
 
+def test_ctrl_c_leaves_what_to_go_on_from(tmp_path):
+    settings = {"grid.cells": [40, 40], "time.end": 0.26, "time.report": [0.26], "output.frames.every": 1, "output.report": False}
+    study = str(ROOT / "studies/burgers.toml")
+    said, _ = interrupted(study, settings | {"time.step": 5e-5}, tmp_path / "cut")
+    assert "run(…, resume=True) goes on" in said and driftmesh.load(tmp_path / "cut").status == "interrupted"
+    with pytest.raises(OSError, match=r"`grid.cells` is \[40, 40\]; here it is \[41, 40\](.|\n)*leave `resume` out"):
+        driftmesh.run(study, out=tmp_path / "cut", set=settings | {"time.step": 5e-5, "grid.cells": [41, 40]}, resume=True)
+    cut, whole = (driftmesh.run(study, out=tmp_path / name, set=settings | {"time.step": 5e-5}, resume=True) for name in ("cut", "whole"))
+    assert not list((tmp_path / "cut").glob("checkpoint*")) and cut.status == "completed"
+    assert cut.summary["reports"] == whole.summary["reports"] and cut.summary["work"] == whole.summary["work"]
+    for name, column in whole.history.items():
+        assert name == "seconds" or np.array_equal(cut.history[name], column, equal_nan=True)
+    assert np.all(np.diff(cut.history["seconds"]) > 0)
+    for name in ("final.npz", "run.pvd", "mesh.png"):
+        assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    # one that is complete is opened as it is
+    before = (tmp_path / "cut/summary.json").stat().st_mtime_ns
+    assert driftmesh.run(study, out=tmp_path / "cut", set=settings | {"time.step": 5e-5}, resume=True).status == "completed"
+    assert (tmp_path / "cut/summary.json").stat().st_mtime_ns == before
+
+
 def test_ctrl_c_is_heard_where_nothing_can_be_stopped(tmp_path):
     settings = {"grid.cells": [2000, 2000]}
     said, seconds = interrupted(str(ROOT / "studies/laplacian-model-problem.toml"), settings, tmp_path / "out")

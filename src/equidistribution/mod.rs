@@ -80,7 +80,7 @@ pub enum Measure {
 }
 
 /// One iterate; the first is the start.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iterate {
     /// The largest distance of a node of any piece from the discrete single-domain mesh.
     pub error: f64,
@@ -95,7 +95,7 @@ pub struct Iterate {
 }
 
 /// How an iteration went.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct History {
     /// The start and every iterate.
     pub iterates: Vec<Iterate>,

@@ -1,6 +1,6 @@
 use super::{Line, Method, Robin, Sweep};
 use crate::error::Failure;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What theory says of the contraction in two iterations
 ///
@@ -13,7 +13,7 @@ use serde::Serialize;
 /// | in time, two pieces | | theorem 7.2 |
 ///
 /// Nothing is known of the linearised method: theorem 3.4 does not hold.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// The asymptotic contraction.
     pub predicted: Option<f64>,

@@ -25,6 +25,17 @@ impl Field {
         Self { components: K, values: values.into_flattened() }
     }
 
+    /// A field of so many unknowns from all values, node by node.
+    ///
+    /// # Example
+    /// ```
+    /// let field = driftmesh::geometry::Field::of(2, vec![1.0, 2.0, 3.0, 4.0]);
+    /// assert_eq!(field.component(1).collect::<Vec<_>>(), [2.0, 4.0]);
+    /// ```
+    pub fn of(components: usize, values: Vec<f64>) -> Self {
+        Self { components: components.max(1), values }
+    }
+
     /// A field from the values of each unknown at all nodes.
     ///
     /// # Example

@@ -12,7 +12,7 @@ use crate::error::Failure;
 /// # Source
 /// (3.4) of Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation*
 /// (2015).
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Quality {
     /// Largest Q over the cells.
     pub q_max: f64,
@@ -127,7 +127,7 @@ pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
 }
 
 /// How a mesh compares with a reference over the same lattice.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Comparison {
     /// Largest Q of the reference over largest Q of the mesh.
     pub r_max: f64,

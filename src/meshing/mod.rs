@@ -21,11 +21,12 @@ pub use stochastic::{
 };
 pub use whole::Whole;
 
-use crate::error::{Failure, Result};
+use crate::error::{Failure, Result, Unfit};
 use crate::geometry::{Lattice, Mesh};
+use crate::kept::Kept;
 use crate::kind::kinds;
 use crate::work::Work;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A way to advance the mesh by one time step.
 ///
@@ -37,6 +38,17 @@ pub trait MeshGenerator: Send {
     /// # Errors
     /// A [`Failure`] where a system cannot be solved or the arrays do not fit.
     fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure>;
+
+    /// Puts what it carries from step to step into a checkpoint; nothing where steps depend on their arguments alone.
+    fn keep(&self, _kept: &mut Kept) {}
+
+    /// Goes on from what [`keep`](Self::keep) left. `mesh` is any mesh of the run.
+    ///
+    /// # Errors
+    /// [`Unfit`] where that is not there, or cannot be.
+    fn resume(&mut self, _mesh: &Mesh<2>, _kept: &Kept) -> Result<(), Unfit> {
+        Ok(())
+    }
 }
 
 /// A mesh that was moved.
@@ -51,7 +63,7 @@ pub struct Moved {
 }
 
 /// What one step knows about the values at which subdomains meet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interface {
     /// Nodes at which subdomains meet.
     pub points: usize,
@@ -70,7 +82,7 @@ pub struct Interface {
 }
 
 /// Convergence of an iteration between subdomains.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contraction {
     /// Iterations done.
     pub iterations: usize,

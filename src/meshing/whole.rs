@@ -1,7 +1,8 @@
 use super::sides::{jump, size};
 use super::{MeshGenerator, Mmpde, Moved, move_sides};
-use crate::error::{Failure, Result};
+use crate::error::{Failure, Result, Unfit};
 use crate::geometry::{Mesh, Patch};
+use crate::kept::{Kept, check_nodal};
 use crate::numerics::linear::{Pcg, Robust};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -83,5 +84,25 @@ impl MeshGenerator for Whole {
         work += cost;
         patch.scatter(lattice, &new, &mut x, jump(mesh));
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: None })
+    }
+
+    fn keep(&self, kept: &mut Kept) {
+        kept.put("last mesh step", &self.last.as_ref().map(|last| (last.from.x(), last.to.x(), last.dt)));
+    }
+
+    fn resume(&mut self, mesh: &Mesh<2>, kept: &Kept) -> Result<(), Unfit> {
+        type Last = (Vec<[f64; 2]>, Vec<[f64; 2]>, f64);
+        let moved = |x: Vec<[f64; 2]>| {
+            check_nodal("last mesh step", &x, mesh.lattice().len())?;
+            mesh.moved(x).map_err(|failure| Unfit::Damaged(failure.to_string()))
+        };
+        self.last = match kept.get::<Option<Last>>("last mesh step")? {
+            Some((.., dt)) if !(dt.is_finite() && dt > 0.0) => {
+                return Err(Unfit::Damaged(format!("its last mesh step is {dt} long")));
+            }
+            Some((from, to, dt)) => Some(Step { from: moved(from)?, to: moved(to)?, dt }),
+            None => None,
+        };
+        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! The time loop: mesh, then physics, then whoever watches.
 
+mod checkpoint;
 mod coupling;
 mod observer;
 mod pace;
@@ -7,9 +8,14 @@ mod prediction;
 mod report;
 mod schedule;
 
+pub use checkpoint::CheckpointsAt;
+pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
-pub use report::{Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Summary, WorkTotal};
+pub(crate) use observer::{reopened, synced};
+pub use report::{
+    Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Standing, Summary, WorkTotal,
+};
 pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
 pub(crate) use report::{status, write_file};
 pub use schedule::Schedule;
@@ -17,11 +23,13 @@ pub use schedule::Schedule;
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
+use crate::kept::Kept;
 use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Whole};
 use crate::physics::Physics;
 use crate::work::Work;
 use pace::Pace;
 use prediction::blend;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Everything that changes from step to step.
@@ -42,7 +50,7 @@ pub struct State {
 }
 
 /// What a run did so far.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Record {
     /// Steps and their cost.
     pub work: WorkTotal,
@@ -141,6 +149,7 @@ impl Simulation {
         for _ in 0..MAX_STEPS_OF_THE_START {
             let mut state = self.start(mesh)?;
             observers.iter_mut().try_for_each(|observer| observer.adapting(&state))?;
+            end_where_asked(observers, &state)?;
             if let Some(before) = &before {
                 blend(before, &mut state.rho);
             }
@@ -171,26 +180,51 @@ impl Simulation {
     /// # Errors
     /// [`Error::Failed`] with the time and step of a numerical failure, or what an observer returned.
     pub fn run(&mut self, state: &mut State, record: &mut Record, observers: &mut [&mut dyn Observer]) -> Result<()> {
-        record.timed(|record| self.run_steps(state, record, observers))
+        self.run_on(state, record, observers, None, None)
     }
 
-    fn run_steps(&mut self, state: &mut State, record: &mut Record, observers: &mut [&mut dyn Observer]) -> Result<()> {
-        let started = Instant::now();
-        let mass_at_start = self.physics.conserved(&state.mesh, &state.u);
-        self.show(Event::Started, state, record, observers, 0.0, started)?;
-        if self.schedule.reports_at(state.t) {
+    /// The same with checkpoints, and from where the one left off that the state is of.
+    pub(crate) fn run_on(
+        &mut self,
+        state: &mut State,
+        record: &mut Record,
+        observers: &mut [&mut dyn Observer],
+        checkpoints: Option<&mut Checkpoints>,
+        course: Option<Course>,
+    ) -> Result<()> {
+        record.timed(|record| self.run_steps(state, record, observers, checkpoints, course))
+    }
+
+    fn run_steps(
+        &mut self,
+        state: &mut State,
+        record: &mut Record,
+        observers: &mut [&mut dyn Observer],
+        mut checkpoints: Option<&mut Checkpoints>,
+        course: Option<Course>,
+    ) -> Result<()> {
+        let clock = Clock::start(course.as_ref(), record);
+        let (event, mass_at_start) = match &course {
+            Some(course) => (Event::Resumed, course.mass_at_start),
+            None => (Event::Started, self.physics.conserved(&state.mesh, &state.u)),
+        };
+        self.show(event, state, record, observers, 0.0, &clock)?;
+        if course.is_none() && self.schedule.reports_at(state.t) {
             let report = self.report(state, mass_at_start, record.interface);
             record.reports.push(report);
         }
-        let mut pace = match self.schedule.is_automatic() {
-            true => {
+        let mut pace = match course {
+            Some(course) => course.pace,
+            None if self.schedule.is_automatic() => {
                 let began = Instant::now();
                 let pace = Pace::new(self, state)?;
                 record.seconds.pde += began.elapsed().as_secs_f64();
                 Some(pace)
             }
-            false => None,
+            None => None,
         };
+        let course = |pace: &Option<Pace>| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
+        self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
         while let Some((t, dt)) = self.next(state, pace.as_ref()) {
             let step = state.step + 1;
             self.warn_of_haste(state.t, dt, record);
@@ -216,9 +250,50 @@ impl Simulation {
                 let report = self.report(state, mass_at_start, record.interface);
                 record.reports.push(report);
             }
-            self.show(Event::Stepped, state, record, observers, dt, started)?;
+            self.show(Event::Stepped, state, record, observers, dt, &clock)?;
+            self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
         }
-        self.show(Event::Finished, state, record, observers, 0.0, started)
+        if let Some(checkpoints) = checkpoints.filter(|checkpoints| checkpoints.at_the_end) {
+            self.checkpoint(state, record, observers, checkpoints, &clock, course(&pace))?;
+        }
+        self.show(Event::Finished, state, record, observers, 0.0, &clock)
+    }
+
+    /// Writes a checkpoint where one is due, and ends the run where an observer asks for that.
+    fn pause(
+        &self,
+        state: &State,
+        record: &mut Record,
+        observers: &mut [&mut dyn Observer],
+        checkpoints: &mut Option<&mut Checkpoints>,
+        clock: &Clock,
+        course: impl FnOnce() -> Course,
+    ) -> Result<()> {
+        let asked = end_where_asked(observers, state);
+        if let Some(checkpoints) = checkpoints
+            && (asked.is_err() || checkpoints.due(state.step))
+        {
+            self.checkpoint(state, record, observers, checkpoints, clock, course())?;
+        }
+        asked
+    }
+
+    fn checkpoint(
+        &self,
+        state: &State,
+        record: &mut Record,
+        observers: &mut [&mut dyn Observer],
+        checkpoints: &mut Checkpoints,
+        clock: &Clock,
+        course: Course,
+    ) -> Result<()> {
+        let began = Instant::now();
+        let mut kept = Kept::default();
+        self.generator.keep(&mut kept);
+        observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
+        checkpoints.write(state.step, &Checkpoint::of(state, clock.counted(record), course, kept))?;
+        record.seconds.output += began.elapsed().as_secs_f64();
+        Ok(())
     }
 
     /// The time after the next step, and its length.
@@ -269,7 +344,7 @@ impl Simulation {
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
         dt: f64,
-        started: Instant,
+        clock: &Clock,
     ) -> Result<()> {
         if observers.is_empty() {
             return Ok(());
@@ -285,7 +360,7 @@ impl Simulation {
             error: self.error(state),
             work: record.work,
             interface: record.interface,
-            seconds: started.elapsed().as_secs_f64(),
+            seconds: clock.seconds(),
         };
         let outcome = observers.iter_mut().try_for_each(|observer| observer.observe(event, &snapshot));
         record.seconds.output += output.elapsed().as_secs_f64();
@@ -317,6 +392,41 @@ impl Simulation {
             interface,
             comparison: None,
         }
+    }
+}
+
+/// Ends a run where an observer asks for that.
+fn end_where_asked(observers: &[&mut dyn Observer], state: &State) -> Result<()> {
+    match observers.iter().any(|observer| observer.interrupts()) {
+        true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
+        false => Ok(()),
+    }
+}
+
+/// The time that a run takes, over all its parts.
+struct Clock {
+    wall: Instant,
+    cpu: cpu_time::ProcessTime,
+    /// Seconds of the steps before this part, and of everything.
+    before: f64,
+    spent: Seconds,
+}
+
+impl Clock {
+    fn start(course: Option<&Course>, record: &Record) -> Self {
+        let before = course.map_or(0.0, |course| course.seconds);
+        Self { wall: Instant::now(), cpu: cpu_time::ProcessTime::now(), before, spent: record.seconds }
+    }
+
+    fn seconds(&self) -> f64 {
+        self.before + self.wall.elapsed().as_secs_f64()
+    }
+
+    /// The record with the time up to now.
+    fn counted(&self, record: &Record) -> Record {
+        let (wall, cpu) = (self.wall.elapsed().as_secs_f64(), self.cpu.elapsed().as_secs_f64());
+        let seconds = Seconds { wall: self.spent.wall + wall, cpu: self.spent.cpu + cpu, ..record.seconds };
+        Record { seconds, ..record.clone() }
     }
 }
 

@@ -4,6 +4,7 @@ use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{DualCells, Field, Lattice, padded};
 use crate::numerics::larger;
 use crate::physics::Motion;
+use serde::{Deserialize, Serialize};
 
 /// Steps as long as the solution and the mesh allow: at no moving node does the first unknown change by much more than
 /// three hundredths of the largest range that it had
@@ -11,8 +12,8 @@ use crate::physics::Motion;
 /// Where the mesh goes along with a front, little changes at its nodes, and a step may carry the front over many times its
 /// width. The next step is chosen from the change in the last one; a step in which much more changes, or that fails, is
 /// refused and tried again with a shorter one. A trial on the resting mesh chooses the first.
-#[derive(Debug, Clone)]
-pub(super) struct Pace {
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Pace {
     dt: f64,
     longest: f64,
     scale: f64,
@@ -62,6 +63,13 @@ impl Pace {
         }
     }
 
+    /// True where steps can be so.
+    pub fn is_sound(&self) -> bool {
+        [self.dt, self.longest, self.scale].iter().all(|dt| dt.is_finite() && *dt > 0.0)
+            && self.range.is_finite()
+            && self.range >= 0.0
+    }
+
     /// Length of the next step, if nothing ends before.
     pub fn step(&self) -> f64 {
         self.dt
@@ -77,7 +85,11 @@ impl Pace {
     ///
     /// # Errors
     /// What a step failed with, or [`Failure::VanishingStep`], where the next would be too short.
-    pub fn judge(&mut self, before: &State, step: Result<Advanced, Failure>) -> Result<Option<Advanced>, Failure> {
+    pub(super) fn judge(
+        &mut self,
+        before: &State,
+        step: Result<Advanced, Failure>,
+    ) -> Result<Option<Advanced>, Failure> {
         let step = match step {
             Ok(step) => step,
             Err(failure) => {

@@ -129,6 +129,14 @@ impl Schedule {
         (step < end).then(|| (to - from) / (end - done) as f64)
     }
 
+    /// True where the run may be at `t` after `step` steps.
+    pub fn meets(&self, step: usize, t: f64) -> bool {
+        match self.steps() {
+            Some(steps) => step <= steps && t == self.time(step),
+            None => (self.start..=self.end()).contains(&t),
+        }
+    }
+
     /// True where a report is due.
     pub fn reports_at(&self, t: f64) -> bool {
         self.reports.contains(&t)

@@ -2,7 +2,7 @@
 
 use super::columns::{Columns, LOWER, UPPER};
 use super::heat::{end_slope, slope};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The balance of energy since the start
 ///
@@ -17,7 +17,7 @@ use serde::Serialize;
 /// ```
 ///
 /// and for comparison by one-sided differences over three rows.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     /// E at the start.
     pub start: f64,

@@ -96,7 +96,7 @@ impl std::fmt::Debug for Response {
 }
 
 /// A front with the temperatures on both sides of it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrontState {
     /// Time.
     pub t: f64,

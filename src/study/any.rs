@@ -1,11 +1,20 @@
 use super::moving_mesh::Header;
 use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
-use crate::error::{Error, Result};
-use crate::simulation::Observer;
+use crate::error::{Error, Result, Unfit};
+use crate::simulation::{Checkpoints, CheckpointsAt, Observer, RunDirectory, Standing};
 use schemars::generate::SchemaSettings;
 use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;
+
+/// Where a run begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Begin {
+    /// At its start.
+    Anew,
+    /// At the newest checkpoint; at its start where there is none.
+    Resumed,
+}
 
 /// A study of any kind.
 #[derive(Debug, Clone)]
@@ -72,14 +81,46 @@ impl Study {
     /// Runs it into a directory, and says why it ended early, if it did. Observers watch what goes step by step.
     ///
     /// # Errors
-    /// As the `run` of each kind.
-    pub fn run(&self, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<Option<Error>> {
-        Ok(match self {
-            Self::MovingMesh(study) => super::run(study, directory, watchers)?.failure,
-            Self::Poisson(study) => study.run(directory).map(|_| None)?,
-            Self::Stefan(study) => study.run(directory, watchers)?.failure,
-            Self::Equidistribution(study) => study.run(directory)?.failure,
+    /// As the `run` of each kind; [`Error::Checkpoint`] where there are checkpoints, but none that will do.
+    pub fn run(&self, directory: &Path, begin: Begin, watchers: &mut [&mut dyn Observer]) -> Result<Option<Error>> {
+        Ok(match (self, begin) {
+            (Self::MovingMesh(study), Begin::Anew) => super::run(study, directory, watchers)?.failure,
+            (Self::MovingMesh(study), Begin::Resumed) => super::resume(study, directory, watchers)?.failure,
+            (Self::Stefan(study), Begin::Anew) => study.run(directory, watchers)?.failure,
+            (Self::Stefan(study), Begin::Resumed) => study.resume(directory, watchers)?.failure,
+            (Self::Poisson(study), _) => study.run(directory).map(|_| None)?,
+            (Self::Equidistribution(study), _) => study.run_from(directory, watchers, begin)?.failure,
         })
+    }
+
+    /// How far the run of this very study in a directory came.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] where it is complete, but of other settings.
+    pub fn standing(&self, directory: &Path) -> Result<Standing> {
+        let standing = RunDirectory::standing(directory);
+        if standing == Standing::Complete {
+            let path = directory.join("study.toml");
+            let text = std::fs::read_to_string(&path)
+                .map_err(|error| Error::Unreadable { path: path.clone(), reason: error.to_string() })?;
+            let checkpoints = Checkpoints::new(directory, CheckpointsAt::default(), &self.to_toml())?;
+            checkpoints.check_study(&text).map_err(|unfit| Error::Checkpoint { refused: vec![(path, unfit)] })?;
+        }
+        Ok(standing)
+    }
+
+    /// The step of a checkpoint of this study, from the bytes behind its checksum: whatever they are, what a run could not go
+    /// on from is refused, and nothing is allocated that they do not fill.
+    ///
+    /// # Errors
+    /// [`Unfit`] with what is wrong.
+    pub fn decode(&self, bytes: &[u8]) -> Result<usize, Unfit> {
+        match self {
+            Self::MovingMesh(study) => super::run::decode(study, bytes),
+            Self::Stefan(study) => study.decode(bytes),
+            Self::Equidistribution(study) => study.decode(bytes),
+            Self::Poisson(_) => Err(Unfit::Foreign),
+        }
     }
 
     /// The remedy for an error, in the keys of this study.

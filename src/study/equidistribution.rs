@@ -276,6 +276,7 @@ impl EquidistributionStudy {
     /// # Errors
     /// [`Error::Invalid`] or [`Error::Formula`] with the dotted key.
     pub fn resolve(&mut self) -> Result<()> {
+        self.output.check()?;
         self.study.check_name()?;
         let LineDomain { lower: [a], upper: [b] } = self.domain;
         if !(a.is_finite() && b.is_finite() && a < b && (b - a).is_normal()) {

@@ -1,16 +1,18 @@
 //! Studies of kind `stefan`: how they run, and what they leave.
 
 use super::StefanStudy;
+use super::any::Begin;
 use super::stefan::Prepared;
-use crate::error::{Error, Moment, Result};
+use crate::error::{Error, Moment, Result, Unfit};
 use crate::geometry::{Field, quality};
+use crate::kept::{Kept, check_nodal};
 use crate::report;
 use crate::simulation::{
-    Event, Failed, Frames, Observer, Parallel, Picture, RunDirectory, Schedule, Snapshot, State, WorkTotal, draw,
-    draw_curves, final_arrays, status,
+    Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, RunDirectory, Schedule, Snapshot, State,
+    WorkTotal, draw, draw_curves, final_arrays, reopened, status, synced,
 };
-use crate::stefan::{Front, FrontState, LOWER, Problem, Stepping, UPPER};
-use serde::Serialize;
+use crate::stefan::{Energy, Front, FrontState, LOWER, Problem, Stepping, UPPER};
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -45,7 +47,7 @@ pub struct StefanSummary {
 }
 
 /// Seconds by part.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct FrontSeconds {
     /// By the clock.
     pub wall: f64,
@@ -56,7 +58,7 @@ pub struct FrontSeconds {
 }
 
 /// The state at one of the times asked for.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FrontReport {
     /// Time.
     pub t: f64,
@@ -74,7 +76,7 @@ pub struct FrontReport {
 }
 
 /// Of the front.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FrontFigures {
     /// Mean height over the width.
     pub mean: f64,
@@ -86,7 +88,7 @@ pub struct FrontFigures {
 }
 
 /// Error of the temperature.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FrontError {
     /// Largest over the nodes.
     pub linf: f64,
@@ -137,6 +139,41 @@ struct Row {
     seconds: f64,
 }
 
+/// Everything that the steps of a run to come depend on, and what was found in those done.
+#[derive(Serialize, Deserialize)]
+struct FrontCheckpoint {
+    state: FrontState,
+    seconds: FrontSeconds,
+    work: WorkTotal,
+    reports: Vec<FrontReport>,
+    warnings: Vec<String>,
+    fronts: Vec<(f64, Vec<f64>)>,
+    kept: Kept,
+}
+
+impl FrontCheckpoint {
+    /// Refuses what cannot be a state of the study.
+    fn check(&self, Prepared { front, schedule, .. }: &Prepared) -> Result<(), Unfit> {
+        let (columns, state) = (&front.columns, &self.state);
+        let heights = |front: &[f64]| check_nodal("front", front.as_chunks::<1>().0, columns.x().len());
+        heights(&state.front)?;
+        self.fronts.iter().try_for_each(|(_, front)| heights(front))?;
+        columns.check(&state.front).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+        for phase in [LOWER, UPPER] {
+            let nodes = columns.x().len() * (columns.rows(phase) + 1);
+            check_nodal("temperature", state.u[phase].as_chunks::<1>().0, nodes)?;
+        }
+        let Energy { start, now, inflow, inflow_by_differences } = state.energy;
+        let times: Vec<[f64; 1]> = self.fronts.iter().map(|(t, _)| [*t]).collect();
+        check_nodal("energy", &[[start, now, inflow, inflow_by_differences]], 1)?;
+        check_nodal("times of fronts", &times, times.len())?;
+        match schedule.meets(state.step, state.t) {
+            true => Ok(()),
+            false => Err(Unfit::Damaged(format!("its step {} at t = {} is none of the run", state.step, state.t))),
+        }
+    }
+}
+
 /// `history.csv` and `front.csv`.
 struct Tables {
     path: PathBuf,
@@ -154,6 +191,22 @@ impl Tables {
         let heads = ["t".to_string()].into_iter().chain(x.iter().map(|x| format!("x={x}")));
         tables.fronts.write_record(heads).map_err(|error| tables.unwritable(&error.to_string()))?;
         Ok(tables)
+    }
+
+    /// Goes on behind the rows that a checkpoint knows of.
+    fn resume(directory: &Path, kept: &Kept) -> Result<Self, Unfit> {
+        let open = |name: &str| {
+            let rows = reopened(&directory.join(name), kept.get(name)?)?;
+            Ok(csv::WriterBuilder::new().has_headers(false).from_writer(rows))
+        };
+        Ok(Self { path: directory.into(), history: open("history.csv")?, fronts: open("front.csv")? })
+    }
+
+    fn keep(&self, kept: &mut Kept) -> Result<()> {
+        for (name, table) in [("history.csv", &self.history), ("front.csv", &self.fronts)] {
+            kept.put(name, &synced(table.get_ref()).map_err(|error| self.unwritable(&error.to_string()))?);
+        }
+        Ok(())
     }
 
     fn unwritable(&self, reason: &str) -> Error {
@@ -179,43 +232,112 @@ impl StefanStudy {
     /// # Errors
     /// As [`StefanStudy::check`]; [`Error::ForeignDirectory`], [`Error::Busy`] or [`Error::Unwritable`] for the directory.
     pub fn run(&self, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<FrontFinished> {
-        let begin = Instant::now();
+        self.run_from(directory, watchers, Begin::Anew)
+    }
+
+    /// The same from the newest checkpoint in the directory, to the bits of a run that nothing disturbed; from the start
+    /// where there is none.
+    ///
+    /// # Errors
+    /// As [`StefanStudy::run`], and [`Error::Checkpoint`] where there are checkpoints, but none that will do.
+    pub fn resume(&self, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<FrontFinished> {
+        self.run_from(directory, watchers, Begin::Resumed)
+    }
+
+    fn run_from(&self, path: &Path, watchers: &mut [&mut dyn Observer], begin: Begin) -> Result<FrontFinished> {
+        let clock = Instant::now();
         let mut prepared = self.prepare()?;
-        let directory = RunDirectory::claim(directory)?;
-        directory.write("study.toml", self.to_toml().as_bytes())?;
         let mut summary = self.summary();
         summary.warnings = self.warnings()?;
+        let directory = RunDirectory::open(path)?;
+        let mut checkpoints = Checkpoints::new(path, self.output.checkpoint, &self.to_toml())?;
+        let resumed = match begin {
+            Begin::Anew => None,
+            Begin::Resumed => checkpoints.resume(|found: FrontCheckpoint| {
+                found.check(&prepared)?;
+                let picture =
+                    pictured(&prepared.front, &found.state).map_err(|error| Unfit::Damaged(error.to_string()))?;
+                let tables = Tables::resume(path, &found.kept)?;
+                let frames = Frames::resume(path, prepared.frames.clone(), [1, 1], &picture, &found.kept)?;
+                Ok((found, tables, frames))
+            })?,
+        };
+        let (event, mut tables, mut frames, mut fronts) = match resumed {
+            Some(((found, tables, frames), refused)) => {
+                directory.clear_ended()?;
+                prepared.state = found.state;
+                (summary.seconds, summary.work, summary.reports) = (found.seconds, found.work, found.reports);
+                summary.warnings = [found.warnings, refused].concat();
+                (Event::Resumed, tables, frames, found.fronts)
+            }
+            None => {
+                directory.clear()?;
+                let tables = Tables::create(path, prepared.front.columns.x())?;
+                (Event::Started, tables, Frames::create(path, prepared.frames.clone(), [1, 1])?, Vec::new())
+            }
+        };
+        directory.write("study.toml", self.to_toml().as_bytes())?;
         directory.write_summary(&summary)?;
-        let mut tables = Tables::create(directory.path(), prepared.front.columns.x())?;
-        let mut frames = Frames::create(directory.path(), prepared.frames.clone(), [1, 1])?;
-        let mut fronts = Vec::new();
+        let before = summary.seconds.wall;
+        let wall = || before + clock.elapsed().as_secs_f64();
         let failure = {
-            let mut leave = |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState| {
-                if let Some(row) = row {
-                    tables.write(row, &state.front)?;
-                    collect(&mut fronts, snapshot.share, state);
-                }
-                frames.observe(event, snapshot)?;
-                watchers.iter_mut().try_for_each(|watcher| watcher.observe(event, snapshot))
-            };
-            go(&mut prepared, &mut summary, begin, &mut leave).err()
+            let mut leave =
+                |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState, so_far: &StefanSummary| {
+                    if let Some(row) = row {
+                        tables.write(row, &state.front)?;
+                        collect(&mut fronts, snapshot.share, state);
+                    }
+                    frames.observe(event, snapshot)?;
+                    watchers.iter_mut().try_for_each(|watcher| watcher.observe(event, snapshot))?;
+                    let ends = event != Event::Finished && watchers.iter().any(|watcher| watcher.interrupts());
+                    if ends || event != Event::Finished && checkpoints.due(state.step) {
+                        let mut kept = Kept::default();
+                        tables.keep(&mut kept)?;
+                        frames.keep(&mut kept)?;
+                        let StefanSummary { seconds, work, reports, warnings, .. } = so_far.clone();
+                        let (state, fronts) = (state.clone(), fronts.clone());
+                        let found = FrontCheckpoint { state, seconds, work, reports, warnings, fronts, kept };
+                        checkpoints.write(found.state.step, &found)?;
+                    }
+                    match ends {
+                        true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
+                        false => Ok(()),
+                    }
+                };
+            go(&mut prepared, &mut summary, event, &wall, &mut leave).err()
         };
         let output = Instant::now();
         let mut finished = FrontFinished::of(summary, prepared, fronts, failure)?;
         let kept = self.keep(&directory, &finished, &mut frames);
         let FrontFinished { summary, failure, .. } = &mut finished;
         summary.seconds.output += output.elapsed().as_secs_f64();
-        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        summary.seconds.wall = wall();
         summary.status = status(failure.as_ref()).into();
         summary.error = failure.as_ref().map(Failed::from);
-        directory.write_summary(summary)?;
-        kept?;
-        let output = Instant::now();
-        report::finish(directory.path(), self.output.report, self.output.animation)?;
-        summary.seconds.output += output.elapsed().as_secs_f64();
-        summary.seconds.wall = begin.elapsed().as_secs_f64();
-        directory.write_summary(summary)?;
-        Ok(finished)
+        let finish = || {
+            directory.write_summary(summary)?;
+            kept?;
+            let output = Instant::now();
+            report::finish(directory.path(), self.output.report, self.output.animation)?;
+            summary.seconds.output += output.elapsed().as_secs_f64();
+            summary.seconds.wall = wall();
+            directory.write_summary(summary)?;
+            if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() }
+        };
+        // what went wrong first is what is reported
+        match (finish(), &finished.failure) {
+            (Err(error), None) => Err(error),
+            _ => Ok(finished),
+        }
+    }
+
+    /// See [`Study::decode`](super::Study::decode).
+    pub(super) fn decode(&self, bytes: &[u8]) -> Result<usize, Unfit> {
+        let damaged = |error: Error| Unfit::Damaged(error.to_string());
+        let checkpoints = Checkpoints::new(Path::new(""), self.output.checkpoint, &self.to_toml()).map_err(damaged)?;
+        let (step, found) = checkpoints.read::<FrontCheckpoint>(bytes)?;
+        found.check(&self.prepare().map_err(damaged)?)?;
+        Ok(step)
     }
 
     /// Runs the study without leaving anything on disk.
@@ -226,11 +348,13 @@ impl StefanStudy {
         let mut prepared = self.prepare()?;
         let mut summary = self.summary();
         let mut fronts = Vec::new();
-        let mut leave = |_, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState| {
+        let mut leave = |_, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState, _: &StefanSummary| {
             row.iter().for_each(|_| collect(&mut fronts, snapshot.share, state));
             Ok(())
         };
-        let failure = go(&mut prepared, &mut summary, Instant::now(), &mut leave).err();
+        let clock = Instant::now();
+        let wall = || clock.elapsed().as_secs_f64();
+        let failure = go(&mut prepared, &mut summary, Event::Started, &wall, &mut leave).err();
         summary.status = status(failure.as_ref()).into();
         FrontFinished::of(summary, prepared, fronts, failure)
     }
@@ -310,10 +434,16 @@ fn pictured(front: &Front, state: &FrontState) -> Result<State> {
     Ok(State { t: state.t, step: state.step, mesh, u: Field::scalar(u), rho, velocity })
 }
 
-type Leave<'a> = dyn FnMut(Event, &Snapshot<'_>, Option<Row>, &FrontState) -> Result<()> + 'a;
+type Leave<'a> = dyn FnMut(Event, &Snapshot<'_>, Option<Row>, &FrontState, &StefanSummary) -> Result<()> + 'a;
 
-/// The time loop.
-fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leave: &mut Leave<'_>) -> Result<()> {
+/// The time loop, which begins with an event; `wall` tells the seconds since the run began.
+fn go(
+    prepared: &mut Prepared,
+    summary: &mut StefanSummary,
+    begin: Event,
+    wall: &dyn Fn() -> f64,
+    leave: &mut Leave<'_>,
+) -> Result<()> {
     let Prepared { front, given, state, schedule, .. } = prepared;
     let [start, end] = [schedule.start(), schedule.end()];
     let names = ["u".to_string()];
@@ -322,8 +452,9 @@ fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leav
         let picture = pictured(front, state)?;
         let quality = quality(&picture.mesh, &picture.rho);
         let report = reported(front, given, state);
-        let seconds = begin.elapsed().as_secs_f64();
-        let row = (event != Event::Finished).then(|| Row {
+        let seconds = wall();
+        let new = matches!(event, Event::Started | Event::Stepped);
+        let row = new.then(|| Row {
             t: state.t,
             dt,
             front_mean: report.front.mean,
@@ -340,7 +471,7 @@ fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leav
             newton_iterations: summary.work.work.newton_iterations,
             seconds,
         });
-        if event != Event::Finished && schedule.reports_at(state.t) {
+        if new && schedule.reports_at(state.t) {
             summary.reports.push(report);
         }
         let snapshot = Snapshot {
@@ -355,11 +486,11 @@ fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leav
             interface: None,
             seconds,
         };
-        let left = leave(event, &snapshot, row, state);
+        let left = leave(event, &snapshot, row, state, summary);
         summary.seconds.output += output.elapsed().as_secs_f64();
         left
     };
-    tell(Event::Started, front, state, 0.0, summary)?;
+    tell(begin, front, state, 0.0, summary)?;
     while let Some(t) = next(front, state, schedule) {
         let (clock, dt) = (Instant::now(), t - state.t);
         let stepped = front.step(given, state, t);
@@ -371,7 +502,7 @@ fn go(prepared: &mut Prepared, summary: &mut StefanSummary, begin: Instant, leav
             other => other,
         })?;
         summary.work.steps += 1;
-        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        summary.seconds.wall = wall();
         tell(Event::Stepped, front, state, dt, summary)?;
     }
     tell(Event::Finished, front, state, 0.0, summary)

@@ -1,13 +1,15 @@
 //! Studies of kind `equidistribution`: how they run, and what they leave.
 
 use super::EquidistributionStudy;
+use super::any::Begin;
 use crate::equidistribution::{FaceDensity, History, Iterate, Line};
-use crate::error::{Error, Moment, Result};
+use crate::error::{Error, Moment, Result, Unfit};
+use crate::kept::check_nodal;
 use crate::report;
-use crate::simulation::{Curve, Failed, Figure, Parallel, RunDirectory, Scale, status};
+use crate::simulation::{Checkpoints, Curve, Failed, Figure, Observer, Parallel, RunDirectory, Scale, status};
 use ndarray::{Array1, Array2, arr0};
 use ndarray_npy::{NpzWriter, WriteNpzError};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::io::Cursor;
 use std::path::Path;
 use std::time::Instant;
@@ -56,7 +58,7 @@ pub struct EquidistributionSummary {
 }
 
 /// Seconds by part.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct LineSeconds {
     /// By the clock.
     pub wall: f64,
@@ -140,7 +142,7 @@ pub struct LineFinished {
 }
 
 /// What was computed, as far as it came.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Evolution {
     /// Times of the meshes kept, the first and the last among them; 0 and 0 where there is no time.
     pub times: Vec<f64>,
@@ -152,12 +154,21 @@ pub struct Evolution {
     pub last: Option<History>,
     /// Steps done.
     pub done: usize,
+    /// The mesh after them, from which the next one starts.
+    pub newest: Vec<f64>,
     /// Linear solves in them.
     pub linear_solves: usize,
 }
 
+/// What a run in time goes on from.
+#[derive(Default, Serialize, Deserialize)]
+struct LineCheckpoint {
+    evolution: Evolution,
+    seconds: LineSeconds,
+}
+
 /// A step in `history.csv`.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct StepRow {
     /// Time.
     pub t: f64,
@@ -188,12 +199,25 @@ impl EquidistributionStudy {
     /// # Errors
     /// [`Error::Failed`], also where an iteration misses its tolerance; `evolution` then holds what was done.
     pub fn compute(&self, line: &Line, evolution: &mut Evolution) -> Result<()> {
+        self.evolve(line, evolution, &mut |_, _| Ok(()))
+    }
+
+    /// The same from what was done already, with something to do after each step, at its time.
+    fn evolve(
+        &self,
+        line: &Line,
+        evolution: &mut Evolution,
+        after: &mut dyn FnMut(f64, &Evolution) -> Result<()>,
+    ) -> Result<()> {
         let schedule = self.time.map(|time| time.schedule()).transpose()?;
         let (steps, start) = schedule.as_ref().map_or((1, 0.0), |s| (s.steps().unwrap_or(1), s.time(0)));
         let divided = self.decomposition()?;
-        let mut mesh = self.first(line)?;
-        (evolution.times, evolution.meshes) = (vec![start], vec![mesh.clone()]);
-        for step in 1..=steps {
+        if evolution.newest.is_empty() {
+            evolution.newest = self.first(line)?;
+            (evolution.times, evolution.meshes) = (vec![start], vec![evolution.newest.clone()]);
+        }
+        for step in evolution.done + 1..=steps {
+            let mesh = std::mem::take(&mut evolution.newest);
             let [before, t] = schedule.as_ref().map_or([start; 2], |s| [s.time(step - 1), s.time(step)]);
             let dt = t - before;
             let during = |error: Error| match (error, self.time) {
@@ -217,15 +241,46 @@ impl EquidistributionStudy {
                     next
                 }
             };
-            mesh = next;
+            evolution.newest = next;
             evolution.done = step;
             let kept = self.output.frames.as_ref().is_none_or(|frames| frames.due(step, t, dt));
             if kept || step == steps {
                 evolution.times.push(t);
-                evolution.meshes.push(mesh.clone());
+                evolution.meshes.push(evolution.newest.clone());
             }
+            after(t, evolution)?;
         }
         Ok(())
+    }
+
+    /// Refuses what cannot have been done of this study.
+    fn accept(&self, line: &Line, LineCheckpoint { evolution, .. }: &LineCheckpoint) -> Result<(), Unfit> {
+        let damaged = |error: Error| Unfit::Damaged(error.to_string());
+        let schedule = self.time.map(|time| time.schedule()).transpose().map_err(damaged)?;
+        let divided = self.decomposition().map_err(damaged)?.is_some();
+        let Evolution { times, meshes, steps, last, done, newest, .. } = evolution;
+        let nodes = |mesh: &Vec<f64>| check_nodal("mesh", mesh.as_chunks::<1>().0, line.cells + 1);
+        let glued = last.iter().flat_map(|history| [&history.mesh, &history.reference]);
+        meshes.iter().chain([newest]).chain(glued).try_for_each(nodes)?;
+        let counted = schedule.and_then(|schedule| schedule.steps()).is_some_and(|steps| *done <= steps)
+            && times.len() == meshes.len()
+            && !times.is_empty()
+            && steps.len() == if divided { *done } else { 0 }
+            && last.is_some() == (divided && *done > 0)
+            && last.as_ref().is_none_or(|history| !history.iterates.is_empty());
+        match counted && newest.is_sorted_by(|a, b| a < b) {
+            true => Ok(()),
+            false => Err(Unfit::Damaged(format!("its meshes of {done} steps are none of the run"))),
+        }
+    }
+
+    /// See [`Study::decode`](super::Study::decode).
+    pub(super) fn decode(&self, bytes: &[u8]) -> Result<usize, Unfit> {
+        let damaged = |error: Error| Unfit::Damaged(error.to_string());
+        let checkpoints = Checkpoints::new(Path::new(""), self.output.checkpoint, &self.to_toml()).map_err(damaged)?;
+        let (step, found) = checkpoints.read::<LineCheckpoint>(bytes)?;
+        self.accept(&self.problem().map_err(damaged)?, &found)?;
+        Ok(step)
     }
 
     /// Runs the study into a directory.
@@ -233,34 +288,78 @@ impl EquidistributionStudy {
     /// # Errors
     /// Settings out of range, and what hinders writing. What fails in the computation is in [`LineFinished::failure`].
     pub fn run(&self, directory: &Path) -> Result<LineFinished> {
-        let begin = Instant::now();
+        self.run_from(directory, &[], Begin::Anew)
+    }
+
+    /// The same from the newest checkpoint in the directory, to the bits of a run that nothing disturbed; from the start
+    /// where there is none, as there is without `[time]`. Watchers are asked after each step of `[time]` whether to end.
+    ///
+    /// # Errors
+    /// As [`EquidistributionStudy::run`], and [`Error::Checkpoint`] where there are checkpoints, but none that will do.
+    pub fn run_from(&self, path: &Path, watchers: &[&mut dyn Observer], begin: Begin) -> Result<LineFinished> {
+        let clock = Instant::now();
         let mut study = self.clone();
         study.resolve()?;
         let line = study.problem()?;
-        let directory = RunDirectory::claim(directory)?;
+        let directory = RunDirectory::open(path)?;
+        let mut checkpoints = Checkpoints::new(path, study.output.checkpoint, &study.to_toml())?;
+        let resumed = match begin {
+            Begin::Anew => None,
+            Begin::Resumed => {
+                checkpoints.resume(|found: LineCheckpoint| study.accept(&line, &found).map(|()| found))?
+            }
+        };
+        match &resumed {
+            Some(_) => directory.clear_ended()?,
+            None => directory.clear()?,
+        }
         directory.write("study.toml", study.to_toml().as_bytes())?;
         let mut summary = study.summary();
         directory.write_summary(&summary)?;
-        let mut evolution = Evolution::default();
-        let clock = Instant::now();
-        let failure = study.compute(&line, &mut evolution).err();
-        summary.seconds.mesh = clock.elapsed().as_secs_f64();
-        let clock = Instant::now();
+        let (LineCheckpoint { mut evolution, seconds }, refused) = resumed.unwrap_or_default();
+        let wall = || seconds.wall + clock.elapsed().as_secs_f64();
+        let solving = Instant::now();
+        let spent = || LineSeconds { wall: wall(), mesh: seconds.mesh + solving.elapsed().as_secs_f64(), ..seconds };
+        let outcome = study.evolve(&line, &mut evolution, &mut |t, evolution| {
+            let step = evolution.done;
+            let ends = study.time.is_some() && watchers.iter().any(|watcher| watcher.interrupts());
+            if ends || study.time.is_some() && checkpoints.due(step) {
+                checkpoints.write(step, &LineCheckpoint { evolution: evolution.clone(), seconds: spent() })?;
+            }
+            if ends { Err(Error::Interrupted(Moment { t, step })) } else { Ok(()) }
+        });
+        let failure = outcome.err();
+        if let Some(Error::Interrupted(Moment { t, .. })) = failure
+            && evolution.times.last() != Some(&t)
+        {
+            evolution.times.push(t);
+            evolution.meshes.push(evolution.newest.clone());
+        }
+        summary.seconds = spent();
+        let output = Instant::now();
         // what the density turns out to be between the nodes may be a failure of its own
         let told = summary.tell(&study, &line, &evolution);
         let failure = failure.or(told.err());
+        summary.warnings.extend(refused);
         summary.failure = failure.as_ref().map(Failed::from);
         summary.status = status(failure.as_ref()).into();
-        keep(&study, &line, &directory, &evolution)?;
-        summary.seconds.output = clock.elapsed().as_secs_f64();
-        summary.seconds.wall = begin.elapsed().as_secs_f64();
-        directory.write_summary(&summary)?;
-        let clock = Instant::now();
-        report::finish(directory.path(), study.output.report, study.output.animation)?;
-        summary.seconds.output += clock.elapsed().as_secs_f64();
-        summary.seconds.wall = begin.elapsed().as_secs_f64();
-        directory.write_summary(&summary)?;
-        Ok(LineFinished { summary, evolution, failure })
+        let mut finish = || {
+            keep(&study, &line, &directory, &evolution)?;
+            summary.seconds.output += output.elapsed().as_secs_f64();
+            summary.seconds.wall = wall();
+            directory.write_summary(&summary)?;
+            let output = Instant::now();
+            report::finish(directory.path(), study.output.report, study.output.animation)?;
+            summary.seconds.output += output.elapsed().as_secs_f64();
+            summary.seconds.wall = wall();
+            directory.write_summary(&summary)?;
+            if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() }
+        };
+        // what went wrong first is what is reported
+        match (finish(), &failure) {
+            (Err(error), None) => Err(error),
+            _ => Ok(LineFinished { summary, evolution, failure }),
+        }
     }
 
     fn summary(&self) -> EquidistributionSummary {

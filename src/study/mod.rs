@@ -13,7 +13,7 @@ mod source;
 mod stefan;
 mod uniform;
 
-pub use any::Study;
+pub use any::{Begin, Study};
 pub use equidistribution::{
     Discretization, EquidistributionStudy, FirstMesh, Integral, Interval, LineArclength, LineDensityKind, LineDomain,
     LineFormula, LineGrid, LineTime, MethodName, SchwarzTable, Start, StopTable,
@@ -32,7 +32,7 @@ pub use poisson::{
     Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary,
     Sides, Solved, SolverKind, SolverTable, StencilReport,
 };
-pub use run::{Finished, compute, run};
+pub use run::{Finished, compute, resume, run};
 pub use source::Source;
 pub use stefan::{
     Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy,

@@ -5,7 +5,7 @@ use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
-use crate::simulation::{Coupling, FramesAt, Observer, Record, Schedule, Simulation, State, timed};
+use crate::simulation::{CheckpointsAt, Coupling, FramesAt, Observer, Record, Schedule, Simulation, State, timed};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -201,6 +201,9 @@ pub enum StartMesh {
 pub struct Output {
     /// When frames are written; about twenty of them where nothing is said.
     pub frames: Option<FramesAt>,
+    /// When a checkpoint is written, from which a run that ends early goes on; every minute where nothing is said. A study
+    /// without time steps has none, and begins again.
+    pub checkpoint: CheckpointsAt,
     /// Whether the frames become `animation.gif`.
     pub animation: bool,
     /// Whether the run ends with `report.html` and its plots.
@@ -209,7 +212,17 @@ pub struct Output {
 
 impl Default for Output {
     fn default() -> Self {
-        Self { frames: None, animation: false, report: true }
+        Self { frames: None, checkpoint: CheckpointsAt::default(), animation: false, report: true }
+    }
+}
+
+impl Output {
+    /// Refuses settings out of range that do not depend on the rest of the study.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub(super) fn check(&self) -> Result<()> {
+        self.checkpoint.check().map_err(|error| error.within("output"))
     }
 }
 
@@ -281,7 +294,8 @@ impl MovingMesh {
             }
         };
         let frames = self.output.frames.get_or_insert(frames_by_default);
-        frames.check([start, end]).map_err(|error| error.within("output"))
+        frames.check([start, end]).map_err(|error| error.within("output"))?;
+        self.output.check()
     }
 
     /// Refuses axes that the equation is not made for.

@@ -247,6 +247,7 @@ impl PoissonStudy {
     /// # Errors
     /// [`Error::Invalid`] or [`Error::Formula`] with the dotted key.
     pub fn check(&self) -> Result<()> {
+        self.output.check()?;
         self.study.check_name()?;
         let laplacian = self.laplacian.laplacian()?;
         self.data()?;

@@ -1,10 +1,12 @@
 use super::MovingMesh;
-use crate::error::{Error, Result};
+use super::any::Begin;
+use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
+use crate::kept::{Kept, check_nodal};
 use crate::report;
 use crate::simulation::{
-    Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory, Snapshot, State, Summary, draw,
-    final_arrays, status,
+    Checkpoint, Checkpoints, Course, Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory,
+    Simulation, Snapshot, State, Summary, draw, final_arrays, status,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -29,12 +31,40 @@ pub struct Finished {
 /// [`Error::Invalid`], [`Error::ForeignDirectory`] or [`Error::Busy`] before anything is written; [`Error::Failed`] where
 /// the initial state cannot be computed; [`Error::Unwritable`] where the directory cannot be written.
 pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<Finished> {
+    run_from(study, directory, watchers, Begin::Anew)
+}
+
+/// The same from the newest checkpoint in the directory, to the bits of a run that nothing disturbed; from the start where
+/// there is none.
+///
+/// # Errors
+/// As [`run`], and [`Error::Checkpoint`] where there are checkpoints, but none that will do.
+pub fn resume(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observer]) -> Result<Finished> {
+    run_from(study, directory, watchers, Begin::Resumed)
+}
+
+fn run_from(
+    study: &MovingMesh,
+    directory: &Path,
+    watchers: &mut [&mut dyn Observer],
+    begin: Begin,
+) -> Result<Finished> {
     let mut study = study.clone();
     study.resolve()?;
     let mut simulation = study.simulation()?;
     let unknowns = simulation.physics.unknowns();
 
-    let directory = RunDirectory::claim(directory)?;
+    let directory = RunDirectory::open(directory)?;
+    let mut checkpoints = Checkpoints::new(directory.path(), study.output.checkpoint, &study.to_toml())?;
+    checkpoints.at_the_end = study.compare.is_some();
+    let resumed = match begin {
+        Begin::Anew => None,
+        Begin::Resumed => checkpoints.resume(|found| Underway::resume(&study, &mut simulation, &directory, found))?,
+    };
+    match &resumed {
+        Some(_) => directory.clear_ended()?,
+        None => directory.clear()?,
+    }
     let mut summary = Summary {
         schema: 1,
         study: study.study.name.clone(),
@@ -50,25 +80,34 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     };
     directory.write("study.toml", study.to_toml().as_bytes())?;
     directory.write_summary(&summary)?;
-    let mut record = Record { warnings: study.warnings()?, ..Record::default() };
-    let outcome = study.start(&simulation, &mut record, watchers).and_then(|mut state| {
-        let mut history = History::create(&directory.path().join("history.csv"))?;
-        let mut frames = Frames::create(directory.path(), study.frames(), study.mesh.generator.subdomains())?;
-        let mut meshes = Meshes::of(&study);
+    let mut record = Record::default();
+    let underway = match resumed {
+        Some((underway, refused)) => {
+            record = underway.record.clone();
+            record.warnings.extend(refused);
+            Ok(underway)
+        }
+        None => {
+            record.warnings = study.warnings()?;
+            Underway::start(&study, &simulation, &directory, &mut record, watchers)
+        }
+    };
+    let outcome = underway.map(|underway| {
+        let Underway { mut state, course, mut history, mut frames, mut meshes, .. } = underway;
         let mut observers: Vec<&mut dyn Observer> = vec![&mut history, &mut frames, &mut meshes];
         watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
-        let failure = simulation.run(&mut state, &mut record, &mut observers).err();
-        let failure = failure.map_or_else(|| reference_into(&directory, &study, &meshes, &mut record).err(), Some);
+        let failure = simulation.run_on(&mut state, &mut record, &mut observers, Some(&mut checkpoints), course).err();
+        let failure = match failure {
+            None => reference_into(&directory, &study, &meshes, &mut record, watchers).err(),
+            failure => failure,
+        };
         let output = Instant::now();
         let kept = keep(&study, &directory, &unknowns, &state, &mut frames);
         let spent = output.elapsed().as_secs_f64();
         record.seconds.output += spent;
         record.seconds.wall += spent;
         // what went wrong first is what is reported
-        match (failure, kept) {
-            (None, Err(error)) => Err(error),
-            (failure, _) => Ok((state, failure)),
-        }
+        (state, failure.or(kept.err()))
     });
 
     let failure = outcome.as_ref().map_or_else(Some, |(_, failure)| failure.as_ref());
@@ -78,17 +117,80 @@ pub fn run(study: &MovingMesh, directory: &Path, watchers: &mut [&mut dyn Observ
     summary.work = record.work;
     summary.reports = record.reports;
     summary.warnings = record.warnings;
+    let resumable = failure.is_some_and(Error::is_resumable);
     let written = directory.write_summary(&summary);
     let (state, failure) = outcome?;
-    written?;
-    // the report shows the summary; what it took itself is added afterwards
-    let output = Instant::now();
-    report::finish(directory.path(), study.output.report, study.output.animation)?;
-    let spent = output.elapsed().as_secs_f64();
-    summary.seconds.output += spent;
-    summary.seconds.wall += spent;
-    directory.write_summary(&summary)?;
-    Ok(Finished { summary, state, failure })
+    let finish = || {
+        written?;
+        // the report shows the summary; what it took itself is added afterwards
+        let output = Instant::now();
+        report::finish(directory.path(), study.output.report, study.output.animation)?;
+        let spent = output.elapsed().as_secs_f64();
+        summary.seconds.output += spent;
+        summary.seconds.wall += spent;
+        directory.write_summary(&summary)?;
+        if resumable { Ok(()) } else { checkpoints.remove() }
+    };
+    match (finish(), failure) {
+        (Err(error), None) => Err(error),
+        (_, failure) => Ok(Finished { summary, state, failure }),
+    }
+}
+
+/// A run between two steps, with what leaves its traces on the disk.
+struct Underway {
+    state: State,
+    record: Record,
+    course: Option<Course>,
+    history: History,
+    frames: Frames,
+    meshes: Meshes,
+}
+
+impl Underway {
+    fn start(
+        study: &MovingMesh,
+        simulation: &Simulation,
+        directory: &RunDirectory,
+        record: &mut Record,
+        watchers: &mut [&mut dyn Observer],
+    ) -> Result<Self> {
+        let state = study.start(simulation, record, watchers)?;
+        let history = History::create(&directory.path().join("history.csv"))?;
+        let frames = Frames::create(directory.path(), study.frames(), study.mesh.generator.subdomains())?;
+        Ok(Self { state, record: record.clone(), course: None, history, frames, meshes: Meshes::of(study) })
+    }
+
+    fn resume(
+        study: &MovingMesh,
+        simulation: &mut Simulation,
+        directory: &RunDirectory,
+        found: Checkpoint,
+    ) -> Result<Self, Unfit> {
+        let (state, meshes) = accept(study, simulation, &found)?;
+        let Checkpoint { record, course, kept, .. } = found;
+        let (path, subdomains) = (directory.path(), study.mesh.generator.subdomains());
+        let history = History::resume(&path.join("history.csv"), &kept)?;
+        let frames = Frames::resume(path, study.frames(), subdomains, &state, &kept)?;
+        Ok(Self { state, record, course: Some(course), history, frames, meshes })
+    }
+}
+
+/// What a checkpoint holds, if the study can go on from it.
+fn accept(study: &MovingMesh, simulation: &mut Simulation, found: &Checkpoint) -> Result<(State, Meshes), Unfit> {
+    let mesh = study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
+    let state = found.state(&mesh, simulation.physics.as_ref(), &simulation.schedule)?;
+    simulation.generator.resume(&mesh, &found.kept)?;
+    Ok((state, Meshes::resume(study, &mesh, &found.kept)?))
+}
+
+/// See [`Study::decode`](super::Study::decode).
+pub(super) fn decode(study: &MovingMesh, bytes: &[u8]) -> Result<usize, Unfit> {
+    let damaged = |error: Error| Unfit::Damaged(error.to_string());
+    let checkpoints = Checkpoints::new(Path::new(""), study.output.checkpoint, &study.to_toml()).map_err(damaged)?;
+    let (step, found) = checkpoints.read(bytes)?;
+    accept(study, &mut study.simulation().map_err(damaged)?, &found)?;
+    Ok(step)
 }
 
 /// Runs a study without leaving anything on disk; a failure after the start ends it early.
@@ -118,22 +220,55 @@ impl Meshes {
         let at = if study.compare.is_some() { study.time.report.clone() } else { Vec::new() };
         Self { at, found: Vec::new() }
     }
+
+    fn resume(study: &MovingMesh, mesh: &Mesh<2>, kept: &Kept) -> Result<Self, Unfit> {
+        let found: Vec<(f64, Vec<[f64; 2]>)> = kept.get("meshes")?;
+        let moved = |(t, x): (f64, Vec<[f64; 2]>)| {
+            check_nodal("mesh at a report", &x, mesh.lattice().len())?;
+            Ok((t, mesh.moved(x).map_err(|failure| Unfit::Damaged(failure.to_string()))?))
+        };
+        Ok(Self { found: found.into_iter().map(moved).collect::<Result<_, Unfit>>()?, ..Self::of(study) })
+    }
 }
 
 impl Observer for Meshes {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        if event != Event::Finished && self.at.contains(&snapshot.state.t) {
+        if matches!(event, Event::Started | Event::Stepped) && self.at.contains(&snapshot.state.t) {
             self.found.push((snapshot.state.t, snapshot.state.mesh.clone()));
         }
         Ok(())
     }
+
+    fn keep(&mut self, kept: &mut Kept) -> Result<()> {
+        kept.put("meshes", &self.found.iter().map(|(t, mesh)| (t, mesh.x())).collect::<Vec<_>>());
+        Ok(())
+    }
+}
+
+/// Asks whether a run is to end, of those who watch another.
+struct Ends<'a, 'w>(&'a [&'w mut dyn Observer]);
+
+impl Observer for Ends<'_, '_> {
+    fn observe(&mut self, _event: Event, _snapshot: &Snapshot<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    fn interrupts(&self) -> bool {
+        self.0.iter().any(|watcher| watcher.interrupts())
+    }
 }
 
 /// As [`compare_with_reference`], which leaves its frames beside those of the run.
-fn reference_into(directory: &RunDirectory, study: &MovingMesh, meshes: &Meshes, record: &mut Record) -> Result<()> {
+fn reference_into(
+    directory: &RunDirectory,
+    study: &MovingMesh,
+    meshes: &Meshes,
+    record: &mut Record,
+    watchers: &[&mut dyn Observer],
+) -> Result<()> {
     let Some(compare) = &study.compare else { return Ok(()) };
     let mut frames = Frames::of_reference(directory.path(), study.frames(), compare.generator.subdomains())?;
-    compare_with_reference(study, meshes, record, &mut [&mut frames])
+    compare_with_reference(study, meshes, record, &mut [&mut frames, &mut Ends(watchers)])
 }
 
 /// Runs the study with the generator of `[compare]` and adds to each report how the meshes compare.
@@ -145,7 +280,7 @@ fn compare_with_reference(
 ) -> Result<()> {
     let Some(reference) = study.reference() else { return Ok(()) };
     let mut simulation = reference.simulation()?;
-    let mut state = reference.start(&simulation, &mut Record::default(), &mut [])?;
+    let mut state = reference.start(&simulation, &mut Record::default(), watchers)?;
     let mut theirs = Meshes::of(study);
     let mut observers: Vec<&mut dyn Observer> = vec![&mut theirs];
     watchers.iter_mut().for_each(|watcher| observers.push(*watcher));

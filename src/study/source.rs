@@ -36,7 +36,7 @@ const KINDED: [&str; 7] = [
     "compare.generator",
 ];
 /// Tables that hold one of several keys.
-const CHOICES: [&str; 2] = ["monitor.strength", "output.frames"];
+const CHOICES: [&str; 3] = ["monitor.strength", "output.frames", "output.checkpoint"];
 /// Characters of a line that are shown.
 const SHOWN: usize = 160;
 /// A study is a page of text; more is some other file.
@@ -112,6 +112,7 @@ impl Source {
                 let form = match path {
                     "monitor.strength" => "{ relative = 30.0 }",
                     "output.frames" => "{ every = 50 }",
+                    "output.checkpoint" => "{ seconds = 60 }",
                     "mesh.coupling" => "{ mesh_steps = 1, iterations = 1 }",
                     path if KINDED.contains(&path) => "{ kind = \"…\" }",
                     _ => return Err(self.diagnostic(&message, value.span(), Some(format!("begin it with [{path}]")))),

@@ -443,6 +443,7 @@ impl StefanStudy {
             }
         });
         frames.check([start, end]).map_err(|error| error.within("output"))?;
+        self.output.check()?;
         Ok(Prepared { front, given, state, schedule, frames })
     }
 

@@ -12,8 +12,9 @@ pub use monte_carlo::MonteCarlo;
 
 use super::sides::{jump, size};
 use super::{Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
-use crate::error::{Error, Failure, Result};
+use crate::error::{Error, Failure, Result, Unfit};
 use crate::geometry::{Lattice, Mesh, Patch};
+use crate::kept::Kept;
 use crate::kind::kinds;
 use crate::numerics::linear::Robust;
 use crate::parallel;
@@ -243,6 +244,15 @@ impl MeshGenerator for Stochastic {
             patch.scatter(lattice, &inside, &mut x, jump);
         }
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: Some(interface) })
+    }
+
+    fn keep(&self, kept: &mut Kept) {
+        kept.put("mesh steps", &self.steps);
+    }
+
+    fn resume(&mut self, _mesh: &Mesh<2>, kept: &Kept) -> Result<(), Unfit> {
+        self.steps = kept.get("mesh steps")?;
+        Ok(())
     }
 }
 

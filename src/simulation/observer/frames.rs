@@ -1,10 +1,11 @@
 use super::vtu::{self, Values};
 use super::{Event, Observer, Snapshot};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, cell_jacobians, cell_qualities};
+use crate::kept::{Kept, check_nodal};
 use crate::meshing::Decomposition;
 use crate::simulation::State;
-use crate::simulation::report::write_file;
+use crate::simulation::report::{is_frame, write_file};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -65,9 +66,17 @@ pub struct Frames {
     grid: Option<Arc<vtu::Grid>>,
     /// The last mesh and the one before, with their times.
     meshes: [Option<(f64, Mesh<2>)>; 2],
-    written: Vec<(f64, String)>,
+    /// Times and steps of the frames.
+    written: Vec<(f64, usize)>,
     /// A frame that is being compressed and written while the run goes on.
     writing: Option<JoinHandle<Result<()>>>,
+}
+
+/// What frames to come depend on, beside the state.
+#[derive(Serialize, Deserialize)]
+struct KeptFrames {
+    written: Vec<(f64, usize)>,
+    before: Option<(f64, Vec<[f64; 2]>)>,
 }
 
 impl Frames {
@@ -116,8 +125,7 @@ impl Frames {
     /// The same, with compressing and writing left to a thread beside the run.
     fn start(&mut self, unknowns: &[String], state: &State) -> Result<()> {
         self.wait()?;
-        let name = format!("{}/step-{:06}.vtu", self.names[0], state.step);
-        if self.written.iter().any(|(_, written)| *written == name) {
+        if self.written.iter().any(|(_, written)| *written == state.step) {
             return Ok(());
         }
         let lattice = state.mesh.lattice();
@@ -136,20 +144,66 @@ impl Frames {
             ("subdomain".into(), Values::Numbers(subdomains)),
         ];
         let points = state.mesh.closed().into_owned();
-        self.written.push((state.t, name.clone()));
-        let entries: String =
-            (self.written.iter()).map(|(t, name)| format!("<DataSet timestep=\"{t}\" file=\"{name}\"/>\n")).collect();
-        let series = format!(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
-             <Collection>\n{entries}</Collection>\n</VTKFile>\n"
-        );
+        self.written.push((state.t, state.step));
+        let series = self.series();
         let grid = self.grid.get_or_insert_with(|| Arc::new(vtu::Grid::new(lattice.cells()))).clone();
-        let [frame, index] = [self.directory.join(name), self.directory.join(self.names[1])];
+        let [frame, index] = [self.name(state.step).as_str(), self.names[1]].map(|name| self.directory.join(name));
         self.writing = Some(std::thread::spawn(move || {
             write_file(&frame, grid.document(&points, &nodes, &cells).as_bytes())?;
             write_file(&index, series.as_bytes())
         }));
         Ok(())
+    }
+
+    fn name(&self, step: usize) -> String {
+        format!("{}/step-{step:06}.vtu", self.names[0])
+    }
+
+    /// The file that puts the frames in time.
+    fn series(&self) -> String {
+        let entry = |(t, step): &(f64, usize)| format!("<DataSet timestep=\"{t}\" file=\"{}\"/>\n", self.name(*step));
+        let entries: String = self.written.iter().map(entry).collect();
+        format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
+             <Collection>\n{entries}</Collection>\n</VTKFile>\n"
+        )
+    }
+
+    /// Goes on behind the frames that a checkpoint knows of, from its state; later ones are removed.
+    ///
+    /// # Errors
+    /// [`Unfit`] where they are not there.
+    pub(crate) fn resume(
+        directory: &Path,
+        at: FramesAt,
+        subdomains: [usize; 2],
+        state: &State,
+        kept: &Kept,
+    ) -> Result<Self, Unfit> {
+        let beside = |file: &Path, error: &dyn std::fmt::Display| Unfit::Beside {
+            file: file.display().to_string(),
+            reason: error.to_string(),
+        };
+        let mut frames = Self::create(directory, at, subdomains).map_err(|error| beside(directory, &error))?;
+        let KeptFrames { written, before } = kept.get("frames")?;
+        let names: Vec<PathBuf> = written.iter().map(|(_, step)| directory.join(frames.name(*step))).collect();
+        if let Some(missing) = names.iter().find(|name| !name.is_file()) {
+            return Err(beside(missing, &"it is not there"));
+        }
+        if let Some((t, x)) = before {
+            check_nodal("frame before", &x, state.mesh.x().len())?;
+            let mesh = state.mesh.moved(x).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+            frames.meshes[1] = Some((t, mesh));
+        }
+        frames.meshes[0] = Some((state.t, state.mesh.clone()));
+        frames.written = written;
+        let entries = std::fs::read_dir(directory.join(frames.names[0])).into_iter().flatten().flatten();
+        for later in entries.map(|entry| entry.path()).filter(|path| is_frame(path) && !names.contains(path)) {
+            std::fs::remove_file(&later).map_err(|error| beside(&later, &error))?;
+        }
+        let index = directory.join(frames.names[1]);
+        write_file(&index, frames.series().as_bytes()).map_err(|error| beside(&index, &error))?;
+        Ok(frames)
     }
 
     fn wait(&mut self) -> Result<()> {
@@ -175,6 +229,9 @@ impl Frames {
 impl Observer for Frames {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
         let state = snapshot.state;
+        if event == Event::Resumed {
+            return Ok(());
+        }
         if event != Event::Finished {
             self.meshes.swap(0, 1);
             self.meshes[0] = Some((state.t, state.mesh.clone()));
@@ -184,6 +241,13 @@ impl Observer for Frames {
             Event::Finished => self.write(snapshot.unknowns, state),
             _ => self.start(snapshot.unknowns, state),
         }
+    }
+
+    fn keep(&mut self, kept: &mut Kept) -> Result<()> {
+        self.wait()?;
+        let before = self.meshes[1].as_ref().map(|(t, mesh)| (*t, mesh.x().to_vec()));
+        kept.put("frames", &KeptFrames { written: self.written.clone(), before });
+        Ok(())
     }
 }
 

@@ -1,7 +1,9 @@
 use super::{Event, Observer, Snapshot};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Unfit};
+use crate::kept::Kept;
 use serde::Serialize;
 use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// `history.csv`: one row for the initial state and one a step; iterations and seconds are totals since the start.
@@ -41,11 +43,49 @@ impl History {
             Err(error) => Err(Error::Unwritable { path, reason: error.to_string() }),
         }
     }
+
+    /// Goes on behind the rows that a checkpoint knows of; later ones are dropped.
+    ///
+    /// # Errors
+    /// [`Unfit`] where they are not there.
+    pub(crate) fn resume(path: &Path, kept: &Kept) -> Result<Self, Unfit> {
+        let writer = csv::WriterBuilder::new().has_headers(false).from_writer(reopened(path, kept.get("history")?)?);
+        Ok(Self { path: path.to_path_buf(), writer })
+    }
+}
+
+/// A file of rows cut back to a length at which one ended, ready for the next.
+pub(crate) fn reopened(path: &Path, length: u64) -> Result<File, Unfit> {
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let beside = |reason: String| Unfit::Beside { file: file.clone(), reason };
+    let open = || -> std::io::Result<Result<File, Unfit>> {
+        let mut rows = File::options().read(true).write(true).open(path)?;
+        let there = rows.metadata()?.len();
+        if there < length {
+            return Ok(Err(beside(format!("it has {there} bytes of the {length} that it had"))));
+        }
+        let mut end = [0];
+        rows.seek(SeekFrom::Start(length.saturating_sub(1)))?;
+        rows.read_exact(&mut end)?;
+        if end != *b"\n" {
+            return Ok(Err(beside(format!("no row ends at byte {length}, where one did"))));
+        }
+        rows.set_len(length)?;
+        rows.seek(SeekFrom::Start(length))?;
+        Ok(Ok(rows))
+    };
+    open().unwrap_or_else(|error| Err(beside(error.to_string())))
+}
+
+/// The length of a file of whole rows, which are on the disk then.
+pub(crate) fn synced(file: &File) -> std::io::Result<u64> {
+    file.sync_data()?;
+    Ok(file.metadata()?.len())
 }
 
 impl Observer for History {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        if event == Event::Finished {
+        if matches!(event, Event::Resumed | Event::Finished) {
             return Ok(());
         }
         let work = snapshot.work.work;
@@ -70,5 +110,13 @@ impl Observer for History {
         let written = self.writer.serialize(row).map_err(|error| error.to_string());
         let written = written.and_then(|()| self.writer.flush().map_err(|error| error.to_string()));
         written.map_err(|reason| Error::Unwritable { path: self.path.clone(), reason })
+    }
+
+    fn keep(&mut self, kept: &mut Kept) -> Result<()> {
+        let length = synced(self.writer.get_ref());
+        let unwritable =
+            |error: std::io::Error| Error::Unwritable { path: self.path.clone(), reason: error.to_string() };
+        kept.put("history", &length.map_err(unwritable)?);
+        Ok(())
     }
 }

@@ -6,10 +6,12 @@ mod vtu;
 
 pub use frames::{Frames, FramesAt};
 pub use history::History;
+pub(crate) use history::{reopened, synced};
 
 use super::{ErrorNorms, State, WorkTotal};
 use crate::error::Result;
 use crate::geometry::Quality;
+use crate::kept::Kept;
 use crate::meshing::Interface;
 
 /// What just happened.
@@ -17,6 +19,8 @@ use crate::meshing::Interface;
 pub enum Event {
     /// The initial state is there.
     Started,
+    /// The state of a checkpoint is there, from which the run goes on.
+    Resumed,
     /// A step was done.
     Stepped,
     /// The end was reached.
@@ -44,7 +48,7 @@ pub struct Snapshot<'a> {
     pub work: WorkTotal,
     /// What the last step knows about the interfaces between subdomains.
     pub interface: Option<Interface>,
-    /// Seconds since the run began.
+    /// Seconds since the run began, over all its parts.
     pub seconds: f64,
 }
 
@@ -62,6 +66,19 @@ pub trait Observer {
     /// # Errors
     /// Whatever stops the observer from doing its work.
     fn adapting(&mut self, _state: &State) -> Result<()> {
+        Ok(())
+    }
+
+    /// Asked after every step: true ends the run there, with a checkpoint where it has any.
+    fn interrupts(&self) -> bool {
+        false
+    }
+
+    /// Puts what it carries from step to step into a checkpoint, and makes sure that what it wrote so far is on the disk.
+    ///
+    /// # Errors
+    /// What hinders that.
+    fn keep(&mut self, _kept: &mut Kept) -> Result<()> {
         Ok(())
     }
 }

@@ -1,6 +1,8 @@
 use crate::error::{Error, Result};
+use crate::simulation::Checkpoints;
 use serde::Serialize;
 use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The directory of one run
@@ -79,24 +81,66 @@ impl RunDirectory {
     /// # Errors
     /// As [`RunDirectory::check`], or [`Error::Unwritable`].
     pub fn claim(path: &Path) -> Result<Self> {
+        let directory = Self::open(path)?;
+        directory.clear()?;
+        Ok(directory)
+    }
+
+    /// Makes the directory ours as it stands: created if missing.
+    ///
+    /// # Errors
+    /// As [`RunDirectory::claim`].
+    pub fn open(path: &Path) -> Result<Self> {
         Self::check(path)?;
         let unwritable =
             |path: &Path, error: std::io::Error| Error::Unwritable { path: path.into(), reason: error.to_string() };
         std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))?;
         let lock = File::create(path.join(LOCK)).map_err(|error| unwritable(path, error))?;
         lock.try_lock().map_err(|_| Error::Busy { path: path.into() })?;
-        let folders = FRAMES.into_iter().map(|folder| std::fs::read_dir(path.join(folder)));
+        Ok(Self { path: path.into(), lock })
+    }
+
+    /// Removes what only a run that ended writes, and leaves what one that goes on adds to.
+    pub(crate) fn clear_ended(&self) -> Result<()> {
+        let keep = ["summary.json", "study.toml", "history.csv", "front.csv", "run.pvd", FRAMES[0]];
+        self.clear_but(&[&keep[..], &Checkpoints::NAMES].concat())
+    }
+
+    /// Removes what an earlier run wrote, and nothing else.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn clear(&self) -> Result<()> {
+        self.clear_but(&[])
+    }
+
+    fn clear_but(&self, keep: &[&str]) -> Result<()> {
+        let path = &self.path;
+        let kept = |name: &&str| !keep.contains(name);
+        let folders = FRAMES.into_iter().filter(kept).map(|folder| std::fs::read_dir(path.join(folder)));
         let frames = folders.flatten().flatten().flatten().map(|entry| entry.path());
         let old_frames = frames.filter(|frame| is_frame(frame));
-        for old in OURS.into_iter().map(|name| path.join(name)).chain(old_frames) {
-            match std::fs::remove_file(&old) {
-                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(unwritable(&old, error)),
-                _ => {}
-            }
+        let files = OURS.into_iter().chain(Checkpoints::NAMES);
+        let parts = files.clone().map(|name| part(&path.join(name)));
+        for old in files.filter(kept).map(|name| path.join(name)).chain(parts).chain(old_frames) {
+            remove(&old)?;
         }
         // only an empty folder goes; what is not ours keeps it
         let _ = std::fs::remove_dir(path.join(FRAMES[1]));
-        Ok(Self { path: path.into(), lock })
+        Ok(())
+    }
+
+    /// How far the run in a directory came.
+    pub fn standing(path: &Path) -> Standing {
+        let there = |name: &str| path.join(name).exists();
+        if Checkpoints::NAMES.into_iter().any(there) {
+            return Standing::Unfinished;
+        }
+        match summary(path) {
+            // a run that was killed while it wrote its report has left its lock
+            Some(summary) if summary["status"] == "completed" && !there(LOCK) => Standing::Complete,
+            _ => Standing::Nothing,
+        }
     }
 
     /// Where it is.
@@ -130,9 +174,21 @@ impl Drop for RunDirectory {
     }
 }
 
-fn is_frame(path: &Path) -> bool {
+/// True for a frame, and for one that a run was writing when it was killed.
+pub(crate) fn is_frame(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    name.starts_with("step-") && name.ends_with(".vtu")
+    name.starts_with("step-") && (name.ends_with(".vtu") || name.ends_with(".vtu.part"))
+}
+
+/// What a directory holds of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// Nothing to go on from.
+    Nothing,
+    /// Checkpoints.
+    Unfinished,
+    /// A run that came to its end.
+    Complete,
 }
 
 /// True if a run of ours wrote this directory: its summary says so, or the lock of a run that was killed before.
@@ -140,18 +196,53 @@ fn wrote(path: &Path) -> bool {
     if path.join(LOCK).is_file() {
         return true;
     }
-    let Ok(text) = std::fs::read_to_string(path.join("summary.json")) else { return false };
-    let Ok(summary) = serde_json::from_str::<serde_json::Value>(&text) else { return false };
-    summary["schema"].is_u64() && summary["study"].is_string() && path.join("study.toml").is_file()
+    summary(path).is_some_and(|summary| summary["schema"].is_u64() && summary["study"].is_string())
+        && path.join("study.toml").is_file()
 }
 
-/// Writes a file under another name and renames it when it is complete.
-pub(crate) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
+/// `summary.json`, if it can be read.
+fn summary(path: &Path) -> Option<serde_json::Value> {
+    serde_json::from_str(&std::fs::read_to_string(path.join("summary.json")).ok()?).ok()
+}
+
+/// The name that a file has until it is complete.
+fn part(path: &Path) -> PathBuf {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
-    let part = PathBuf::from(part);
-    std::fs::write(&part, contents).and_then(|()| std::fs::rename(&part, path)).map_err(|error| {
+    part.into()
+}
+
+/// Removes a file, if it is there.
+pub(crate) fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::Unwritable { path: path.into(), reason: error.to_string() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a file under another name, and renames it when it is complete and on the disk.
+pub(crate) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
+    let part = part(path);
+    let write = || {
+        let mut file = File::create(&part)?;
+        file.write_all(contents)?;
+        file.sync_data()?;
+        std::fs::rename(&part, path)
+    };
+    write().map_err(|error| {
         let _ = std::fs::remove_file(&part);
         Error::Unwritable { path: path.into(), reason: error.to_string() }
     })
+}
+
+/// Makes sure that the names in a directory are on the disk.
+pub(crate) fn sync_directory(path: &Path) -> Result<()> {
+    // elsewhere directories cannot be opened, and renaming does it
+    if cfg!(unix) {
+        let synced = File::open(path).and_then(|directory| directory.sync_all());
+        synced.map_err(|error| Error::Unwritable { path: path.into(), reason: error.to_string() })?;
+    }
+    Ok(())
 }

@@ -9,8 +9,8 @@ mod summary;
 
 pub use arrays::final_arrays;
 pub use curves::draw_curves;
-pub use directory::RunDirectory;
-pub(crate) use directory::write_file;
+pub use directory::{RunDirectory, Standing};
+pub(crate) use directory::{is_frame, remove, sync_directory, write_file};
 pub use figure::{Curve, Figure, Scale};
 pub use picture::{Picture, Pixels, Sheet, draw};
 pub(crate) use summary::status;

@@ -2,7 +2,7 @@ use crate::error::{Error, Failure};
 use crate::geometry::{Comparison, Quality};
 use crate::meshing::Interface;
 use crate::work::Work;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// `summary.json`.
 #[derive(Debug, Clone, Serialize)]
@@ -68,7 +68,7 @@ pub(crate) fn status(failure: Option<&Error>) -> &'static str {
 }
 
 /// Seconds by part.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct Seconds {
     /// By the clock.
     pub wall: f64,
@@ -96,7 +96,7 @@ pub struct Parallel {
 }
 
 /// Steps and their cost.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WorkTotal {
     /// Time steps accepted.
     pub steps: usize,
@@ -108,7 +108,7 @@ pub struct WorkTotal {
 }
 
 /// The state of a run at one of the times asked for.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Report {
     /// Time.
     pub t: f64,
@@ -128,7 +128,7 @@ pub struct Report {
 }
 
 /// Error against the exact solution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ErrorNorms {
     /// Largest over the nodes.
     pub linf: f64,
@@ -137,7 +137,7 @@ pub struct ErrorNorms {
 }
 
 /// What a conservative scheme keeps, up to what flows through the sides.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Conserved {
     /// ∫u dA of the first unknown.
     pub mass: f64,
