@@ -4,7 +4,7 @@ use driftmesh::density::{Arclength, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh};
 use driftmesh::meshing::{Mmpde, Whole};
 use driftmesh::physics::{Burgers, Convection, Motion, Physics};
-use driftmesh::simulation::{Coupling, Record, Schedule, Simulation, State};
+use driftmesh::simulation::{Coupling, Record, Safety, Schedule, Simulation, State};
 use driftmesh::{Failure, Work};
 
 /// A bump at the centre, whatever u is.
@@ -48,6 +48,7 @@ fn simulate(
         equation: Mmpde { relaxation: 0.2.into(), ..Mmpde::default() },
         coupling,
         schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),
+        safety: Safety::default(),
     };
     let mesh = Mesh::uniform(Lattice::bounded([20, 20]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
     let mut state = simulation.start(mesh).unwrap();

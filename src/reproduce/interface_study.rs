@@ -9,7 +9,7 @@ use crate::meshing::{
 use crate::numerics::linear::{Robust, Smoother};
 use crate::physics::{Burgers, Convection};
 use crate::setting::Auto;
-use crate::simulation::{Coupling, Record, Schedule, Simulation};
+use crate::simulation::{Coupling, Record, Safety, Schedule, Simulation};
 use crate::work::Work;
 use std::time::Instant;
 
@@ -57,6 +57,7 @@ impl InterfaceStep {
             equation: Mmpde::default(),
             coupling: Coupling::default(),
             schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
+            safety: Safety::default(),
         };
         let mesh = Mesh::uniform(Lattice::bounded([cells, cells])?, [0.0; 2], [1.0; 2])?;
         let mut state = simulation.start(mesh)?;
@@ -398,6 +399,7 @@ fn coupled(options: Options) -> Result<Table> {
             equation: Mmpde::default(),
             coupling: Coupling::default(),
             schedule: Schedule::new(0.25, 0.75, 1e-3, vec![0.75])?,
+            safety: Safety::default(),
         };
         let mut state = simulation.start(Mesh::uniform(lattice, [0.0; 2], [1.0; 2])?)?;
         simulation.run(&mut state, &mut Record::default(), &mut [])?;

@@ -1,9 +1,9 @@
 use super::prediction::{Predicted, blend};
-use super::{NOISE_WORTH_A_WARNING, Seconds, Simulation, State, timed};
-use crate::density::Monitor;
+use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State, timed};
+use crate::density::{Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
-use crate::meshing::{Interface, Mmpde};
+use crate::meshing::{Interface, MeshGenerator, Mmpde};
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
 use schemars::JsonSchema;
@@ -61,9 +61,10 @@ pub(super) fn advance(
     t: f64,
     dt: f64,
     scale: f64,
-    seconds: &mut Seconds,
+    record: &mut Record,
 ) -> Result<Advanced, Failure> {
-    let Simulation { physics, monitor, generator, equation, coupling, .. } = simulation;
+    let Simulation { physics, monitor, generator, equation, coupling, safety, .. } = simulation;
+    let Record { seconds, safety: rescues, .. } = record;
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
@@ -73,27 +74,29 @@ pub(super) fn advance(
     let predicted = timed(&mut seconds.mesh, || Predicted::after(state, gain, dt))?;
     let mut latest = None;
     for _ in 0..coupling.iterations {
-        let mut spent = 0.0;
-        let mesh = timed(&mut seconds.mesh, || {
-            let mut mesh = predicted.mesh.clone();
-            for sub in 0..coupling.mesh_steps {
-                let carried = if sub == 0 { None } else { Some(interpolate(&predicted.mesh, &rho, &mesh)) };
-                let rho = carried.as_ref().unwrap_or(&rho);
-                let moved = generator.step(&equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
-                let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
-                check_unfolded(&moved.mesh).map_err(|failure| match failure {
-                    Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
-                    other => other,
-                })?;
-                mesh = moved.mesh;
-                work += moved.work;
-                spent += moved.interface.map_or(0.0, |i| i.seconds);
-                interface = moved.interface;
+        let mut attempts = safety.attempts().peekable();
+        let moved = loop {
+            let [parts, passes] = attempts.next().expect("there is a first attempt");
+            let substeps = coupling.mesh_steps * parts;
+            let moved = timed(&mut seconds.mesh, || {
+                let mut smoother = rho.clone();
+                smooth(predicted.mesh.lattice(), &mut smoother, passes);
+                moved(generator.as_mut(), &equation, &predicted.mesh, &smoother, dt, substeps)
+            });
+            match moved {
+                Err(failure) if failure.may_pass() && attempts.peek().is_some() => continue,
+                moved => {
+                    rescues.substeps += usize::from(moved.is_ok() && parts > 1);
+                    rescues.smoothed += usize::from(moved.is_ok() && passes > 0);
+                    break moved?;
+                }
             }
-            Ok::<_, Failure>(mesh)
-        })?;
-        seconds.mesh -= spent;
-        seconds.interface += spent;
+        };
+        work += moved.work;
+        interface = moved.interface;
+        seconds.mesh -= moved.between;
+        seconds.interface += moved.between;
+        let mesh = moved.mesh;
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
         let (u, cost) = timed(&mut seconds.pde, || physics.step(motion, &state.u))?;
         work += cost;
@@ -106,6 +109,66 @@ pub(super) fn advance(
     let (mesh, u) = latest.expect("a coupling has at least one iteration");
     let velocity = predicted.corrected(&mesh, gain, dt);
     Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, velocity }, work, interface })
+}
+
+/// Where mesh sub-steps lead.
+struct Moved {
+    mesh: Mesh<2>,
+    work: Work,
+    interface: Option<Interface>,
+    /// Seconds on interfaces.
+    between: f64,
+}
+
+/// A mesh step in so many sub-steps, ρ carried along onto each sub-mesh.
+fn moved(
+    generator: &mut dyn MeshGenerator,
+    equation: &Mmpde,
+    from: &Mesh<2>,
+    rho: &[f64],
+    dt: f64,
+    substeps: usize,
+) -> Result<Moved, Failure> {
+    let mut all = Moved { mesh: from.clone(), work: Work::default(), interface: None, between: 0.0 };
+    for sub in 0..substeps {
+        let carried = if sub == 0 { None } else { Some(interpolate(from, rho, &all.mesh)) };
+        let rho = carried.as_deref().unwrap_or(rho);
+        let moved = generator.step(equation, &all.mesh, rho, dt / substeps as f64)?;
+        let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
+        check_unfolded(&moved.mesh).map_err(|failure| match failure {
+            Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
+            other => other,
+        })?;
+        all.mesh = moved.mesh;
+        all.work += moved.work;
+        all.between += moved.interface.map_or(0.0, |i| i.seconds);
+        all.interface = moved.interface;
+    }
+    Ok(all)
+}
+
+/// One step to time `t`, in halves where it fails, and these in halves, so many times.
+pub(super) fn advance_in_halves(
+    simulation: &mut Simulation,
+    state: &State,
+    [t, dt]: [f64; 2],
+    scale: f64,
+    halvings: u32,
+    record: &mut Record,
+) -> Result<Advanced, Failure> {
+    match advance(simulation, state, t, dt, scale, record) {
+        Err(failure) if halvings > 0 && failure.may_pass() => {
+            record.work.rejected_steps += 1;
+            record.safety.halved += 1;
+            let half = 0.5 * dt;
+            let first = advance_in_halves(simulation, state, [state.t + half, half], scale, halvings - 1, record)?;
+            let mut both = advance_in_halves(simulation, &first.state, [t, half], scale, halvings - 1, record)?;
+            both.state.step = state.step + 1;
+            both.work += first.work;
+            Ok(both)
+        }
+        done => done,
+    }
 }
 
 /// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that

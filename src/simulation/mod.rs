@@ -6,6 +6,7 @@ mod observer;
 mod pace;
 mod prediction;
 mod report;
+mod safety;
 mod schedule;
 
 pub use checkpoint::CheckpointsAt;
@@ -18,6 +19,7 @@ pub use report::{
 };
 pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
 pub(crate) use report::{status, write_file};
+pub use safety::{Rescues, Safety};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
@@ -62,6 +64,10 @@ pub struct Record {
     pub interface: Option<Interface>,
     /// What the user should know although nothing failed.
     pub warnings: Vec<String>,
+    /// What `[safety]` had to do.
+    pub safety: Rescues,
+    /// How far the mesh went: the longest way of a node in each step, in cells of the uniform mesh, added up.
+    pub motion: f64,
 }
 
 /// A moving mesh, the physics on it, and how they are advanced together.
@@ -69,7 +75,7 @@ pub struct Record {
 /// # Example
 /// ```
 /// use driftmesh::{density::Arclength, geometry::{Lattice, Mesh}, meshing::{Mmpde, Whole}};
-/// use driftmesh::{physics::{Burgers, Convection}, simulation::{Coupling, Record, Schedule, Simulation}};
+/// use driftmesh::{physics::{Burgers, Convection}, simulation::{Coupling, Record, Safety, Schedule, Simulation}};
 ///
 /// let mut simulation = Simulation {
 ///     physics: Box::new(Burgers::new(0.005, Convection::Conservative)?),
@@ -78,6 +84,7 @@ pub struct Record {
 ///     equation: Mmpde::default(),
 ///     coupling: Coupling::default(),
 ///     schedule: Schedule::new(0.25, 0.30, 1e-3, vec![0.30])?,
+///     safety: Safety::default(),
 /// };
 /// let mesh = Mesh::uniform(Lattice::bounded([20, 20])?, [0.0, 0.0], [1.0, 1.0])?;
 /// let mut state = simulation.start(mesh)?;
@@ -100,6 +107,8 @@ pub struct Simulation {
     pub coupling: Coupling,
     /// When.
     pub schedule: Schedule,
+    /// What is tried where a step fails.
+    pub safety: Safety,
 }
 
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
@@ -109,6 +118,11 @@ const STEPS_OF_THE_START: f64 = 30.0;
 const MAX_STEPS_OF_THE_START: usize = 500;
 /// Motion in one step, as a share of the shortest edge, below which the mesh at the start rests.
 const AT_REST: f64 = 4e-3;
+/// Motion in a run, in cells, below which a mesh is said not to move where max/mean of ρ × area is above the second figure,
+/// or ρ the same everywhere but for the third.
+const MOTION: f64 = 0.01;
+const ASKED: f64 = 1.5;
+const FLAT: f64 = 1e-6;
 const HASTY: &str = "`mesh.relaxation` is short";
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
@@ -228,8 +242,10 @@ impl Simulation {
         while let Some((t, dt)) = self.next(state, pace.as_ref()) {
             let step = state.step + 1;
             self.warn_of_haste(state.t, dt, record);
-            let next =
-                coupling::advance(self, state, t, dt, pace.as_ref().map_or(dt, Pace::scale), &mut record.seconds);
+            let next = match &pace {
+                Some(pace) => coupling::advance(self, state, t, dt, pace.scale(), record),
+                None => coupling::advance_in_halves(self, state, [t, dt], dt, self.safety.halvings, record),
+            };
             let judged = match &mut pace {
                 Some(pace) => pace.judge(state, next),
                 None => next.map(Some),
@@ -242,6 +258,7 @@ impl Simulation {
                 }
                 Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
             };
+            record.motion += self::motion(&state.mesh, &next.state.mesh);
             *state = next.state;
             record.work.add(next.work);
             record.interface = next.interface;
@@ -253,6 +270,8 @@ impl Simulation {
             self.show(Event::Stepped, state, record, observers, dt, &clock)?;
             self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
         }
+        self.warn_of_rescues(record);
+        self.warn_of_rest(state, record);
         if let Some(checkpoints) = checkpoints.filter(|checkpoints| checkpoints.at_the_end) {
             self.checkpoint(state, record, observers, checkpoints, &clock, course(&pace))?;
         }
@@ -314,6 +333,44 @@ impl Simulation {
                 tau / dt
             ));
         }
+    }
+
+    /// Says at the end what `[safety]` had to do.
+    fn warn_of_rescues(&self, record: &mut Record) {
+        record.warnings.retain(|said| !said.starts_with(safety::SAFETY));
+        record.warnings.extend(record.safety.told());
+    }
+
+    /// Says at the end that the mesh did not move although its density asked it to, and why.
+    fn warn_of_rest(&self, state: &State, record: &mut Record) {
+        let asked = quality(&state.mesh, &state.rho).equidistribution;
+        if !self.generator.moves() || record.motion > MOTION || record.work.steps == 0 {
+            return;
+        }
+        let (low, high) = state.rho.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), r| (l.min(*r), h.max(*r)));
+        let duration = self.schedule.end() - self.schedule.start();
+        let reason = match self.equation.relaxation {
+            _ if high - low <= FLAT * high => {
+                let changes = (0..state.u.components()).any(|c| {
+                    let ends = state.u.component(c).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), u| (l.min(u), h.max(u)));
+                    ends.1 - ends.0 > FLAT * ends.0.abs().max(ends.1.abs())
+                });
+                if !changes {
+                    return;
+                }
+                "its density is the same everywhere although the solution is not: look at monitor.of and monitor.strength".into()
+            }
+            _ if asked <= ASKED => return,
+            Relaxation::Time(tau) if tau > duration => {
+                format!("mesh.relaxation = {tau} is longer than the run, {duration}; lower it")
+            }
+            _ => "the run is short against mesh.relaxation, or the mesh rests on a density that changes nowhere but in a few cells"
+                .into(),
+        };
+        record.warnings.push(format!(
+            "the mesh did not move: by {:.0e} of a cell in the whole run, with {asked:.2} for max/mean of density × area; {reason}",
+            record.motion
+        ));
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.
@@ -440,6 +497,14 @@ impl Record {
         self.seconds.cpu = before.cpu + cpu.elapsed().as_secs_f64();
         result
     }
+}
+
+/// The longest way of a node between two meshes, in cells of the uniform one.
+fn motion(from: &Mesh<2>, to: &Mesh<2>) -> f64 {
+    let (extent, cells) = (from.extent(), from.lattice().cells());
+    let per = [0, 1].map(|d| cells[d] as f64 / extent[d]);
+    let ways = from.x().iter().zip(to.x()).map(|(a, b)| ((b[0] - a[0]) * per[0]).hypot((b[1] - a[1]) * per[1]));
+    ways.fold(0.0, f64::max)
 }
 
 /// Time and result of a computation.

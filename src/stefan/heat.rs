@@ -77,9 +77,13 @@ impl HeatStep<'_> {
                         pairs.into_iter().for_each(|(a, b)| fold((b, a), &mut row));
                     }
                 }
+                // by its own size: rows near a front that is finely graded are larger by orders of magnitude, and what
+                // rounding leaves of them would be allowed of all others
+                let own_size = row[0].abs().max(1.0);
+                let row = row.map(|a| a / own_size);
                 largest = row.iter().fold(largest, |m, a| m.max(a.abs()));
                 matrix.rows[k] = row;
-                b[k] = [self.u[own]];
+                b[k] = [self.u[own] / own_size];
             }
         }
         // columns of the patch with the ring around them
@@ -89,7 +93,7 @@ impl HeatStep<'_> {
             x.iter_mut().zip(&self.sides[i * nodes..]).for_each(|(x, side)| x[0] = *side);
         }
         let size = self.sides.iter().chain(self.u).copied().fold(0.0, larger);
-        // what round-off allows: the rows are scaled with the identity
+        // what round-off allows
         solver.solve(&matrix, &b, &mut x, [4e-15 * largest * size.max(f64::MIN_POSITIVE)])?;
         let mut u = self.sides.to_vec();
         for (p, x) in x.chunks_exact(width).enumerate().skip(1).take(count) {

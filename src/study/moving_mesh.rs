@@ -5,7 +5,9 @@ use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
-use crate::simulation::{CheckpointsAt, Coupling, FramesAt, Observer, Record, Schedule, Simulation, State, timed};
+use crate::simulation::{
+    CheckpointsAt, Coupling, FramesAt, Observer, Record, Safety, Schedule, Simulation, State, timed,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +32,9 @@ pub struct MovingMesh {
     /// `[mesh]`.
     #[serde(default)]
     pub mesh: MeshTable,
+    /// `[safety]`.
+    #[serde(default)]
+    pub safety: Safety,
     /// `[compare]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compare: Option<Compare>,
@@ -282,6 +287,7 @@ impl MovingMesh {
         });
         self.equation().check().map_err(|error| error.within("mesh"))?;
         self.mesh.coupling.check().map_err(|error| error.within("coupling").within("mesh"))?;
+        self.safety.check().map_err(|error| error.within("safety"))?;
         if self.time.report.is_empty() {
             self.time.report = vec![self.time.end];
         }
@@ -524,6 +530,7 @@ impl MovingMesh {
             equation: self.equation(),
             coupling: self.mesh.coupling,
             schedule: self.schedule()?,
+            safety: self.safety,
         })
     }
 

@@ -75,6 +75,7 @@ fn run_from(
         seconds: Default::default(),
         parallel: Parallel { ranks: 1, threads: rayon::current_num_threads() },
         work: Default::default(),
+        safety: Default::default(),
         reports: Vec::new(),
         warnings: Vec::new(),
     };
@@ -115,6 +116,7 @@ fn run_from(
     summary.error = failure.map(Failed::from);
     summary.seconds = record.seconds;
     summary.work = record.work;
+    summary.safety = record.safety;
     summary.reports = record.reports;
     summary.warnings = record.warnings;
     let resumable = failure.is_some_and(Error::is_resumable);

@@ -489,6 +489,34 @@ impl StefanStudy {
         Error::invalid(key, value, format!("{failure}; {}", failure.help()))
     }
 
+    /// Says so where an exact solution flows through sides that are insulated.
+    fn crosses_walls(&self, front: &Front, given: &Given, state: &FrontState) -> Option<String> {
+        const STEP: f64 = 1e-6;
+        const NOTICEABLE: f64 = 1e-3;
+        if self.walls.sides != Sides::Neumann {
+            return None;
+        }
+        let x = front.columns.x();
+        let width = x[x.len() - 1] - x[0];
+        let all = || state.u.iter().flatten();
+        let range = all().fold(f64::MIN, |m, u| m.max(*u)) - all().fold(f64::MAX, |m, u| m.min(*u));
+        let sides = [(0, STEP), (x.len() - 1, -STEP)].into_iter().flat_map(|(i, step)| {
+            let walls = [LOWER, UPPER].map(|phase| front.columns.wall(phase)[i]);
+            [walls[0], state.front[i], walls[1]].map(|y| ([x[i], y], step * width))
+        });
+        let flow = sides.filter_map(|([x, y], step)| {
+            let slope = (given.exact([x + step, y], state.t)? - given.exact([x, y], state.t)?) / step;
+            Some((slope * width).abs())
+        });
+        let share = flow.fold(0.0, f64::max) / range;
+        (share > NOTICEABLE).then(|| {
+            format!(
+                "the exact solution flows through the sides, which are insulated: over the width it changes by {share:.1e} of its range \
+                 there, and errors are against another problem; set walls.sides to \"exact\""
+            )
+        })
+    }
+
     /// What is allowed but probably not meant.
     ///
     /// # Errors
@@ -498,6 +526,7 @@ impl StefanStudy {
         let Prepared { front, given, state, .. } = self.prepare()?;
         let mut warnings = Vec::new();
         if let Given::Exact(..) = given {
+            warnings.extend(self.crosses_walls(&front, &given, &state));
             return Ok(warnings);
         }
         for (phase, name) in [(LOWER, "lower"), (UPPER, "upper")] {
