@@ -1,5 +1,5 @@
 use crate::errors::raised;
-use crate::threads::{BRIEFLY, Ended, PATIENCE, interruptible};
+use crate::threads::{BRIEFLY, Ended, PATIENCE, calls, interruptible};
 use driftmesh::error::Moment;
 use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, State};
 use driftmesh::study::{Source, Study};
@@ -62,7 +62,7 @@ fn read(path: Option<PathBuf>, origin: &str, text: &str, set: &[String]) -> Resu
 #[pyfunction]
 #[pyo3(signature = (path, origin, text, set))]
 pub fn check(py: Python<'_>, path: Option<PathBuf>, origin: &str, text: &str, set: Vec<String>) -> PyResult<String> {
-    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raised(py, &error, None))?;
+    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raised(py, &error, error.help()))?;
     Ok(study.name().into())
 }
 
@@ -82,7 +82,7 @@ pub fn run(
     out: PathBuf,
     told: Option<Py<PyAny>>,
 ) -> PyResult<(Option<PyErr>, bool)> {
-    let raise = |error: &Error| raised(py, error, None);
+    let raise = |error: &Error| raised(py, error, error.help());
     let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raise(&error))?;
     RunDirectory::check(&out).map_err(|error| raise(&error))?;
     let seen = Arc::new(Seen::default());
@@ -90,6 +90,7 @@ pub fn run(
     let computing = study.clone();
     let ended = interruptible(
         py,
+        calls(),
         move || computing.run(&out, &mut [&mut Watcher(theirs)]),
         || {
             seen.stop.store(true, Ordering::Relaxed);
