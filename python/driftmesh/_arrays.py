@@ -21,7 +21,7 @@ def real(name: str, values: ArrayLike) -> Floats:
         raise ValueError(f"`{name}` is no array of numbers: {error}") from None
     if array.dtype.kind not in "fiub":
         raise ValueError(f"`{name}` is of dtype {array.dtype}; give real numbers")
-    return np.require(array, np.float64, "CA")
+    return np.require(array, np.float64, ("C", "A"))
 
 
 def finite(name: str, values: ArrayLike, shape: tuple[int, ...] | None = None, of: str = "the mesh") -> Floats:

@@ -5,6 +5,9 @@ import multiprocessing
 import os
 import pickle
 import signal
+import subprocess
+import sys
+import textwrap
 import threading
 import time
 
@@ -193,11 +196,49 @@ def test_forked_processes_have_threads_of_their_own():
         assert pool.map_async(large, range(2)).get(timeout=60) == [here, here]
 
 
+BESIDE = """
+    import threading
+    import time
+    from pathlib import Path
+    from driftmesh import Mesh, MeshGenerator, run
+
+    study = {
+        "study": {"name": "front", "kind": "moving-mesh"},
+        "grid": {"cells": [60, 60]},
+        "time": {"start": 0.25, "end": 0.35, "step": 1e-3},
+        "pde": {"kind": "burgers", "viscosity": 0.005},
+        "output": {"report": False},
+    }
+    computing = threading.Thread(target=lambda: run(study))
+    computing.start()
+    while not Path("out/front").exists():
+        time.sleep(1e-3)
+    mesh = Mesh.uniform(cells=(8, 8))
+    for _ in range(10):
+        mesh = MeshGenerator().step(mesh, mesh.x**2, 0.1)
+    print(computing.is_alive())
+    computing.join()
+"""
+
+
+def test_a_step_does_not_wait_for_a_run(tmp_path):
+    """Even where the library has one thread."""
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(BESIDE)],
+        env=os.environ | {"RAYON_NUM_THREADS": "1"},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stdout == "True\n", done.stderr
+
+
 def test_ctrl_c_gives_up_a_long_step():
     """The rest of the step goes on in the background, and the generator says so."""
     mesh = Mesh.uniform(cells=(24, 24))
-    generator = MeshGenerator(method=Stochastic(estimator=MonteCarlo(paths=400_000, substeps=100)))
-    threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    generator = MeshGenerator(method=Stochastic(estimator=MonteCarlo(paths=20_000, substeps=50)))
+    threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         generator.step(mesh, layer(mesh), 1e-3)

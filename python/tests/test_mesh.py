@@ -124,6 +124,18 @@ def test_transfer_keeps_the_integral_and_the_range(periodic):
     assert old.areas.sum() == pytest.approx(2)
 
 
+def test_transfer_has_the_orders_that_it_claims():
+    def errors(n, method):
+        old, new = bent((n, n), amount=-0.05), bent((n, n), amount=0.05)
+        u, exact = (np.sin(3 * mesh.x) * np.cos(2 * mesh.y) for mesh in (old, new))
+        off = np.abs(transfer(u, old, new, method) - exact)
+        return np.array([off.max(), off.mean()])
+
+    largest, mean = np.log2(errors(20, "conservative") / errors(40, "conservative"))
+    assert 0.7 < largest < 1.5 < mean < 2.3
+    assert (np.log2(errors(20, "interpolate") / errors(40, "interpolate")) > 1.7).all()
+
+
 def test_interpolation_carries_linear_fields_exactly():
     old, new = bent(amount=-0.1), bent(amount=0.1)
     v = transfer(2 + 3 * old.x - old.y, old, new, method="interpolate")

@@ -117,12 +117,12 @@ def test_every_kind_runs_and_draws(study, settings, arrays, tmp_path):
 
 
 def test_pictures_and_animations(result, tmp_path):
+    import matplotlib.pyplot as plt
     from PIL import Image
 
-    import matplotlib.pyplot as plt
-
+    before = plt.get_fignums()
     result.plot(tmp_path / "plot.png")
-    assert not plt.get_fignums()
+    assert plt.get_fignums() == before
     result.animate(tmp_path / "moving.gif")
     with Image.open(tmp_path / "moving.gif") as moving:
         assert moving.n_frames == 3

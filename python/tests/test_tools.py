@@ -143,6 +143,7 @@ def test_every_way_to_say_a_density_gives_the_mesh():
     assert equidistribute(front, 100, face_density="exact")[50] == pytest.approx(0.88222053, abs=1e-8)
 
 
+@pytest.mark.filterwarnings("ignore:overflow")
 @pytest.mark.parametrize("steep", ["exp(20*x)", lambda x: np.exp(20 * x)])
 def test_every_cell_has_the_same_share_of_a_steep_density(steep):
     """x(ξ) = ln(1 + ξ(e²⁰ − 1))/20; the trapezoid is off by 0.09 in the first cells."""
@@ -253,7 +254,7 @@ def test_a_density_is_called_in_the_thread_that_asked():
         seen.add(threading.get_ident())
         return 1 + x
 
-    schwarz(density, 40, subdomains=4, overlap_cells=2, iterations=2)
+    schwarz(density, 38, subdomains=4, overlap_cells=2, iterations=2)
     with ThreadPoolExecutor(1) as threads:
         other = threads.submit(lambda: (equidistribute(density, 10), threading.get_ident())[1]).result()
     assert seen == {threading.get_ident(), other}
