@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import json
+import re
 import sys
 import warnings
 import xml.etree.ElementTree as ElementTree
@@ -251,6 +252,9 @@ def run(
         given = Path(study), "", ""
     if not isinstance(set, Mapping | None):
         raise TypeError(f"`set` is {set!r}, but must be a dict of dotted keys and values")
+    for key in set or {}:
+        if not isinstance(key, str) or not re.fullmatch(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*", key):
+            raise ValueError(f"`set` has the key {key!r}, but must have dotted ones such as 'time.step'")
     assignments = [f"{name}={_toml.value(value)}" for name, value in (set or {}).items()]
     name = _driftmesh.check(*given, assignments)
     directory = Path("out") / name if out is None else Path(out)

@@ -54,8 +54,15 @@ fn read(path: Option<PathBuf>, origin: &str, text: &str, set: &[String]) -> Resu
         Some(path) => Source::read(&path)?,
         None => Source::new(origin, text),
     };
-    set.iter().try_for_each(|assignment| source.set(assignment))?;
-    Study::from_source(&source)
+    let study = set.iter().try_for_each(|assignment| source.set(assignment)).and_then(|()| Study::from_source(&source));
+    study.map_err(|error| match error {
+        // not an option here, but an argument
+        Error::Study(mut mistake) if mistake.origin == "--set" => {
+            mistake.origin = "set".into();
+            Error::Study(mistake)
+        }
+        error => error,
+    })
 }
 
 /// The name of a study that has no mistake.

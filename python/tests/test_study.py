@@ -151,7 +151,7 @@ def test_mistakes_read_as_those_of_the_program(text, settings, tmp_path):
         driftmesh.run(path, set=settings)
     command = [PROGRAM, "check", path] + [part for k, v in settings.items() for part in ("--set", f"{k}={v}")]
     said = subprocess.run(command, capture_output=True, text=True).stderr
-    assert f"error: {error.value}\n" == said and "^" in said
+    assert f"error: {error.value}\n" == said.replace("--> --set:", "--> set:") and "^" in said
     assert isinstance(error.value, ValueError) and not Path("out/wrong").exists()
 
 
@@ -160,6 +160,9 @@ def test_studies_as_dicts_show_their_mistakes():
         driftmesh.run(STUDY | {"grid": {"cels": [16, 12]}})
     with pytest.raises(StudyError, match="unknown name `movie`|movie"):
         driftmesh.run({"study": {"name": "a", "kind": "movie"}})
+    for key in ("", "a b", "a=b", "monitor.", 3):
+        with pytest.raises(ValueError, match="`set` has the key"):
+            driftmesh.run(STUDY, set={key: 1})
     with pytest.raises(TypeError, match="no object"):
         driftmesh.run(STUDY | {"grid": {"cells": object()}})
 
