@@ -69,6 +69,7 @@ def test_compact25_solves_with_fourth_order():
         (lambda x, y: laplacian_stencils(1e300 * x, y), ValueError, "scale the mesh"),
         (lambda x, y: laplacian_stencils(x[::-1], y[::-1]), ValueError, "mirrored.*indexing"),
         (lambda x, y: laplacian_stencils(*np.meshgrid(np.arange(5.0), np.arange(4.0))), ValueError, "mirrored.*indexing"),
+        (lambda x, y: laplacian_stencils(*np.mgrid[:9, :9], "compact25", source=True, periodic=(True, False)), ValueError, "bounded axes"),
         (lambda x, y: laplacian_stencils(x, y, kind=None), ValueError, "`kind` is None"),
         (lambda x, y: laplacian_stencils(x, y, periodic=(True, False)), ValueError, "axis 0 is periodic"),
         (lambda x, y: laplacian_stencils(1e-155 * x, 1e-155 * y), ValueError, "scale the mesh"),
