@@ -311,7 +311,6 @@ impl Failure {
             self,
             Self::Folded { .. }
                 | Self::NonFinite { .. }
-                | Self::Formula { .. }
                 | Self::NotPositive { .. }
                 | Self::NewtonStalled { .. }
                 | Self::LinearStalled { .. }

@@ -286,7 +286,14 @@ fn what_a_directory_holds_is_told() {
     let [was, is] = ["0.001", "0.0005"].map(String::from);
     assert_eq!(refused[0].1, Unfit::Study { key: "time.step".into(), was, is });
     // a failure of the numbers would only come again
-    let folding = ["monitor.strength.relative=3000", "monitor.smoothing=0", "grid.cells=[40,40]"];
+    let folding = [
+        "monitor.strength.relative=3000",
+        "monitor.smoothing=0",
+        "grid.cells=[40,40]",
+        "safety.substeps=0",
+        "safety.smoothing=0",
+        "safety.halvings=0",
+    ];
     let folding = study("burgers-b-conservative", &[&SHORT[..], &folding].concat());
     assert!(matches!(folding.run(out.path(), Begin::Anew, &mut []), Ok(Some(Error::Failed { .. }))));
     assert_eq!(folding.standing(out.path()).unwrap(), Standing::Nothing);

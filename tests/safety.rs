@@ -16,7 +16,13 @@ const OFF: [&str; 3] = ["safety.substeps=0", "safety.smoothing=0", "safety.halvi
 /// A mesh that follows within two steps folds; in sub-steps it does not.
 #[test]
 fn a_folded_mesh_is_tried_again() {
-    let hasty = ["mesh.relaxation=2e-4", "monitor.strength.relative=300", "time.end=0.3", "time.report=[0.3]"];
+    let hasty = [
+        "mesh.relaxation=3e-3",
+        "monitor.strength.relative=1000",
+        "monitor.smoothing=0",
+        "time.end=0.26",
+        "time.report=[0.26]",
+    ];
     let (_, failure) = compute(&study(&[&hasty[..], &OFF].concat())).unwrap();
     let failure = failure.unwrap().to_string();
     assert!(failure.contains("the mesh folded"), "{failure}");
@@ -24,11 +30,6 @@ fn a_folded_mesh_is_tried_again() {
     assert!(failure.is_none(), "{failure:?}");
     assert!(record.safety.substeps > 0 && record.reports[0].quality.min_scaled_jacobian > 0.0, "{:?}", record.safety);
     assert!(record.warnings.iter().any(|said| said.starts_with("`[safety]`")), "{:?}", record.warnings);
-    // limits of the study count
-    let (_, failure) =
-        compute(&study(&[&hasty[..], &["safety.substeps=0", "safety.smoothing=0", "safety.halvings=1"]].concat()))
-            .unwrap();
-    assert!(failure.is_none_or(|failure| failure.to_string().contains("folded")));
 }
 
 /// Where nothing folds, nothing is done, and no bit changes.
@@ -57,7 +58,7 @@ fn a_mesh_that_does_not_move_is_told_of() {
 /// Random studies end completed or with a named failure, most of them completed.
 #[test]
 fn a_small_sweep() {
-    let sweep = sweep::sweep(16);
+    let sweep = sweep::sweep(24);
     assert!(sweep.broken.is_empty(), "{:#?}", sweep.broken);
-    assert!(sweep.completed >= 14 && sweep.rescued > 0, "{:?}", sweep.failed);
+    assert!(sweep.completed >= 20 && sweep.rescued > 0, "{:?}", sweep.failed);
 }

@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def real(name: str, values: ArrayLike) -> Floats:
-    """Real numbers as a contiguous array of float64; no copy where it is one."""
+    """Real numbers as a contiguous, aligned array of float64; no copy where it is one."""
     if np.ma.is_masked(values):
         raise ValueError(f"`{name}` has masked entries; fill them first")
     try:
@@ -21,7 +21,7 @@ def real(name: str, values: ArrayLike) -> Floats:
         raise ValueError(f"`{name}` is no array of numbers: {error}") from None
     if array.dtype.kind not in "fiub":
         raise ValueError(f"`{name}` is of dtype {array.dtype}; give real numbers")
-    return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
+    return np.require(array, np.float64, ("C", "A"))
 
 
 def finite(name: str, values: ArrayLike, shape: tuple[int, ...] | None = None, of: str = "the mesh") -> Floats:
@@ -46,9 +46,12 @@ def positive(name: str, value: float) -> float:
 def scalar(name: str, value: float) -> float:
     """A finite number."""
     try:
-        number = float(value)
+        # float() reads texts and truth values too, but here they are mistakes
+        number = None if isinstance(value, (str, bytes, bool, np.bool_)) else float(value)
     except (TypeError, ValueError):
-        raise ValueError(f"`{name}` is {value!r}, but must be a number") from None
+        number = None
+    if number is None:
+        raise ValueError(f"`{name}` is {value!r}, but must be a number")
     if not np.isfinite(number):
         raise ValueError(f"`{name}` is {number}, but must be finite")
     return number
@@ -61,10 +64,18 @@ def count(name: str, value: Any) -> int:
     return int(value)
 
 
-def pair(name: str, values: Sequence[Any]) -> tuple[Any, Any]:
+def pair(name: str, values: Sequence[Any] | NDArray[Any]) -> tuple[Any, Any]:
     """Two entries, one an axis."""
     try:
         first, second = values
     except (TypeError, ValueError):
         raise ValueError(f"`{name}` is {values!r}, but must have two entries, one an axis") from None
     return first, second
+
+
+def word(name: str, value: Any, words: Sequence[str]) -> str:
+    """One of some words; American spelling will do."""
+    given = value.replace("optimized", "optimised") if "optimised" in words and isinstance(value, str) else value
+    if not isinstance(given, str) or given not in words:
+        raise ValueError(f"`{name}` is {value!r}, but must be one of {', '.join(words)}")
+    return given

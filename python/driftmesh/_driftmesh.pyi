@@ -32,8 +32,7 @@ def quality(mesh: _Mesh, density: _Floats) -> tuple[float, float, float, float]:
 def areas(mesh: _Mesh) -> _Floats: ...
 def transfer(values: _Floats, old: _Mesh, new: _Mesh, conservative: bool) -> _Floats: ...
 def stencils(
-    x: _Floats,
-    y: _Floats,
+    mesh: _Mesh,
     kind: str,
     polynomials: str | None,
     scaling: str | None,

@@ -48,6 +48,16 @@ class MeshError(ArithmeticError):
     result: Any = None
 
 
+class RunWarning(RuntimeWarning):
+    """What a study warns of, when its run has ended.
+
+    Attributes:
+        result: The :class:`driftmesh.Run`, for those who turn warnings into errors.
+    """
+
+    result: Any = None
+
+
 class MeshFolded(MeshError):
     """A mesh cell has a corner whose Jacobian is not positive."""
 

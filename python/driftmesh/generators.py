@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from types import NoneType
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _driftmesh, _toml
 from ._arrays import finite, positive
@@ -232,13 +233,19 @@ class Stochastic(_Kind):
     seed: int = 0
     interface: Interpolation | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.estimator, (ResidualWalk, GridWalk, MonteCarlo)):
+            raise ValueError(f"`estimator` is {self.estimator!r}, but must be ResidualWalk(…), GridWalk(…) or MonteCarlo(…)")
+        if not isinstance(self.interface, (Interpolation, NoneType)):
+            raise ValueError(f"`interface` is {self.interface!r}, but must be Interpolation(…) or None")
+
     def _table(self) -> dict[str, Any]:
         sample = None if self.interface is None else vars(self.interface)
         return super()._table() | {"interface": sample}
 
 
 #: Where a mesh should be fine: a monitor of u, the density itself, or a function of mesh and u that gives it.
-Monitor: TypeAlias = "Arclength | RootGradient | Given | NDArray[Any] | Callable[[Mesh, Any], ArrayLike]"
+Monitor: TypeAlias = "Arclength | RootGradient | Given | ArrayLike | Callable[[Mesh, Any], ArrayLike]"
 
 
 class MeshGenerator:
@@ -306,6 +313,8 @@ class MeshGenerator:
         Raises:
             ValueError: Wrong shapes or values.
             driftmesh.MeshError: The mesh is or would be folded, a system was not solved.
+            RuntimeError: The generator is still at work: in another thread, or on a step that Ctrl-C gave up.
+            KeyboardInterrupt: Ctrl-C. The step is given up: it ends in the background, and what it finds is thrown away.
 
         >>> from driftmesh import Mesh, MeshGenerator
         >>> mesh = Mesh.uniform(cells=(8, 8))

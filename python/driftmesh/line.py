@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _driftmesh, _toml
-from ._arrays import Floats, count, finite, pair, real, scalar
+from ._arrays import Floats, count, finite, pair, real, scalar, word
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ def equidistribute(
     cells: int,
     *,
     domain: Sequence[float] = (0.0, 1.0),
-    face_density: Faces | None = None,
+    face_density: Faces = "exact",
 ) -> Floats:
     """The mesh on which every cell has the same share of ∫M.
 
@@ -36,8 +36,8 @@ def equidistribute(
             (places, values), both taken as piecewise linear.
         cells: Number of cells, at least 2.
         domain: Ends of the line, in the unit of length.
-        face_density: How M is averaged over a cell: ``"trapezoid"``, ``"midpoint"`` or ``"exact"`` (∫M). Where nothing is
-            said, the exact integral for arrays, which may be rough from cell to cell, and the trapezoid else.
+        face_density: How M is averaged over a cell: ``"exact"`` (∫M), or from few values by ``"trapezoid"`` or
+            ``"midpoint"``, as studies do: faster for functions, and near where M varies little over a cell.
 
     Returns:
         The nodes, shape (cells + 1,), in order from end to end.
@@ -53,12 +53,13 @@ def equidistribute(
     0.5961
     """
     ends = _ends(domain)
-    given, faces = _density(density, ends, face_density)
+    given = _density(density, ends)
+    faces = word("face_density", face_density, get_args(Faces))
     settings = _toml.document({"equidistribution": {"face_density": faces}})
     return _driftmesh.equidistribute(given, _cells(cells), ends, settings)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class SchwarzResult:
     """How a Schwarz iteration went; entry n of every history belongs to iterate n, entry 0 to the start.
 
@@ -96,6 +97,10 @@ class SchwarzResult:
         """Iterations done."""
         return len(self.error) - 1
 
+    def __repr__(self) -> str:
+        rate = "" if self.observed is None else f", observed={self.observed:.4g}"
+        return f"<SchwarzResult of {len(self.mesh) - 1} cells, iterations={self.iterations}, error={self.error[-1]:.1e}{rate}>"
+
     def plot(self, ax: Axes | None = None, **line: Any) -> Axes:
         """Draws the error over the iterations; needs matplotlib. ``line`` goes to ``Axes.semilogy``."""
         from . import plot
@@ -107,11 +112,11 @@ def schwarz(
     density: Density,
     cells: int,
     *,
-    method: Literal["classical", "optimal", "optimized"] = "classical",
-    overlap: Sequence[float] | None = None,
-    intervals: Sequence[Sequence[float]] | None = None,
+    method: Literal["classical", "optimal", "optimized", "optimised"] = "classical",
+    overlap: Sequence[float] | NDArray[Any] | None = None,
+    intervals: Sequence[Sequence[float]] | NDArray[Any] | None = None,
     cut: float | None = None,
-    cuts: Sequence[float] | None = None,
+    cuts: Sequence[float] | NDArray[Any] | None = None,
     subdomains: int | None = None,
     overlap_cells: int | None = None,
     sweep: Literal["parallel", "alternating"] | None = None,
@@ -149,7 +154,8 @@ def schwarz(
         measure: ``"error"`` against the discrete mesh of the whole line, or ``"increment"``.
         start: The first mesh, shape (cells + 1,), or a function of ξ from 0 to 1 that gives it; equal cells by default.
         domain: Ends of the line.
-        face_density: As for :func:`equidistribute`.
+        face_density: As for :func:`equidistribute`; where nothing is said, the exact integral for arrays, which may be rough
+            from cell to cell, and the trapezoid of the published method else.
 
     Raises:
         ValueError: Wrong shapes or values, subdomains that do not fit.
@@ -163,7 +169,7 @@ def schwarz(
     ends = _ends(domain)
     n = _cells(cells)
     table = {
-        "method": method,
+        "method": word("method", method, ("classical", "optimal", "optimised")).replace("optimised", "optimized"),
         "overlap": overlap,
         "intervals": intervals,
         "cut": cut,
@@ -177,7 +183,9 @@ def schwarz(
         "integral": integral,
     }
     stop = {"iterations": iterations, "tolerance": tolerance, "measure": measure}
-    given, faces = _density(density, ends, face_density)
+    given = _density(density, ends)
+    rough = not callable(density) and not isinstance(density, (str, Mapping))
+    faces = word("face_density", face_density or ("exact" if rough else "trapezoid"), get_args(Faces))
     settings = _toml.document({"equidistribution": {"face_density": faces}, "schwarz": table, "stop": stop})
     columns, meshes, rates, missed = _driftmesh.schwarz(given, n, ends, settings, _start(start, n, ends))
     result = SchwarzResult(*meshes, *columns, *rates)
@@ -214,18 +222,19 @@ def _start(start: Any, cells: int, ends: tuple[float, float]) -> list[float] | N
     return mesh
 
 
-def _density(density: Any, ends: tuple[float, float], faces: Faces | None) -> tuple[Any, Faces]:
-    """A density as the library takes it: a kind and a formula, places and values, or a function; and its mean over a cell."""
+def _density(density: Any, ends: tuple[float, float]) -> Any:
+    """A density as the library takes it: a kind and a formula, places and values, or a function."""
     if isinstance(density, str):
-        return ("formula", density), faces or "trapezoid"
+        return "formula", density
     if isinstance(density, Mapping):
         keys = {"formula": "value", "arclength": "of"}
         kind = density.get("kind", "formula")
-        if set(density) - {"kind"} != {keys.get(kind)}:
+        known = keys.get(kind) if isinstance(kind, str) else None
+        if set(density) - {"kind"} != {known} or not isinstance(density[known], str):
             raise ValueError(f"`density` is {dict(density)}, but must be a table such as {{'kind': 'arclength', 'of': 'x^2'}}")
-        return (kind, density[keys[kind]]), faces or "trapezoid"
+        return kind, density[known]
     if not callable(density):
-        return _sampled(density, ends), faces or "exact"
+        return _sampled(density, ends)
 
     def function(places: Floats) -> Floats:
         values = real("density", density(places))
@@ -233,7 +242,7 @@ def _density(density: Any, ends: tuple[float, float], faces: Faces | None) -> tu
             raise ValueError(f"the density has shape {values.shape}, but was asked for places of shape {places.shape}")
         return np.ascontiguousarray(np.broadcast_to(values, places.shape))
 
-    return function, faces or "trapezoid"
+    return function
 
 
 def _sampled(density: Any, ends: tuple[float, float]) -> tuple[list[float], list[float]]:

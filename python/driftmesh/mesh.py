@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _driftmesh
 from ._arrays import Floats, count, finite, pair, scalar
@@ -46,12 +46,15 @@ class Mesh:
     Args:
         x: Positions of the nodes, shape (nx + 1, ny + 1), nx and ny at least 2, first index along ξ.
         y: The same.
-        lower: Lower corner of the box; of the smallest box around the nodes where nothing is said.
-        upper: Upper corner.
+        lower: Lower corner of the box; of the smallest box around the nodes where nothing is said. Where the first nodes of a
+            periodic axis have moved, the nodes do not tell: give it.
+        upper: Upper corner; where nothing is said, of a periodic axis as far from the lower one as its last nodes are from
+            the first.
         periodic: Which axes wrap around. The last node of such an axis is the first one, a box further.
 
     Raises:
-        ValueError: Shapes that differ, values that are not finite, a box without extent, closing nodes that are none.
+        ValueError: Shapes that differ, values that are not finite, a box without extent, closing nodes that are none, a mesh
+            whose second index goes along x.
 
     A mesh does not change; :meth:`moved` gives another one. It may be folded: :meth:`quality` tells, and whatever needs a
     valid mesh raises :class:`driftmesh.errors.MeshFolded`.
@@ -84,13 +87,14 @@ class Mesh:
         second = finite("y", y, first.shape, "`x`")
         wraps = _flags(periodic)
         nodes = np.stack([first, second], axis=-1)
-        lowest, highest = nodes.min(axis=(0, 1)), nodes.max(axis=(0, 1))
+        low = tuple(nodes.min(axis=(0, 1)).tolist()) if lower is None else _corner("lower", lower)
+        high = tuple(nodes.max(axis=(0, 1)).tolist()) if upper is None else _corner("upper", upper)
         for axis in range(2):
             if wraps[axis]:
                 start, end = np.take(nodes, 0, axis)[:, axis], np.take(nodes, -1, axis)[:, axis]
-                lowest[axis], highest[axis] = start.min(), start.min() + (end - start).mean()
-        low = tuple(lowest.tolist()) if lower is None else _corner("lower", lower)
-        high = tuple(highest.tolist()) if upper is None else _corner("upper", upper)
+                low = _with(low, axis, float(start.min())) if lower is None else low
+                high = _with(high, axis, low[axis] + float((end - start).mean())) if upper is None else high
+        _refuse_mirrored(nodes)
         _close(nodes, low, high, wraps)
         # the checks of the library: a box with an extent
         _driftmesh.uniform((nodes.shape[0] - 1, nodes.shape[1] - 1), low, high, wraps)
@@ -116,7 +120,7 @@ class Mesh:
     @classmethod
     def uniform(
         cls,
-        cells: Sequence[int],
+        cells: Sequence[int] | NDArray[np.integer[Any]],
         lower: Sequence[float] = (0.0, 0.0),
         upper: Sequence[float] = (1.0, 1.0),
         periodic: Sequence[bool] = (False, False),
@@ -335,14 +339,18 @@ def transfer(
         old: The mesh that u is on.
         new: The mesh that it is wanted on.
         method: ``"conservative"`` keeps ``(u * mesh.areas).sum()`` to round-off and leaves the range of u nowhere, by fluxes
-            through faces that move, of second order where u is smooth. ``"interpolate"`` takes u linear on two triangles a
-            cell: exact for linear u, and the better choice where u is no density.
+            through faces that move. Where u is smooth it is of second order in the mean, of first at sides and extrema, and
+            therefore in the maximum; linear u is not kept. It goes in steps of at most half a cell: as fast as a step of a
+            mesh between neighbouring times, slow where the meshes are far apart. ``"interpolate"`` takes u linear on two
+            triangles a cell: fast over any distance, of second order everywhere, exact for linear u, but it keeps no
+            integral.
 
     Returns:
         The values on the new mesh, shape as u.
 
     Raises:
-        ValueError: Shapes or boxes that differ, values that are not finite.
+        ValueError: Shapes or boxes that differ, values that are not finite; for ``"conservative"``, sides that differ other
+            than by nodes that slide along straight ones.
         driftmesh.errors.MeshFolded: A mesh is folded, or one on the straight way between both.
 
     >>> from driftmesh import Mesh, transfer
@@ -352,12 +360,17 @@ def transfer(
     >>> abs((u * new.areas).sum() - (old.x * old.areas).sum()) < 1e-14
     np.True_
     """
+    for name, mesh in (("old", old), ("new", new)):
+        if not isinstance(mesh, Mesh):
+            raise TypeError(f"`{name}` is of type {type(mesh).__name__}, but must be a driftmesh.Mesh")
     if old.shape != new.shape:
         raise ValueError(f"`old` has shape {old.shape}, but `new` has shape {new.shape}; both need the same lattice")
     if old._given()[1:] != new._given()[1:]:
         raise ValueError(f"`old` and `new` lie in different boxes: {old!r} and {new!r}")
     if method not in ("conservative", "interpolate"):
         raise ValueError(f'`method` is {method!r}, but must be "conservative" or "interpolate"')
+    if method == "conservative":
+        _refuse_moved_sides(old, new)
     values = finite("u", u)
     if values.shape[:2] != old.shape or values.ndim not in (2, 3):
         raise ValueError(f"`u` has shape {values.shape}, but the mesh has shape {old.shape}")
@@ -397,6 +410,36 @@ def _close(nodes: Floats, lower: tuple[float, ...], upper: tuple[float, ...], pe
             nodes[last] = image
 
 
+def _refuse_mirrored(nodes: Floats) -> None:
+    """Refuses a mesh all of whose cells are clockwise: its indices are the wrong way round."""
+    along, across = nodes[1:, 1:] - nodes[:-1, :-1], nodes[:-1, 1:] - nodes[1:, :-1]
+    if (along[..., 0] * across[..., 1] < along[..., 1] * across[..., 0]).all():
+        raise ValueError(
+            "the mesh is mirrored: its first index must go along x, its second one along y, shape (nx + 1, ny + 1), as of "
+            'np.meshgrid(x, y, indexing="ij")'
+        )
+
+
+def _refuse_moved_sides(old: Mesh, new: Mesh) -> None:
+    """Refuses meshes whose sides enclose something else: there is no value for what a side sweeps."""
+    size = (old.upper[0] - old.lower[0]) * (old.upper[1] - old.lower[1])
+    for axis in range(2):
+        for end in (0, -1):
+            before, after = np.take(old._nodes, end, axis), np.take(new._nodes, end, axis)
+            # of the quadrilateral between a segment before and after, twice the area by its diagonals
+            one, other = after[1:] - before[:-1], after[:-1] - before[1:]
+            swept = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
+            if not old.periodic[axis] and swept.max() > _ROUNDING * size:
+                raise ValueError(
+                    f"the {'last' if end else 'first'} side of axis {axis} differs between `old` and `new`, so that no integral can "
+                    'be kept; use method="interpolate"'
+                )
+
+
+def _with(corner: tuple[Any, ...], axis: int, value: float) -> tuple[Any, ...]:
+    return (value, corner[1]) if axis == 0 else (corner[0], value)
+
+
 def _corner(name: str, values: Sequence[float]) -> tuple[float, float]:
     first, second = pair(name, values)
     return scalar(name, first), scalar(name, second)
@@ -404,6 +447,9 @@ def _corner(name: str, values: Sequence[float]) -> tuple[float, float]:
 
 def _flags(values: Sequence[bool]) -> tuple[bool, bool]:
     first, second = pair("periodic", values)
+    for value in (first, second):
+        if isinstance(value, str) or value not in (False, True):
+            raise ValueError(f"`periodic` is {values!r}, but must be two truth values, one an axis")
     return bool(first), bool(second)
 
 

@@ -41,6 +41,7 @@ def convergence(error: Floats, ax: Axes | None, **line: Any) -> Axes:
 
 def run(of: Run, path: str | PathLike[str] | None, ax: Axes | None) -> Axes:
     """The last state of a run, by what there is of it."""
+    own = ax is None
     ax = _axes(ax)
     iterates = of.summary.get("iterations")
     x, y = of.final.get("x"), of.final.get("y")
@@ -61,6 +62,8 @@ def run(of: Run, path: str | PathLike[str] | None, ax: Axes | None) -> Axes:
         raise ValueError(f"{of.directory} has no state to draw: the run is {of.status}")
     if path is not None:
         _figure(ax).savefig(fspath(path), dpi=150)
+        if own:
+            plt.close(_figure(ax))
     return ax
 
 

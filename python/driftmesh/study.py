@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import json
+import re
 import sys
 import warnings
 import xml.etree.ElementTree as ElementTree
@@ -19,9 +20,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 from . import _driftmesh, _toml
 from ._arrays import Floats
-from .errors import MeshError
+from .errors import MeshError, RunWarning
 from .mesh import Mesh
 
 if TYPE_CHECKING:
@@ -38,15 +44,26 @@ class Frame:
         path: The ``.vtu`` file, which ParaView, PyVista and meshio open too.
         shape: (nx + 1, ny + 1).
 
+    Raises:
+        RuntimeError: The file is gone or another one since the run was opened.
+
     See :class:`Run` for an example.
     """
 
     t: float
     path: Path
     shape: tuple[int, int]
+    _domain: dict[str, Any] = field(repr=False)
+    _stamp: tuple[int, int] | None = field(repr=False)
 
     @cached_property
     def _arrays(self) -> dict[str, Floats]:
+        if self._stamp is None or _stamp(self.path) != self._stamp:
+            what = "has been replaced" if self.path.exists() else "is gone"
+            raise RuntimeError(
+                f"{self.path} {what} since this run was opened, by another run into the same directory perhaps; give each run "
+                "a directory of its own with `out`"
+            )
         root = ElementTree.parse(self.path).getroot()
         arrays = {}
         for element in root.iterfind(".//Points/DataArray"):
@@ -71,7 +88,7 @@ class Frame:
     @property
     def mesh(self) -> Mesh:
         """The mesh, closing nodes of periodic axes included."""
-        return Mesh(self.x, self.y)
+        return Mesh(self.x, self.y, **self._domain)
 
     @property
     def names(self) -> list[str]:
@@ -85,7 +102,7 @@ class Frame:
         return self._arrays[name]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """What a run left behind.
 
@@ -95,7 +112,7 @@ class Run:
         history: Columns of ``history.csv`` by name, one entry a step (NaN where there is no number); empty for kinds
             without time.
         final: Arrays of ``final.npz`` by name: the last mesh and the unknowns on it.
-        frames: States over time.
+        frames: States over time, read from the directory when they are looked at: another run into it, and they are gone.
 
     >>> import tempfile
     >>> from driftmesh import run
@@ -122,7 +139,8 @@ class Run:
     summary: dict[str, Any]
     history: dict[str, Floats]
     final: dict[str, Floats]
-    frames: list[Frame] = field(repr=False)
+    frames: list[Frame]
+    _domain: dict[str, Any]
 
     @property
     def status(self) -> str:
@@ -132,7 +150,12 @@ class Run:
     @property
     def mesh(self) -> Mesh:
         """The last mesh, of kinds in two dimensions."""
-        return Mesh(self.final["x"], self.final["y"])
+        return Mesh(self.final["x"], self.final["y"], **self._domain)
+
+    def __repr__(self) -> str:
+        steps = self.summary.get("work", {}).get("steps")
+        done = "" if steps is None else f" after {steps} steps"
+        return f"<Run {self.summary['study']!r}, {self.status}{done}, in {self.directory}>"
 
     def plot(self, path: str | PathLike[str] | None = None, ax: Axes | None = None) -> Axes:
         """Draws the last state: the mesh over its first unknown, or the convergence of a Schwarz iteration. Needs matplotlib.
@@ -179,7 +202,8 @@ def load(directory: str | PathLike[str]) -> Run:
     if (path / "final.npz").is_file():
         with np.load(path / "final.npz") as arrays:
             final = {name: arrays[name] for name in arrays.files}
-    return Run(path, json.loads(summary.read_text("utf-8")), _table(path / "history.csv"), final, _frames(path, final))
+    told, domain = json.loads(summary.read_text("utf-8")), _domain(path)
+    return Run(path, told, _table(path / "history.csv"), final, _frames(path, final, domain), domain)
 
 
 def run(
@@ -194,7 +218,7 @@ def run(
     Args:
         study: A study file, or the same as a dict of tables.
         out: Directory for the results; ``out/<study name>`` where nothing is said. One that a run of ours wrote is
-            replaced, any other that is not empty is refused.
+            replaced, with the frames of its result; any other that is not empty is refused. Give each run of a series its own.
         set: Settings on top: dotted keys and values, such as ``{"time.step": 5e-4}``.
         progress: Shows a bar, in terminals and notebooks.
         resume: Goes on from the newest checkpoint in the directory, to the very bits of a run that nothing disturbed. Where
@@ -205,7 +229,10 @@ def run(
         driftmesh.MeshError: The computation failed; ``result`` and ``directory`` have everything up to the last good state.
         OSError: What cannot be read or written; :class:`FileExistsError` for a directory with something else in it.
         KeyboardInterrupt: Ctrl-C, which ends the run with its step and leaves the last good state in the run directory,
-            with a checkpoint for ``resume``.
+            with a checkpoint for ``resume``. What cannot be stopped half-way goes on until it is done or the program ends.
+
+    Warns:
+        driftmesh.errors.RunWarning: What is allowed but probably not meant; its ``result`` is the run.
 
     >>> import tempfile
     >>> from driftmesh import run
@@ -228,36 +255,44 @@ def run(
         given = Path(study), "", ""
     if not isinstance(set, Mapping | None):
         raise TypeError(f"`set` is {set!r}, but must be a dict of dotted keys and values")
+    for key in set or {}:
+        if not isinstance(key, str) or not re.fullmatch(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*", key):
+            raise ValueError(f"`set` has the key {key!r}, but must have dotted ones such as 'time.step'")
     assignments = [f"{name}={_toml.value(value)}" for name, value in (set or {}).items()]
     name = _driftmesh.check(*given, assignments)
     directory = Path("out") / name if out is None else Path(out)
     if not resume and any(directory.glob("checkpoint.[01]")):
         left = f"{directory} holds an unfinished run, which this one replaces; with resume=True it would go on"
         warnings.warn(left, RuntimeWarning, stacklevel=2)
+    # an exception leaves the bar where it is
     with _bar(name, progress) as told:
         try:
             error, ended = _driftmesh.run(*given, assignments, directory, resume, told)
         except MeshError as failure:
             error, ended = failure, True
-    if isinstance(error, MeshError):
-        error.directory = directory
-        if (directory / "summary.json").is_file():
-            error.result = load(directory)
-        raise error
-    if error is not None:
-        if not isinstance(error, KeyboardInterrupt):
+        if isinstance(error, MeshError):
+            error.directory = directory
+            if (directory / "summary.json").is_file():
+                error.result = load(directory)
+        if isinstance(error, KeyboardInterrupt):
+            raise KeyboardInterrupt(_interrupted(directory, ended)) from None
+        if error is not None:
             raise error
-        raise KeyboardInterrupt(_interrupted(directory, ended)) from None
     result = load(directory)
-    for warning in result.summary.get("warnings", ()):
-        warnings.warn(warning, RuntimeWarning, stacklevel=2)
+    for text in result.summary.get("warnings", ()):
+        warning = RunWarning(text)
+        warning.result = result
+        warnings.warn(warning, stacklevel=2)
     return result
 
 
 def _interrupted(directory: Path, ended: bool) -> str:
     """What a run that was told to stop leaves."""
     if not ended:
-        return f"what is being computed goes on in the background and is left in {directory} when it ends"
+        return (
+            f"what is being computed cannot be stopped: it goes on in the background until it is left in {directory}, or this "
+            "program ends"
+        )
     summary = json.loads((directory / "summary.json").read_text("utf-8"))
     if summary["status"] == "interrupted":
         message = summary["error"]["message"]
@@ -309,14 +344,31 @@ def _table(path: Path) -> dict[str, Floats]:
     return {name: np.ascontiguousarray(column) for name, column in zip(names, columns, strict=True)}
 
 
-def _frames(directory: Path, final: Mapping[str, Floats]) -> list[Frame]:
+def _stamp(path: Path) -> tuple[int, int] | None:
+    """What tells a file from one that replaced it; nothing where there is none."""
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
+def _domain(directory: Path) -> dict[str, Any]:
+    """The box of a run and the axes that wrap around, where its study says them."""
+    study = directory / "study.toml"
+    domain = tomllib.loads(study.read_text("utf-8")).get("domain", {}) if study.is_file() else {}
+    return {key: domain[key] for key in ("lower", "upper", "periodic")} if "periodic" in domain else {}
+
+
+def _frames(directory: Path, final: Mapping[str, Floats], domain: dict[str, Any]) -> list[Frame]:
     index = directory / "run.pvd"
     x = final.get("x")
     if not index.is_file() or x is None or x.ndim != 2:
         return []
     entries: Sequence[ElementTree.Element] = ElementTree.parse(index).getroot().findall(".//DataSet")
     shape = (x.shape[0], x.shape[1])
-    return [Frame(float(entry.attrib["timestep"]), directory / entry.attrib["file"], shape) for entry in entries]
+    files = [(float(entry.attrib["timestep"]), directory / entry.attrib["file"]) for entry in entries]
+    return [Frame(t, path, shape, domain, _stamp(path)) for t, path in files]
 
 
 def _decoded(element: ElementTree.Element) -> Floats:

@@ -7,7 +7,7 @@ pub fn raised(py: Python<'_>, error: &Error, help: Option<String>) -> PyErr {
     let help = match error {
         Error::ForeignDirectory { .. } => Some("name another directory with `out`, or empty this one".into()),
         Error::Busy { .. } => Some("wait for it to end, or name another directory with `out`".into()),
-        _ => help.or_else(|| error.help()).map(|help| {
+        _ => help.map(|help| {
             let ours = [("--out", "`out`"), ("leave --resume out", "leave `resume` out")];
             ours.into_iter().fold(help, |help, (theirs, ours)| help.replace(theirs, ours))
         }),
@@ -48,7 +48,42 @@ fn capital(word: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// An error of the library without a study.
+/// An error of the library without a study, with a remedy in the words of the arguments.
 pub fn plain(py: Python<'_>, error: impl Into<Error>) -> PyErr {
-    raised(py, &error.into(), None)
+    let error = error.into();
+    let help = match &error {
+        // what a study has in tables are arguments here
+        Error::Failed { failure: failure @ Failure::NotConverged { .. }, .. } => {
+            let tables = ["equidistribution.", "grid.", "schwarz.", "stop."];
+            Some(tables.iter().fold(failure.help().to_string(), |help, table| help.replace(table, "")))
+        }
+        Error::Failed { failure, .. } => remedy(failure).map(String::from),
+        _ => error.help(),
+    };
+    raised(py, &error, help)
+}
+
+/// The remedy where there is no study; nothing where the message says it all.
+fn remedy(failure: &Failure) -> Option<&'static str> {
+    Some(match failure {
+        Failure::Folded { .. } => {
+            "begin with a mesh without folded cells; where a step folded it, lower `dt` or raise the monitor's `smoothing`"
+        }
+        Failure::LinearStalled { .. } => {
+            "lower `dt`, raise `relaxation`, or set the monitor's `gradient` to \"safe\" where the density is very steep"
+        }
+        Failure::SteepDensity { .. } => "set the monitor's `gradient` to \"safe\", or raise its `smoothing`",
+        Failure::LongWalks { .. } => "raise `relaxation`, lower `dt` or the number of walks, or use Whole()",
+        Failure::NoisyInterface { .. } => "raise the estimator's `walks` or `paths`, or use ResidualWalk()",
+        Failure::SchwarzStalled { .. } => "raise `iterations` or `overlap` of Schwarz(…), or lower `dt`",
+        Failure::LineDensity { .. } => {
+            "mend the density; an optimized Schwarz method asks for it outside the domain too"
+        }
+        Failure::LineStalled { .. } => {
+            "give more cells; where the density jumps or peaks within a cell smooth it, or set `face_density` to \"exact\""
+        }
+        Failure::DegenerateStencil { .. } => "make the cells around it less flat",
+        Failure::Subdomains { .. } => "give every axis between one subdomain and one a cell",
+        _ => return None,
+    })
 }

@@ -3,14 +3,14 @@ use crate::mesh::{Given, nodal, nodes};
 use crate::threads::compute;
 use driftmesh::Failure;
 use driftmesh::density::{Monitor, MonitorKind};
-use driftmesh::geometry::check_unfolded;
-use driftmesh::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde};
+use driftmesh::geometry::{Mesh, check_unfolded};
+use driftmesh::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde, Moved};
 use driftmesh::study::{MeshForm, MeshTable, Source};
 use numpy::{PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::sync::{Mutex, TryLockError};
+use std::sync::{Arc, Mutex, TryLockError};
 
 /// The tables of a study that move a mesh.
 #[derive(Deserialize)]
@@ -32,7 +32,7 @@ struct Told {
 pub struct Generator {
     equation: Mmpde,
     kind: GeneratorKind,
-    parts: Mutex<Parts>,
+    parts: Arc<Mutex<Parts>>,
 }
 
 struct Parts {
@@ -57,7 +57,7 @@ impl Generator {
             monitor: monitor.into_monitor(&[]).map_err(raise)?,
             generator: mesh.generator.clone().into_generator(),
         };
-        Ok(Self { equation, kind: mesh.generator, parts: Mutex::new(parts) })
+        Ok(Self { equation, kind: mesh.generator, parts: Arc::new(Mutex::new(parts)) })
     }
 
     /// The nodes after a step, and what it cost as JSON.
@@ -71,24 +71,33 @@ impl Generator {
         let mesh = mesh.mesh(py)?;
         let u = nodal(&mesh, &u)?;
         self.kind.check(mesh.lattice()).map_err(|error| plain(py, error.within("mesh.generator")))?;
-        let mut parts = self.parts.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => PyRuntimeError::new_err("this generator is at work in another thread; use two"),
-            TryLockError::Poisoned(_) => {
-                PyRuntimeError::new_err("this generator broke in an earlier step; make a new one")
-            }
-        })?;
-        let (parts, equation) = (&mut *parts, self.equation);
+        let (parts, equation) = (self.parts.clone(), self.equation);
         let moved = compute(py, move || {
-            let Parts { monitor, generator } = parts;
-            check_unfolded(&mesh)?;
-            let rho = monitor.density(&mesh, &u, None)?;
-            let moved = generator.step(&equation, &mesh, &rho, dt)?;
-            check_unfolded(&moved.mesh)?;
-            Ok::<_, Failure>(moved)
+            let mut parts = parts.try_lock().map_err(|error| match error {
+                TryLockError::WouldBlock => "this generator is still at work on another step; wait, or use two",
+                TryLockError::Poisoned(_) => "this generator broke in an earlier step; make a new one",
+            })?;
+            let Parts { monitor, generator } = &mut *parts;
+            Ok::<_, &str>(step(&mesh, &u, monitor.as_ref(), generator.as_mut(), &equation, dt))
         })?;
-        let moved = moved.map_err(|failure| plain(py, failure))?;
+        let moved = moved.map_err(PyRuntimeError::new_err)?.map_err(|failure| plain(py, failure))?;
         let told = Told { work: moved.work, interface: moved.interface };
         let told = serde_json::to_string(&told).map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
         Ok((nodes(py, &moved.mesh)?, told))
     }
+}
+
+fn step(
+    mesh: &Mesh<2>,
+    u: &[f64],
+    monitor: &dyn Monitor,
+    generator: &mut dyn MeshGenerator,
+    equation: &Mmpde,
+    dt: f64,
+) -> Result<Moved, Failure> {
+    check_unfolded(mesh)?;
+    let rho = monitor.density(mesh, u, None)?;
+    let moved = generator.step(equation, mesh, &rho, dt)?;
+    check_unfolded(&moved.mesh)?;
+    Ok(moved)
 }

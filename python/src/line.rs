@@ -1,13 +1,12 @@
-use crate::errors::{plain, raised};
-use crate::threads::{BRIEFLY, Ended, interruptible};
+use crate::errors::plain;
+use crate::threads::{BRIEFLY, Caller, Calls, Ended, calls, interruptible};
 use driftmesh::equidistribution::{History, Iterate, Line, LineDensity};
 use driftmesh::study::{Discretization, SchwarzTable, Source, StopTable, check_memory};
 use driftmesh::{Error, Failure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde::Deserialize;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 /// A density as the package hands it over.
 #[derive(FromPyObject)]
@@ -20,83 +19,49 @@ pub enum Density {
     Function(Py<PyAny>),
 }
 
-/// What a density by a Python function shares with the thread that waits for it.
-#[derive(Clone, Default)]
-struct Shared {
-    /// The first exception that it raised.
-    raised: Arc<Mutex<Option<PyErr>>>,
-    stop: Arc<AtomicBool>,
-}
-
 /// Memory for each cell, about.
 const BYTES_PER_CELL: u128 = 1000;
 /// Distance over which the slope of a function is differenced, as a share of the line: Newton's method needs no better.
 const APART: f64 = 1e-6;
 
-impl Shared {
-    fn density(&self, density: Density, [a, b]: [f64; 2]) -> driftmesh::Result<LineDensity> {
-        let function = match density {
-            Density::Text(kind, text) if kind == "arclength" => return LineDensity::arclength(&text),
-            Density::Text(_, text) => return LineDensity::formula(&text),
-            Density::Samples(x, m) => return LineDensity::sampled(x, m),
-            Density::Function(function) => function,
-        };
-        let (shared, apart) = (self.clone(), APART * (b - a));
-        Ok(LineDensity::function(move |_, x| {
-            let n = x.len();
-            // a function need not be defined beyond the line
-            let below = |x: f64| if x >= a { (x - apart).max(a) } else { x - apart };
-            let above = |x: f64| if x <= b { (x + apart).min(b) } else { x + apart };
-            let lower = x.iter().map(|x| below(*x));
-            let places: Vec<f64> = x.iter().copied().chain(lower).chain(x.iter().map(|x| above(*x))).collect();
-            let m = shared.values(&function, &places);
-            (0..n).map(|k| [m[k], (m[2 * n + k] - m[n + k]) / (places[2 * n + k] - places[n + k])]).collect()
-        }))
-    }
+fn line_density(density: Density, [a, b]: [f64; 2], caller: &Caller) -> driftmesh::Result<LineDensity> {
+    let function = match density {
+        Density::Text(kind, text) if kind == "arclength" => return LineDensity::arclength(&text),
+        Density::Text(_, text) => return LineDensity::formula(&text),
+        Density::Samples(x, m) => return LineDensity::sampled(x, m),
+        Density::Function(function) => Arc::new(function),
+    };
+    let (caller, apart) = (caller.clone(), APART * (b - a));
+    Ok(LineDensity::function(move |_, x| {
+        let n = x.len();
+        // a function need not be defined beyond the line
+        let below = |x: f64| if x >= a { (x - apart).max(a) } else { x - apart };
+        let above = |x: f64| if x <= b { (x + apart).min(b) } else { x + apart };
+        let lower = x.iter().map(|x| below(*x));
+        let places: Vec<f64> = x.iter().copied().chain(lower).chain(x.iter().map(|x| above(*x))).collect();
+        let Some(m) = values(&caller, &function, &places) else { return vec![[f64::NAN; 2]; n] };
+        (0..n).map(|k| [m[k], (m[2 * n + k] - m[n + k]) / (places[2 * n + k] - places[n + k])]).collect()
+    }))
+}
 
-    /// M at some places; no numbers where the function raised.
-    fn values(&self, function: &Py<PyAny>, places: &[f64]) -> Vec<f64> {
-        let none = || vec![f64::NAN; places.len()];
-        if self.raised().is_some() || self.stop.load(Ordering::Relaxed) {
-            return none();
-        }
-        let called = Python::attach(|py| {
-            let values = function.call1(py, (PyArray1::from_slice(py, places),))?;
-            Ok(values.extract::<PyReadonlyArray1<'_, f64>>(py)?.as_array().to_vec())
-        });
-        called.unwrap_or_else(|error: PyErr| {
-            self.raised().get_or_insert(error);
-            none()
-        })
-    }
+/// M at some places; nothing where the function raised.
+fn values(caller: &Caller, function: &Arc<Py<PyAny>>, places: &[f64]) -> Option<Vec<f64>> {
+    let (function, places) = (function.clone(), places.to_vec());
+    caller.call(move |py| {
+        let values = function.call1(py, (places.into_pyarray(py),))?;
+        Ok(values.extract::<PyReadonlyArray1<'_, f64>>(py)?.as_array().to_vec())
+    })
+}
 
-    fn raised(&self) -> MutexGuard<'_, Option<PyErr>> {
-        self.raised.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Computes with a density, interruptible; what its function raised comes before what followed from it.
-    fn compute<T: Send + 'static>(
-        &self,
-        py: Python<'_>,
-        f: impl FnOnce() -> driftmesh::Result<T> + Send + 'static,
-    ) -> PyResult<T> {
-        let stop = || {
-            self.stop.store(true, Ordering::Relaxed);
-            BRIEFLY
-        };
-        let ended = interruptible(py, f, stop, |_| Ok(()))?;
-        if let Some(error) = self.raised().take() {
-            return Err(error);
-        }
-        match ended {
-            Ended::Itself(result) => result.map_err(|error| match &error {
-                Error::Failed { failure: Failure::LineStalled { .. }, .. } => {
-                    raised(py, &error, Some("set face_density to \"exact\": rough densities need it".into()))
-                }
-                _ => plain(py, error),
-            }),
-            Ended::Stopped(error, _) => Err(error),
-        }
+/// Computes with a density, interruptible; what its function raised comes before what followed from it.
+fn compute<T: Send + 'static>(
+    py: Python<'_>,
+    calls: (Caller, Calls),
+    f: impl FnOnce() -> driftmesh::Result<T> + Send + 'static,
+) -> PyResult<T> {
+    match interruptible(py, calls, f, || BRIEFLY, |_| Ok(()))? {
+        Ended::Itself(result) => result.map_err(|error| plain(py, error)),
+        Ended::Stopped(error, _) => Err(error),
     }
 }
 
@@ -112,7 +77,7 @@ struct Settings {
 }
 
 fn problem(
-    shared: &Shared,
+    caller: &Caller,
     density: Density,
     cells: usize,
     ends: [f64; 2],
@@ -121,7 +86,7 @@ fn problem(
     let mut settings: Settings = Source::new("settings", settings).parse()?;
     settings.stop.resolve()?;
     check_memory(cells as u128 + 1, BYTES_PER_CELL, &[cells])?;
-    let density = shared.density(density, ends)?;
+    let density = line_density(density, ends, caller)?;
     Ok((Line { density, face: settings.equidistribution.face_density, cells, ends }, settings))
 }
 
@@ -134,9 +99,9 @@ pub fn equidistribute<'py>(
     ends: [f64; 2],
     settings: &str,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let shared = Shared::default();
-    let (line, _) = problem(&shared, density, cells, ends, settings).map_err(|error| plain(py, error))?;
-    let mesh = shared.compute(py, move || Ok(line.solve(0.0, &line.uniform(), None)?.0))?;
+    let calls = calls();
+    let (line, _) = problem(&calls.0, density, cells, ends, settings).map_err(|error| plain(py, error))?;
+    let mesh = compute(py, calls, move || Ok(line.solve(0.0, &line.uniform(), None)?.0))?;
     Ok(mesh.into_pyarray(py))
 }
 
@@ -154,13 +119,13 @@ pub fn schwarz<'py>(
     settings: &str,
     start: Option<Vec<f64>>,
 ) -> PyResult<Iterated<'py>> {
-    let shared = Shared::default();
+    let calls = calls();
     let raise = |error: Error| plain(py, error);
-    let (line, Settings { schwarz, stop, .. }) = problem(&shared, density, cells, ends, settings).map_err(raise)?;
+    let (line, Settings { schwarz, stop, .. }) = problem(&calls.0, density, cells, ends, settings).map_err(raise)?;
     let mut schwarz = schwarz.unwrap_or_default();
     let ranges = schwarz.resolve(false).and_then(|()| schwarz.ranges(cells)).map_err(raise)?;
     let (method, until) = (schwarz.method(), stop.until());
-    let history = shared.compute(py, move || {
+    let history = compute(py, calls, move || {
         let start = start.unwrap_or_else(|| line.uniform());
         line.iterate(0.0, &ranges, method, &start, None, until)
     })?;

@@ -2,6 +2,7 @@
 
 use crate::errors::plain;
 use crate::threads::compute;
+use driftmesh::Failure;
 use driftmesh::geometry::{self, DualCells, Lattice, Mesh};
 use driftmesh::study::check_memory;
 use numpy::ndarray::{Array2, Array3};
@@ -73,7 +74,7 @@ pub fn uniform<'py>(
 pub fn quality(py: Python<'_>, mesh: Given<'_>, density: PyReadonlyArray2<'_, f64>) -> PyResult<[f64; 4]> {
     let mesh = mesh.mesh(py)?;
     let rho = nodal(&mesh, &density)?;
-    let q = compute(py, || geometry::quality(&mesh, &rho))?;
+    let q = compute(py, move || geometry::quality(&mesh, &rho))?;
     Ok([q.q_max, q.q_mean, q.min_scaled_jacobian, q.equidistribution])
 }
 
@@ -100,13 +101,16 @@ pub fn transfer<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (old, new) = (old.mesh(py)?, new.mesh(py)?);
     let values = nodal(&old, &values)?;
-    let carried = compute(py, || match conservative {
-        true => geometry::remap(&old, &values, &new),
-        false => {
+    let carried = compute(py, move || {
+        let carried = if conservative {
+            geometry::remap(&old, &values, &new)?
+        } else {
             geometry::check_unfolded(&old)?;
             geometry::check_unfolded(&new)?;
-            Ok(geometry::interpolate(&old, &values, &new))
-        }
+            geometry::interpolate(&old, &values, &new)
+        };
+        Ok::<_, Failure>((new, carried))
     })?;
-    array(py, &new, &carried.map_err(|failure| plain(py, failure))?)
+    let (new, carried) = carried.map_err(|failure| plain(py, failure))?;
+    array(py, &new, &carried)
 }

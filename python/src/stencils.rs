@@ -1,8 +1,8 @@
 use crate::errors::plain;
+use crate::mesh::Given;
 use crate::threads::compute;
-use driftmesh::geometry::{Lattice, Mesh};
 use driftmesh::laplacian::{self, Laplacian, Polynomials, Scaling};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -16,12 +16,11 @@ type Entries<'py> = (
     Vec<([usize; 2], f64)>,
 );
 
-/// The weights of the discrete Laplacian of a mesh of any shape.
+/// The weights of the discrete Laplacian of a mesh of any shape; nodes without the closing ones of periodic axes.
 #[pyfunction]
 pub fn stencils<'py>(
     py: Python<'py>,
-    x: PyReadonlyArray2<'py, f64>,
-    y: PyReadonlyArray2<'py, f64>,
+    mesh: Given<'py>,
     kind: &str,
     polynomials: Option<&str>,
     scaling: Option<&str>,
@@ -39,11 +38,8 @@ pub fn stencils<'py>(
         _ => Err(PyValueError::new_err(format!("`scaling` is \"{name}\", but must be none, global or local"))),
     });
     let laplacian = Laplacian::named(kind, polynomials.transpose()?, scaling.transpose()?).map_err(raise)?;
-    let [n, m] = *x.shape() else { unreachable!("an array of two axes") };
-    let lattice = Lattice::bounded([n - 1, m - 1]).map_err(raise)?;
-    let points = x.as_slice()?.iter().zip(y.as_slice()?).map(|(x, y)| [*x, *y]).collect();
-    let mesh = Mesh::mapped(lattice, points).map_err(raise)?;
-    let entries = compute(py, || {
+    let mesh = mesh.mesh(py)?;
+    let entries = compute(py, move || {
         let stencils = laplacian::stencils(&mesh, laplacian)?;
         let (mut rows, mut columns, mut a, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for k in 0..stencils.patch().len() {

@@ -1,5 +1,5 @@
 use crate::errors::raised;
-use crate::threads::{BRIEFLY, Ended, PATIENCE, interruptible};
+use crate::threads::{BRIEFLY, Ended, PATIENCE, calls, interruptible};
 use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, Standing, State};
 use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
@@ -54,15 +54,22 @@ fn read(path: Option<PathBuf>, origin: &str, text: &str, set: &[String]) -> Resu
         Some(path) => Source::read(&path)?,
         None => Source::new(origin, text),
     };
-    set.iter().try_for_each(|assignment| source.set(assignment))?;
-    Study::from_source(&source)
+    let study = set.iter().try_for_each(|assignment| source.set(assignment)).and_then(|()| Study::from_source(&source));
+    study.map_err(|error| match error {
+        // not an option here, but an argument
+        Error::Study(mut mistake) if mistake.origin == "--set" => {
+            mistake.origin = "set".into();
+            Error::Study(mistake)
+        }
+        error => error,
+    })
 }
 
 /// The name of a study that has no mistake.
 #[pyfunction]
 #[pyo3(signature = (path, origin, text, set))]
 pub fn check(py: Python<'_>, path: Option<PathBuf>, origin: &str, text: &str, set: Vec<String>) -> PyResult<String> {
-    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raised(py, &error, None))?;
+    let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raised(py, &error, error.help()))?;
     Ok(study.name().into())
 }
 
@@ -85,7 +92,7 @@ pub fn run(
     resume: bool,
     told: Option<Py<PyAny>>,
 ) -> PyResult<(Option<PyErr>, bool)> {
-    let raise = |error: &Error| raised(py, error, None);
+    let raise = |error: &Error| raised(py, error, error.help());
     let study = py.detach(|| read(path, origin, text, &set)).map_err(|error| raise(&error))?;
     RunDirectory::check(&out).map_err(|error| raise(&error))?;
     if resume && study.standing(&out).map_err(|error| raise(&error))? == Standing::Complete {
@@ -97,6 +104,7 @@ pub fn run(
     let computing = study.clone();
     let ended = interruptible(
         py,
+        calls(),
         move || computing.run(&out, begin, &mut [&mut Watcher(theirs)]),
         || {
             seen.stop.store(true, Ordering::Relaxed);

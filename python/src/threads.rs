@@ -1,10 +1,15 @@
-//! Where things are computed: in a pool of threads of this process, with the interpreter free meanwhile.
+//! Where things are computed: in threads of their own, with the interpreter free meanwhile.
+//!
+//! Every computation has a pool to itself, so that none waits for another, whoever started it: a thread beside it, or a
+//! Python function that it calls. Python is called in the thread that waits and nowhere else: Ctrl-C is heard there, and a
+//! computation that is left alone never meets an interpreter that ends.
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often signals are looked for.
@@ -14,66 +19,122 @@ pub const PATIENCE: Duration = Duration::from_secs(3);
 /// The same for one that may not look.
 pub const BRIEFLY: Duration = Duration::from_millis(200);
 
-/// The pool, and the process that it belongs to: the threads of a process are not there after a fork.
-static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+/// Pools at rest, kept for the next computations, and the process that they belong to: its threads are not there after a
+/// fork.
+static RESTING: Mutex<(u32, Vec<Arc<ThreadPool>>)> = Mutex::new((0, Vec::new()));
+/// Most pools at rest; what is more ends its threads.
+const KEPT: usize = 4;
+
+fn resting() -> MutexGuard<'static, (u32, Vec<Arc<ThreadPool>>)> {
+    let mut resting = RESTING.lock().unwrap_or_else(PoisonError::into_inner);
+    if resting.0 != std::process::id() {
+        // the pools of the parent process are left alone: there is nobody to join
+        std::mem::forget(std::mem::replace(&mut *resting, (std::process::id(), Vec::new())));
+    }
+    resting
+}
 
 fn pool() -> PyResult<Arc<ThreadPool>> {
-    let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    match pool.as_ref() {
-        Some((process, pool)) if *process == std::process::id() => Ok(pool.clone()),
-        _ => {
-            let made = ThreadPoolBuilder::new().thread_name(|k| format!("driftmesh-{k}")).build();
-            let made = made.map_err(|error| PyRuntimeError::new_err(format!("no threads can be made: {error}")))?;
-            let made = Arc::new(made);
-            // the pool of the parent process is left alone: there is nobody to join
-            std::mem::forget(pool.replace((std::process::id(), made.clone())));
-            Ok(made)
-        }
+    if let Some(pool) = resting().1.pop() {
+        return Ok(pool);
+    }
+    let made = ThreadPoolBuilder::new().thread_name(|k| format!("driftmesh-{k}")).build();
+    made.map(Arc::new).map_err(|error| PyRuntimeError::new_err(format!("no threads can be made: {error}")))
+}
+
+fn rest(pool: Arc<ThreadPool>) {
+    let mut resting = resting();
+    if resting.1.len() < KEPT {
+        resting.1.push(pool);
     }
 }
 
-/// Computes with the interpreter free and all threads at hand.
-pub fn compute<T: Send>(py: Python<'_>, f: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let pool = pool()?;
-    Ok(py.detach(|| pool.install(f)))
+/// What is called in the thread that waits.
+type Call = Box<dyn FnOnce(Python<'_>) -> PyResult<()> + Send>;
+
+enum Message {
+    Call(Call),
+    Ended,
 }
 
-/// The same for what may take long: Ctrl-C calls `stop`, which says how long the end may take. `look` is called every now
-/// and then meanwhile.
+/// Lets a computation call Python.
+#[derive(Clone)]
+pub struct Caller(Sender<Message>);
+
+/// The other end, where the thread waits that handed the computation out.
+pub struct Calls(Mutex<Receiver<Message>>);
+
+pub fn calls() -> (Caller, Calls) {
+    let (sender, receiver) = channel();
+    (Caller(sender), Calls(Mutex::new(receiver)))
+}
+
+impl Caller {
+    /// What a call returns; nothing where it raised, or nobody waits any longer.
+    pub fn call<T: Send + 'static>(&self, f: impl FnOnce(Python<'_>) -> PyResult<T> + Send + 'static) -> Option<T> {
+        let (sender, answer) = channel();
+        let call: Call = Box::new(move |py| {
+            let _ = sender.send(f(py)?);
+            Ok(())
+        });
+        self.0.send(Message::Call(call)).ok()?;
+        answer.recv().ok()
+    }
+}
+
+impl Calls {
+    fn next(&self, py: Python<'_>) -> Result<Message, RecvTimeoutError> {
+        py.detach(|| self.0.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK))
+    }
+}
+
+/// Computes what cannot be stopped half-way: at Ctrl-C it is left alone, and what it finds is thrown away.
+pub fn compute<T: Send + 'static>(py: Python<'_>, f: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    match interruptible(py, calls(), f, || BRIEFLY, |_| Ok(()))? {
+        Ended::Itself(result) => Ok(result),
+        Ended::Stopped(error, _) => Err(error),
+    }
+}
+
+/// Computes with all threads at hand. Ctrl-C, or an exception of a call, calls `stop`, which says how long the end may take.
+/// `look` is called every now and then meanwhile.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
+    (Caller(ended), calls): (Caller, Calls),
     f: impl FnOnce() -> T + Send + 'static,
     stop: impl Fn() -> Duration,
     mut look: impl FnMut(Python<'_>) -> PyResult<()>,
 ) -> PyResult<Ended<T>> {
-    let (sender, receiver) = channel();
-    pool()?.spawn(move || {
-        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(f));
+    let (sender, result) = channel();
+    let pool = pool()?;
+    let theirs = pool.clone();
+    pool.spawn(move || {
+        let result = catch_unwind(AssertUnwindSafe(f));
+        rest(theirs);
         let _ = sender.send(result);
+        let _ = ended.send(Message::Ended);
     });
-    let receiver = Mutex::new(receiver);
-    let wait =
-        |py: Python<'_>| py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
+    drop(pool);
+    let result = Mutex::new(result);
     let mut interrupted: Option<(PyErr, Instant)> = None;
     loop {
-        match wait(py) {
-            Ok(Ok(result)) => {
-                return Ok(match interrupted {
-                    None => Ended::Itself(result),
-                    Some((error, _)) => Ended::Stopped(error, Some(result)),
-                });
+        let heard = match calls.next(py) {
+            // after the first exception calls are dropped, and whoever waits for their answers ends
+            Ok(Message::Call(call)) => interrupted.as_ref().map_or_else(|| call(py), |_| Ok(())),
+            Ok(Message::Ended) | Err(RecvTimeoutError::Disconnected) => {
+                let result = result.into_inner().unwrap_or_else(PoisonError::into_inner).try_recv();
+                return match (result, interrupted) {
+                    (Ok(Ok(result)), None) => Ok(Ended::Itself(result)),
+                    (Ok(Ok(result)), Some((error, _))) => Ok(Ended::Stopped(error, Some(result))),
+                    _ => Err(PyRuntimeError::new_err(
+                        "a mistake in driftmesh itself; please report it with these inputs",
+                    )),
+                };
             }
-            Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err(
-                    "a mistake in driftmesh itself; please report it with these inputs",
-                ));
-            }
-            Err(RecvTimeoutError::Timeout) => {}
-        }
-        match (py.check_signals().and_then(|()| look(py)), interrupted.take()) {
-            (Err(error), None) => {
-                interrupted = Some((error, Instant::now() + stop()));
-            }
+            Err(RecvTimeoutError::Timeout) => Ok(()),
+        };
+        match (heard.and_then(|()| py.check_signals()).and_then(|()| look(py)), interrupted.take()) {
+            (Err(error), None) => interrupted = Some((error, Instant::now() + stop())),
             // asked twice, or nothing that could stop it
             (Err(error), Some(_)) => return Ok(Ended::Stopped(error, None)),
             (Ok(()), Some((error, until))) if Instant::now() > until => return Ok(Ended::Stopped(error, None)),

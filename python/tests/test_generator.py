@@ -2,8 +2,14 @@
 
 import copy
 import multiprocessing
+import os
 import pickle
+import signal
+import subprocess
+import sys
+import textwrap
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -129,6 +135,10 @@ def sheared():
         (lambda: MeshGenerator().step(square(), square().x, -1e-3), "`dt` is -0.001"),
         (lambda: MeshGenerator().step(square(), square().x, np.nan), "`dt` is nan"),
         (lambda: MeshGenerator().step(square(), square().x, "soon"), "`dt` is 'soon'"),
+        (lambda: MeshGenerator().step(square(), square().x, "0.01"), "`dt` is '0.01'"),
+        (lambda: MeshGenerator().step(square(), square().x, True), "`dt` is True"),
+        (lambda: Stochastic(interface=3), "`interface` is 3"),
+        (lambda: Stochastic(estimator="residual-walk"), "`estimator` is 'residual-walk'"),
         (lambda: MeshGenerator().step(sheared(), square().x, 0.1), "does not fill its box"),
         (lambda: MeshGenerator(Given()).step(square(), square().x, 0.1), r"density is 0.0 at index \(0, 0\)"),
         (lambda: MeshGenerator(np.ones((3, 3))).step(square(), None, 0.1), r"\(3, 3\).*\(9, 9\)"),
@@ -154,7 +164,7 @@ def test_a_folded_mesh_is_an_error_with_a_remedy():
     mesh = square()
     x = mesh.x.copy()
     x[4, 4] = 0.9
-    with pytest.raises(MeshFolded, match=r"the mesh folded: cell \(.*\n +help: "):
+    with pytest.raises(MeshFolded, match=r"the mesh folded: cell \(.*\n +help: .*`dt`"):
         MeshGenerator().step(mesh.moved(x, mesh.y), mesh.x, 0.1)
 
 
@@ -184,3 +194,56 @@ def test_forked_processes_have_threads_of_their_own():
     here = large(0)
     with multiprocessing.get_context("fork").Pool(2) as pool:
         assert pool.map_async(large, range(2)).get(timeout=60) == [here, here]
+
+
+BESIDE = """
+    import threading
+    import time
+    from pathlib import Path
+    from driftmesh import Mesh, MeshGenerator, run
+
+    study = {
+        "study": {"name": "front", "kind": "moving-mesh"},
+        "grid": {"cells": [60, 60]},
+        "time": {"start": 0.25, "end": 0.35, "step": 1e-3},
+        "pde": {"kind": "burgers", "viscosity": 0.005},
+        "output": {"report": False},
+    }
+    computing = threading.Thread(target=lambda: run(study))
+    computing.start()
+    while not Path("out/front").exists():
+        time.sleep(1e-3)
+    mesh = Mesh.uniform(cells=(8, 8))
+    for _ in range(10):
+        mesh = MeshGenerator().step(mesh, mesh.x**2, 0.1)
+    print(computing.is_alive())
+    computing.join()
+"""
+
+
+def test_a_step_does_not_wait_for_a_run(tmp_path):
+    """Even where the library has one thread."""
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(BESIDE)],
+        env=os.environ | {"RAYON_NUM_THREADS": "1"},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stdout == "True\n", done.stderr
+
+
+def test_ctrl_c_gives_up_a_long_step():
+    """The rest of the step goes on in the background, and the generator says so."""
+    mesh = Mesh.uniform(cells=(24, 24))
+    generator = MeshGenerator(method=Stochastic(estimator=MonteCarlo(paths=20_000, substeps=50)))
+    threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        generator.step(mesh, layer(mesh), 1e-3)
+    assert time.monotonic() - began < 3
+    with pytest.raises(RuntimeError, match="still at work"):
+        generator.step(mesh, layer(mesh), 1e-3)
+    # others go on meanwhile
+    assert follow(MeshGenerator(relaxation=0.1), steps=1) != mesh

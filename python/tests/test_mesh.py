@@ -96,6 +96,11 @@ def test_a_folded_mesh_says_so():
         (lambda: transfer(np.ones(SHAPE), bent(), bent(upper=(1, 2))), "different boxes"),
         (lambda: transfer(np.ones(SHAPE), bent(), bent(), "linear"), "interpolate"),
         (lambda: transfer(bent(periodic=(True, True)).x, *2 * [bent(periodic=(True, True))]), "axis 0 is periodic"),
+        (lambda: Mesh(*np.meshgrid(np.arange(5), np.arange(4))), 'mirrored.*indexing="ij"'),
+        (lambda: Mesh.uniform(cells=(4, 4), periodic="no"), "`periodic` is 'no'"),
+        (lambda: Mesh.uniform(cells=(4, 4), periodic=(0, 2)), "`periodic` is"),
+        (lambda: transfer(np.ones(SHAPE), bent(), bent().moved(1.1 * bent().x, bent().y)), "last side of axis 0 differs.*interpolate"),
+        (lambda: transfer(np.ones(SHAPE), bent(), bent().moved(bent().x, bent().y + 0.1)), "first side of axis 1 differs"),
         (lambda: Mesh(bent().x, bent().y + 0.1 * bent().x, periodic=(True, False)), "axis 0 is periodic"),
     ],
 )
@@ -119,10 +124,57 @@ def test_transfer_keeps_the_integral_and_the_range(periodic):
     assert old.areas.sum() == pytest.approx(2)
 
 
+def test_transfer_has_the_orders_that_it_claims():
+    def errors(n, method):
+        old, new = bent((n, n), amount=-0.05), bent((n, n), amount=0.05)
+        u, exact = (np.sin(3 * mesh.x) * np.cos(2 * mesh.y) for mesh in (old, new))
+        off = np.abs(transfer(u, old, new, method) - exact)
+        return np.array([off.max(), off.mean()])
+
+    largest, mean = np.log2(errors(20, "conservative") / errors(40, "conservative"))
+    assert 0.7 < largest < 1.5 < mean < 2.3
+    assert (np.log2(errors(20, "interpolate") / errors(40, "interpolate")) > 1.7).all()
+
+
 def test_interpolation_carries_linear_fields_exactly():
     old, new = bent(amount=-0.1), bent(amount=0.1)
     v = transfer(2 + 3 * old.x - old.y, old, new, method="interpolate")
     np.testing.assert_allclose(v, 2 + 3 * new.x - new.y, atol=1e-14)
+
+
+def test_transfer_wants_meshes():
+    with pytest.raises(TypeError, match="`old` is of type tuple"):
+        transfer(np.ones(SHAPE), (bent().x, bent().y), bent())
+
+
+def test_nodes_may_slide_along_straight_sides_of_any_shape():
+    old = bent((12, 12))
+    old = Mesh(old.x + 0.3 * old.y, old.y)
+    s = np.linspace(0, 1, 13)[:, None] ** 1.2 * np.ones((1, 13))
+    new = old.moved(s + 0.3 * old.y, old.y)
+    u = transfer(np.exp(old.x), old, new)
+    assert (u * new.areas).sum() == pytest.approx((np.exp(old.x) * old.areas).sum(), rel=1e-13)
+
+
+def test_a_periodic_mesh_whose_seam_has_moved_is_made_again_from_its_nodes():
+    for periodic in [(True, True), (True, False), (False, True)]:
+        mesh = Mesh.uniform(cells=(12, 9), lower=(-1, 2), upper=(1, 5), periodic=periodic)
+        wave = 0.05 * np.cos(np.pi * mesh.x) * np.sin(2 * np.pi * (mesh.y - 2) / 3)
+        x, y = mesh.x + wave * periodic[0], mesh.y + wave * periodic[1]
+        mesh = mesh.moved(x, y)
+        assert Mesh(x, y, lower=mesh.lower, upper=mesh.upper, periodic=periodic) == mesh
+        # the extent follows from the nodes alone, and a given corner is kept
+        again = Mesh(x, y, lower=(-1, 2), periodic=periodic)
+        assert again.lower == (-1, 2) and again.upper == pytest.approx((1, 5), rel=1e-14)
+        assert again.areas == pytest.approx(mesh.areas)
+
+
+@pytest.mark.parametrize("offset", [1, 3])
+def test_misaligned_arrays_will_do(offset):
+    u = np.arange(35.0).reshape(SHAPE)
+    bytes_of = np.frombuffer(bytes(offset) + u.tobytes(), "u1")[offset:].view("f8").reshape(SHAPE)
+    assert not bytes_of.flags.aligned
+    np.testing.assert_array_equal(transfer(bytes_of, bent(), bent()), transfer(u, bent(), bent()))
 
 
 @settings(max_examples=30, deadline=None)

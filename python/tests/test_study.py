@@ -9,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 import time
+import warnings
 from pathlib import Path
 
 import meshio
@@ -17,7 +18,7 @@ import pytest
 
 import driftmesh
 from driftmesh import MeshError, StudyError
-from driftmesh.errors import NotConverged
+from driftmesh.errors import NotConverged, RunWarning
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "target/release/driftmesh"
@@ -70,6 +71,33 @@ def test_results_pickle_and_copy(result):
         np.testing.assert_array_equal(other.final["u"], result.final["u"])
 
 
+def test_frames_of_a_run_that_was_replaced_are_refused(tmp_path):
+    """The directory holds the frames of one run: those of another would be read in their place."""
+    first, second = (driftmesh.run(STUDY, out=tmp_path / "out", set={"pde.viscosity": nu}) for nu in (0.005, 0.02))
+    with pytest.raises(RuntimeError, match="has been replaced(.|\n)*`out`"):
+        first.frames[-1]["u"]
+    with pytest.raises(RuntimeError, match="has been replaced"):
+        first.animate()
+    np.testing.assert_array_equal(second.frames[-1]["u"], second.final["u"])
+    second.frames[0].path.unlink()
+    with pytest.raises(RuntimeError, match="is gone"):
+        second.frames[0]["u"]
+
+
+def test_meshes_of_periodic_runs_wrap_around(tmp_path):
+    settings = {"grid.cells": [16, 16], "time.end": 0.05, "time.report": [0.05], "output.report": False, "compare.generator.kind": "fixed"}
+    result = driftmesh.run(ROOT / "studies/burgers-periodic.toml", out=tmp_path / "out", set=settings)
+    for mesh in (result.mesh, result.frames[-1].mesh):
+        assert mesh.periodic == (True, True) and mesh.lower == (0, 0) and mesh.upper == (2 * np.pi, 2 * np.pi)
+    u = driftmesh.transfer(result.final["u"], result.mesh, result.frames[0].mesh)
+    assert u.shape == result.final["u"].shape
+
+
+def test_results_are_told_apart_and_shown_shortly(result):
+    assert result == result and result != copy.deepcopy(result)
+    assert repr(result).startswith("<Run 'front', completed after 10 steps, in ") and len(repr(result)) < 300
+
+
 @pytest.mark.parametrize(
     ("study", "settings", "arrays"),
     [
@@ -89,9 +117,12 @@ def test_every_kind_runs_and_draws(study, settings, arrays, tmp_path):
 
 
 def test_pictures_and_animations(result, tmp_path):
+    import matplotlib.pyplot as plt
     from PIL import Image
 
+    before = plt.get_fignums()
     result.plot(tmp_path / "plot.png")
+    assert plt.get_fignums() == before
     result.animate(tmp_path / "moving.gif")
     with Image.open(tmp_path / "moving.gif") as moving:
         assert moving.n_frames == 3
@@ -120,7 +151,7 @@ def test_mistakes_read_as_those_of_the_program(text, settings, tmp_path):
         driftmesh.run(path, set=settings)
     command = [PROGRAM, "check", path] + [part for k, v in settings.items() for part in ("--set", f"{k}={v}")]
     said = subprocess.run(command, capture_output=True, text=True).stderr
-    assert f"error: {error.value}\n" == said and "^" in said
+    assert f"error: {error.value}\n" == said.replace("--> --set:", "--> set:") and "^" in said
     assert isinstance(error.value, ValueError) and not Path("out/wrong").exists()
 
 
@@ -129,6 +160,9 @@ def test_studies_as_dicts_show_their_mistakes():
         driftmesh.run(STUDY | {"grid": {"cels": [16, 12]}})
     with pytest.raises(StudyError, match="unknown name `movie`|movie"):
         driftmesh.run({"study": {"name": "a", "kind": "movie"}})
+    for key in ("", "a b", "a=b", "monitor.", 3):
+        with pytest.raises(ValueError, match="`set` has the key"):
+            driftmesh.run(STUDY, set={key: 1})
     with pytest.raises(TypeError, match="no object"):
         driftmesh.run(STUDY | {"grid": {"cells": object()}})
 
@@ -162,14 +196,29 @@ def test_failures_come_with_what_there_is(tmp_path):
 
 
 def test_warnings_are_warnings(tmp_path):
+    study = STUDY | {"mesh": {"relaxation": 0.03}}
     with pytest.warns(RuntimeWarning, match="mesh.relaxation"):
-        driftmesh.run(STUDY | {"mesh": {"relaxation": 0.03}}, out=tmp_path / "out")
+        result = driftmesh.run(study, out=tmp_path / "out")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(RunWarning, match="mesh.relaxation") as warning:
+            driftmesh.run(study, out=tmp_path / "again")
+    np.testing.assert_array_equal(warning.value.result.final["u"], result.final["u"])
 
 
 def test_the_bar_tells_time_and_step(tmp_path, capsys):
     driftmesh.run(STUDY | {"grid": {"cells": [80, 80]}}, out=tmp_path / "out", progress=True)
     said = capsys.readouterr().err
     assert "front: t = 0." in said and "100 %" in said
+
+
+def test_the_bar_stays_where_a_run_failed(tmp_path, capsys):
+    settings = {"monitor": {"kind": "arclength", "strength": {"absolute": 1e6}, "smoothing": 0}}
+    mesh = {"mesh": {"form": "gradient", "relaxation": 1e-4, "start": "uniform"}}
+    with pytest.raises(MeshError):
+        driftmesh.run(STUDY | settings | mesh, out=tmp_path / "out", progress=True)
+    said = capsys.readouterr().err
+    assert "front" in said and "100 %" not in said
 
 
 def interrupted(study, settings, directory):

@@ -1,6 +1,13 @@
 """Laplacians as matrices, equidistribution and Schwarz on a line."""
 
 import math
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -10,7 +17,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from driftmesh import Mesh, StudyError, equidistribute, laplacian_stencils, schwarz
-from driftmesh.errors import LineDensity, MeshFolded, LineStalled, NotConverged
+from driftmesh.errors import LineDensity, LineStalled, NotConverged
 
 
 def annulus(n=16, m=12):
@@ -60,13 +67,46 @@ def test_compact25_solves_with_fourth_order():
         (lambda x, y: laplacian_stencils(x, y, "published", scaling="huge"), ValueError, "none, global or local"),
         (lambda x, y: laplacian_stencils(x, y * 0), ValueError, "scale the mesh"),
         (lambda x, y: laplacian_stencils(1e300 * x, y), ValueError, "scale the mesh"),
-        (lambda x, y: laplacian_stencils(x[::-1], y[::-1]), MeshFolded, "cell"),
+        (lambda x, y: laplacian_stencils(x[::-1], y[::-1]), ValueError, "mirrored.*indexing"),
+        (lambda x, y: laplacian_stencils(*np.meshgrid(np.arange(5.0), np.arange(4.0))), ValueError, "mirrored.*indexing"),
+        (lambda x, y: laplacian_stencils(*np.mgrid[:9, :9], "compact25", source=True, periodic=(True, False)), ValueError, "bounded axes"),
+        (lambda x, y: laplacian_stencils(x, y, kind=None), ValueError, "`kind` is None"),
+        (lambda x, y: laplacian_stencils(x, y, periodic=(True, False)), ValueError, "axis 0 is periodic"),
         (lambda x, y: laplacian_stencils(1e-155 * x, 1e-155 * y), ValueError, "scale the mesh"),
     ],
 )
 def test_laplacians_refuse_what_is_no_mesh(make, error, words):
     with pytest.raises(error, match=words):
         make(*annulus())
+
+
+@pytest.mark.parametrize("kind", ["optimised", "harmonic", "published", "mapped"])
+@pytest.mark.parametrize("periodic", [(True, True), (True, False), (False, True)])
+def test_periodic_laplacians_go_over_the_seam(kind, periodic):
+    """Second order at every node of the seam, the closing nodes included."""
+
+    def error(n):
+        mesh = Mesh.uniform(cells=(n, n + 2), lower=(-1, 2), upper=(1, 5), periodic=periodic)
+        phase = 2 * np.pi * (mesh.x + 1) / 2, 2 * np.pi * (mesh.y - 2) / 3
+        x, y = mesh.x + 0.03 * np.sin(phase[0]) * np.sin(phase[1]), mesh.y + 0.04 * np.sin(phase[1])
+        k, m = 2 * np.pi / 2, 2 * np.pi / 3
+        u = np.sin(k * x) * np.cos(m * y)
+        delta = (laplacian_stencils(x, y, kind, periodic=periodic) @ u.ravel()).reshape(u.shape)
+        inside = tuple(slice(None) if wraps else slice(1, -1) for wraps in periodic)
+        bounded = np.ones(u.shape, bool)
+        bounded[inside] = False
+        assert not delta[bounded].any()
+        return np.abs(delta + (k * k + m * m) * u)[inside].max()
+
+    order = np.log2(error(16) / error(32))
+    assert order > 1.5 if kind != "optimised" else order > 0.7, f"observed order {order:.2f}"
+
+
+def test_american_spelling_is_understood():
+    difference = laplacian_stencils(*annulus(), "optimized") - laplacian_stencils(*annulus(), "optimised")
+    assert abs(difference).max() == 0
+    both = [schwarz("x^2 + 1", 20, cut=0.5, method=method, iterations=2) for method in ("optimised", "optimized")]
+    np.testing.assert_array_equal(both[0].error, both[1].error)
 
 
 @settings(max_examples=15, deadline=None)
@@ -104,6 +144,16 @@ def test_every_way_to_say_a_density_gives_the_mesh():
     assert equidistribute(front, 100, face_density="exact")[50] == pytest.approx(0.88222053, abs=1e-8)
 
 
+@pytest.mark.filterwarnings("ignore:overflow")
+@pytest.mark.parametrize("steep", ["exp(20*x)", lambda x: np.exp(20 * x)])
+def test_every_cell_has_the_same_share_of_a_steep_density(steep):
+    """x(ξ) = ln(1 + ξ(e²⁰ − 1))/20; the trapezoid is off by 0.09 in the first cells."""
+    xi = np.linspace(0, 1, 401)
+    exact = np.log1p(xi * np.expm1(20)) / 20
+    np.testing.assert_allclose(equidistribute(steep, 400), exact, atol=1e-8)
+    assert np.abs(equidistribute(steep, 400, face_density="trapezoid") - exact).max() > 0.01
+
+
 @pytest.mark.parametrize(
     ("make", "error", "words"),
     [
@@ -124,9 +174,12 @@ def test_every_way_to_say_a_density_gives_the_mesh():
         (lambda: equidistribute(([0, 0.5], [1, 2]), 10), ValueError, "known from 0.0 to 0.5"),
         (lambda: equidistribute({"kind": "arclength", "value": "x"}, 10), ValueError, "arclength"),
         (lambda: equidistribute("1", 10**9), ValueError, "GiB"),
-        (lambda: equidistribute(lambda x: np.where(x < 0.3, 1.0, 100.0), 100), LineStalled, "exact"),
+        (lambda: equidistribute(lambda x: np.where(x < 0.3, 1.0, 100.0), 100, face_density="trapezoid"), LineStalled, "`face_density`"),
+        (lambda: equidistribute({"kind": ["a"]}, 4), ValueError, "must be a table"),
+        (lambda: equidistribute({"value": 3}, 4), ValueError, "must be a table"),
         (lambda: equidistribute("1", 10, domain=(1, 0)), ValueError, "left to right"),
         (lambda: equidistribute("1", 10, face_density="rough"), ValueError, "trapezoid"),
+        (lambda: schwarz("1", 100, method="best", cut=0.5), ValueError, "`method` is 'best'.*classical"),
         (lambda: schwarz("1", 100), ValueError, "exactly one of"),
         (lambda: schwarz("1", 100, overlap=(0.483, 0.52)), ValueError, "nearest are 0.48 and 0.49"),
         (lambda: schwarz("1", 100, overlap=(0.4, 0.6), cut=0.5), ValueError, "exactly one"),
@@ -158,4 +211,78 @@ def test_schwarz_contracts_as_theory_says():
 def test_what_does_not_converge_is_an_error_with_its_history():
     with pytest.raises(NotConverged, match="not converged") as error:
         schwarz("300*(x - 0.5)^2 + 1", 100, overlap=(0.48, 0.52), linearized=True, iterations=300, tolerance=1e-8)
+    assert "set linearized to false" in str(error.value)
     assert error.value.result.iterations == 300 and error.value.result.error[-100:].min() > 0.03
+
+
+def test_results_are_told_apart_and_shown_shortly():
+    result = schwarz("x^2 + 1", 100, overlap=np.array([0.4, 0.6]))
+    assert result == result and result != schwarz("x^2 + 1", 100, overlap=(0.4, 0.6))
+    assert repr(result).startswith("<SchwarzResult of 100 cells, iterations=53, error=") and "observed=0.4444" in repr(result)
+
+
+NESTED = """
+    from concurrent.futures import ThreadPoolExecutor
+    from driftmesh import equidistribute, schwarz
+
+    def density(x):
+        return 1 + x * equidistribute(lambda y: 1 + y, 10)[5] + schwarz("x + 1", 20, overlap=(0.4, 0.6), iterations=2).mesh[10]
+
+    with ThreadPoolExecutor(4) as threads:
+        meshes = list(threads.map(lambda _: schwarz(density, 20, overlap=(0.4, 0.6), iterations=3).mesh, range(4)))
+    assert all((mesh == meshes[0]).all() for mesh in meshes)
+    print(len(meshes))
+"""
+
+
+def test_a_density_may_call_the_package_itself():
+    """On one thread of the library, and from several of Python at a time."""
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(NESTED)],
+        env=os.environ | {"RAYON_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stdout == "4\n", done.stderr
+
+
+def test_a_density_is_called_in_the_thread_that_asked():
+    import threading
+
+    seen = set()
+
+    def density(x):
+        seen.add(threading.get_ident())
+        return 1 + x
+
+    schwarz(density, 38, subdomains=4, overlap_cells=2, iterations=2)
+    with ThreadPoolExecutor(1) as threads:
+        other = threads.submit(lambda: (equidistribute(density, 10), threading.get_ident())[1]).result()
+    assert seen == {threading.get_ident(), other}
+
+
+SLOW = """
+    import time
+    from driftmesh import equidistribute
+
+    def density(x):
+        print("called", flush=True)
+        time.sleep(20)
+        return 1 + x
+
+    try:
+        equidistribute(density, 10)
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+def test_ctrl_c_in_a_density_ends_it_and_the_interpreter_in_good_order():
+    script = [sys.executable, "-c", textwrap.dedent(SLOW)]
+    process = subprocess.Popen(script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "called\n"
+    began = time.monotonic()
+    os.kill(process.pid, signal.SIGINT)
+    said, complaint = process.communicate(timeout=60)
+    assert (process.returncode, said, complaint) == (0, "interrupted\n", "") and time.monotonic() - began < 10

@@ -8,9 +8,9 @@ use crate::error::Failure;
 /// ```
 ///
 /// Σ A u ([`DualCells::areas`]) is kept to round-off, constants exactly. u_f is the value upwind with van Leer's limited
-/// slope, of second order where u is smooth (of first at nodes on sides), and no value leaves the range of its neighbours.
-/// Nodes go from one mesh to the other in straight lines, in as many steps as keep what the faces of a dual cell sweep below
-/// half of it: one for meshes that differ by a time step.
+/// slope, of second order in the mean where u is smooth (of first at nodes on sides and at extrema), and no value leaves the
+/// range of its neighbours. Nodes go from one mesh to the other in straight lines, in as many steps as keep what the faces of a
+/// dual cell sweep below half of it: one for meshes that differ by a time step.
 ///
 /// # Errors
 /// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where values

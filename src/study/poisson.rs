@@ -253,7 +253,8 @@ impl PoissonStudy {
         self.data()?;
         let neumann = self.neumann();
         if laplacian == Laplacian::Compact25 && self.grid.cells.iter().any(|&cells| cells < 4) {
-            let rule = "needs at least 4 cells along each axis; raise them, or take another laplacian.kind than \"compact25\"";
+            let rule =
+                "needs at least 4 cells along each axis; raise them, or take another laplacian.kind than \"compact25\"";
             return Err(Error::invalid("grid.cells", format!("{:?}", self.grid.cells), rule));
         }
         let iterates = laplacian != Laplacian::Compact25 && neumann == [[false; 2]; 2];

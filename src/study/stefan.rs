@@ -8,7 +8,7 @@ use crate::laplacian::Laplacian;
 use crate::setting::{Auto, fixed, pair};
 use crate::simulation::{FramesAt, Schedule};
 use crate::stefan::{
-    Columns, Filter, Front, FrontState, LOWER, Method, Problem, Similarity, Stepping, Transfer, UPPER,
+    Columns, Filter, Front, FrontState, LOWER, Method, Problem, Sides, Similarity, Stepping, Transfer, UPPER,
 };
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
