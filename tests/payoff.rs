@@ -129,7 +129,11 @@ fn a_jump_on_the_sides_is_named() {
     assert!(record.warnings[0].contains("the mesh does not come to rest"), "{:?}", record.warnings);
     let failure = failure.unwrap();
     assert!(failure.to_string().contains("automatic time steps shrank"), "{failure}");
-    assert!(study.remedy(&failure).unwrap().contains("a jump in pde.boundary"), "{:?}", study.remedy(&failure));
+    assert!(
+        study.remedy(&failure).unwrap().contains("smooth what jumps in time or from a side"),
+        "{:?}",
+        study.remedy(&failure)
+    );
 }
 
 /// A jump at the start alone is smoothed out: a warning, and the run completes. Steps that failed are counted.

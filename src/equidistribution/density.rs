@@ -263,7 +263,8 @@ impl LineDensity {
             let change = |k: usize| (u[k + 1] - u[k]).abs();
             let most = (0..cells).fold(0, |most, k| if change(k) > change(most) { k } else { most });
             let size = *first.get_or_insert(change(most));
-            if !(change(most) > STILL_A_JUMP * size) {
+            let stays = change(most) > STILL_A_JUMP * size;
+            if !stays {
                 return None;
             }
             (a, b) = (places[most], places[most + 1]);
