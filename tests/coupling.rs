@@ -4,7 +4,7 @@ use driftmesh::density::{Arclength, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh};
 use driftmesh::meshing::{Mmpde, Whole};
 use driftmesh::physics::{Burgers, Convection, Motion, Physics};
-use driftmesh::simulation::{Coupling, Record, Schedule, Simulation, State};
+use driftmesh::simulation::{Coupling, Record, Safety, Schedule, Simulation, State};
 use driftmesh::{Failure, Work};
 
 /// A bump at the centre, whatever u is.
@@ -47,6 +47,7 @@ fn simulate(
         generator: Box::new(Whole::default()),
         equation: Mmpde { relaxation: 0.2.into(), ..Mmpde::default() },
         coupling,
+        safety: Safety::default(),
         schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),
     };
     let mesh = Mesh::uniform(Lattice::bounded([20, 20]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();

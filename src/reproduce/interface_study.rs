@@ -9,7 +9,7 @@ use crate::meshing::{
 use crate::numerics::linear::{Robust, Smoother};
 use crate::physics::{Burgers, Convection};
 use crate::setting::Auto;
-use crate::simulation::{Coupling, Record, Schedule, Simulation};
+use crate::simulation::{Coupling, Record, Safety, Schedule, Simulation};
 use crate::work::Work;
 use std::time::Instant;
 
@@ -56,6 +56,7 @@ impl InterfaceStep {
             generator: Box::new(Whole::default()),
             equation: Mmpde::default(),
             coupling: Coupling::default(),
+            safety: Safety::default(),
             schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
         };
         let mesh = Mesh::uniform(Lattice::bounded([cells, cells])?, [0.0; 2], [1.0; 2])?;
@@ -397,6 +398,7 @@ fn coupled(options: Options) -> Result<Table> {
             generator,
             equation: Mmpde::default(),
             coupling: Coupling::default(),
+            safety: Safety::default(),
             schedule: Schedule::new(0.25, 0.75, 1e-3, vec![0.75])?,
         };
         let mut state = simulation.start(Mesh::uniform(lattice, [0.0; 2], [1.0; 2])?)?;

@@ -1,9 +1,11 @@
 use super::prediction::{Predicted, blend};
+use super::safety::Care;
 use super::{NOISE_WORTH_A_WARNING, Seconds, Simulation, State, timed};
-use crate::density::Monitor;
+use crate::density::{Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
 use crate::meshing::{Interface, Mmpde};
+use crate::numerics::larger;
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
 use schemars::JsonSchema;
@@ -52,34 +54,57 @@ pub(super) struct Advanced {
     pub state: State,
     pub work: Work,
     pub interface: Option<Interface>,
+    /// Error of the step in each unknown, where it was asked for.
+    pub errors: Option<Vec<f64>>,
 }
 
-/// One step to time `t`: mesh, then physics, as often as the coupling says. `scale` is the step that τ is measured in.
-pub(super) fn advance(
+/// What a step goes over, from the time of a state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    /// Time at its end.
+    pub t: f64,
+    /// Its length.
+    pub dt: f64,
+    /// The step that τ is measured in.
+    pub scale: f64,
+    /// Whether its error is estimated.
+    pub estimated: bool,
+}
+
+/// Which part of a step failed.
+pub(super) enum Setback {
+    Mesh(Failure),
+    Physics(Failure),
+}
+
+/// One step, tried once: mesh, then physics, as often as the coupling says.
+pub(super) fn attempt(
     simulation: &mut Simulation,
     state: &State,
-    t: f64,
-    dt: f64,
-    scale: f64,
+    stretch: Stretch,
+    care: Care,
     seconds: &mut Seconds,
-) -> Result<Advanced, Failure> {
+) -> Result<Advanced, Setback> {
+    let Stretch { t, dt, scale, estimated } = stretch;
     let Simulation { physics, monitor, generator, equation, coupling, .. } = simulation;
+    let mesh_steps = coupling.mesh_steps * care.substeps;
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
     // where steps are short against τ the velocity learns no faster in time
     let gain = equation.relaxation.prediction() * dt / scale;
     let equation = Mmpde { relaxation: equation.relaxation.at(scale), ..*equation };
-    let predicted = timed(&mut seconds.mesh, || Predicted::after(state, gain, dt))?;
+    let predicted = timed(&mut seconds.mesh, || Predicted::after(state, gain, dt)).map_err(Setback::Mesh)?;
     let mut latest = None;
     for _ in 0..coupling.iterations {
         let mut spent = 0.0;
         let mesh = timed(&mut seconds.mesh, || {
             let mut mesh = predicted.mesh.clone();
-            for sub in 0..coupling.mesh_steps {
+            smooth(mesh.lattice(), &mut rho, care.smoothing);
+            for sub in 0..mesh_steps {
                 let carried = if sub == 0 { None } else { Some(interpolate(&predicted.mesh, &rho, &mesh)) };
                 let rho = carried.as_ref().unwrap_or(&rho);
-                let moved = generator.step(&equation, &mesh, rho, dt / coupling.mesh_steps as f64)?;
+                let moved = generator.step(&equation, &mesh, rho, dt / mesh_steps as f64)?;
                 let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
                 check_unfolded(&moved.mesh).map_err(|failure| match failure {
                     Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
@@ -90,22 +115,55 @@ pub(super) fn advance(
                 spent += moved.interface.map_or(0.0, |i| i.seconds);
                 interface = moved.interface;
             }
-            Ok::<_, Failure>(mesh)
-        })?;
+            Ok(mesh)
+        });
+        let mesh = mesh.map_err(Setback::Mesh)?;
         seconds.mesh -= spent;
         seconds.interface += spent;
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
-        let (u, cost) = timed(&mut seconds.pde, || physics.step(motion, &state.u))?;
+        let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))
+            .map_err(Setback::Physics)?;
         work += cost;
-        rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
+        rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))
+            .map_err(Setback::Physics)?;
         if gain > 0.0 {
             blend(&state.rho, &mut rho);
         }
-        latest = Some((mesh, u));
+        latest = Some((mesh, u, errors));
     }
-    let (mesh, u) = latest.expect("a coupling has at least one iteration");
+    let (mesh, u, errors) = latest.expect("a coupling has at least one iteration");
     let velocity = predicted.corrected(&mesh, gain, dt);
-    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, velocity }, work, interface })
+    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, velocity }, work, interface, errors })
+}
+
+/// The physics over a step; where its error is asked for in two halves, on the same straight paths of the nodes, beside the
+/// whole
+///
+/// All steppers are trapezoidal: their error over a step is of the third order, that of two halves a quarter of it, and so
+/// a third of the difference. Formulas of several steps would be cheaper, but the nodes turn from step to step, and the
+/// bends would count as errors.
+fn stepped(
+    physics: &mut dyn Physics,
+    motion: Motion<'_>,
+    u: &Field,
+    estimated: bool,
+) -> Result<(Field, Work, Option<Vec<f64>>), Failure> {
+    let (whole, mut work) = physics.step(motion, u)?;
+    if !estimated {
+        return Ok((whole, work, None));
+    }
+    let Motion { t, dt, old, new } = motion;
+    let half = 0.5 * dt;
+    let between = old.x().iter().zip(new.x()).map(|(a, b)| [0, 1].map(|d| 0.5 * (a[d] + b[d])));
+    let middle = old.moved(between.collect())?;
+    check_unfolded(&middle)?;
+    let (first, cost) = physics.step(Motion { t, dt: half, old, new: &middle }, u)?;
+    work += cost;
+    let (second, cost) = physics.step(Motion { t: t + half, dt: half, old: &middle, new }, &first)?;
+    work += cost;
+    let error = |c: usize| whole.component(c).zip(second.component(c)).fold(0.0, |m, (a, b)| larger(m, (a - b) / 3.0));
+    let errors = (0..second.components()).map(error).collect();
+    Ok((second, work, Some(errors)))
 }
 
 /// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that

@@ -1,11 +1,13 @@
 //! The time loop: mesh, then physics, then whoever watches.
 
 mod checkpoint;
+mod control;
 mod coupling;
 mod observer;
 mod pace;
 mod prediction;
 mod report;
+mod safety;
 mod schedule;
 
 pub use checkpoint::CheckpointsAt;
@@ -18,6 +20,7 @@ pub use report::{
 };
 pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
 pub(crate) use report::{status, write_file};
+pub use safety::{Retries, Safety};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
@@ -54,6 +57,10 @@ pub struct State {
 pub struct Record {
     /// Steps and their cost.
     pub work: WorkTotal,
+    /// Steps that were tried again.
+    pub safety: Retries,
+    /// How far nodes went: the sum over all steps of the longest way of a node.
+    pub travelled: f64,
     /// Where the time went.
     pub seconds: Seconds,
     /// One report for each time asked for.
@@ -69,7 +76,7 @@ pub struct Record {
 /// # Example
 /// ```
 /// use driftmesh::{density::Arclength, geometry::{Lattice, Mesh}, meshing::{Mmpde, Whole}};
-/// use driftmesh::{physics::{Burgers, Convection}, simulation::{Coupling, Record, Schedule, Simulation}};
+/// use driftmesh::{physics::{Burgers, Convection}, simulation::{Coupling, Record, Safety, Schedule, Simulation}};
 ///
 /// let mut simulation = Simulation {
 ///     physics: Box::new(Burgers::new(0.005, Convection::Conservative)?),
@@ -77,6 +84,7 @@ pub struct Record {
 ///     generator: Box::new(Whole::default()),
 ///     equation: Mmpde::default(),
 ///     coupling: Coupling::default(),
+///     safety: Safety::default(),
 ///     schedule: Schedule::new(0.25, 0.30, 1e-3, vec![0.30])?,
 /// };
 /// let mesh = Mesh::uniform(Lattice::bounded([20, 20])?, [0.0, 0.0], [1.0, 1.0])?;
@@ -98,6 +106,8 @@ pub struct Simulation {
     pub equation: Mmpde,
     /// How often mesh and physics alternate in a step.
     pub coupling: Coupling,
+    /// How far a step that fails is tried again.
+    pub safety: Safety,
     /// When.
     pub schedule: Schedule,
 }
@@ -158,8 +168,7 @@ impl Simulation {
             if check_unfolded(&moved).is_err() {
                 break;
             }
-            let motion = state.mesh.x().iter().zip(moved.x()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
-            let at_rest = motion.fold(0.0, f64::max) <= AT_REST * moved.shortest_edge();
+            let at_rest = farthest(&state.mesh, &moved) <= AT_REST * moved.shortest_edge();
             mesh = moved;
             before = Some(state.rho);
             if at_rest {
@@ -215,33 +224,19 @@ impl Simulation {
         }
         let mut pace = match course {
             Some(course) => course.pace,
-            None if self.schedule.is_automatic() => {
-                let began = Instant::now();
-                let pace = Pace::new(self, state)?;
-                record.seconds.pde += began.elapsed().as_secs_f64();
-                Some(pace)
-            }
-            None => None,
+            None => timed(&mut record.seconds.pde, || Pace::new(self, state))?,
         };
-        let course = |pace: &Option<Pace>| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
+        let course = |pace: &Pace| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
         self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
-        while let Some((t, dt)) = self.next(state, pace.as_ref()) {
+        while let Some((t, dt)) = pace.next(&self.schedule, state) {
             let step = state.step + 1;
             self.warn_of_haste(state.t, dt, record);
-            let next =
-                coupling::advance(self, state, t, dt, pace.as_ref().map_or(dt, Pace::scale), &mut record.seconds);
-            let judged = match &mut pace {
-                Some(pace) => pace.judge(state, next),
-                None => next.map(Some),
-            };
-            let next = match judged {
+            let next = match pace.step(self, state, (t, dt), record) {
                 Ok(Some(next)) => next,
-                Ok(None) => {
-                    record.work.rejected_steps += 1;
-                    continue;
-                }
+                Ok(None) => continue,
                 Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
             };
+            record.travelled += farthest(&state.mesh, &next.state.mesh);
             *state = next.state;
             record.work.add(next.work);
             record.interface = next.interface;
@@ -294,14 +289,6 @@ impl Simulation {
         checkpoints.write(state.step, &Checkpoint::of(state, clock.counted(record), course, kept))?;
         record.seconds.output += began.elapsed().as_secs_f64();
         Ok(())
-    }
-
-    /// The time after the next step, and its length.
-    fn next(&self, state: &State, pace: Option<&Pace>) -> Option<(f64, f64)> {
-        match pace {
-            None => Some((self.schedule.time(state.step + 1), self.schedule.step_from(state.step)?)),
-            Some(pace) => self.schedule.after(state.t, pace.step()).map(|t| (t, t - state.t)),
-        }
     }
 
     /// Says once in a run that τ, given in units of time, is too few steps.
@@ -393,6 +380,11 @@ impl Simulation {
             comparison: None,
         }
     }
+}
+
+/// The longest way of a node from one mesh to the next.
+pub(crate) fn farthest(from: &Mesh<2>, to: &Mesh<2>) -> f64 {
+    from.x().iter().zip(to.x()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
 }
 
 /// Ends a run where an observer asks for that.

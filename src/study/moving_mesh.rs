@@ -5,7 +5,7 @@ use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
-use crate::simulation::{CheckpointsAt, Coupling, FramesAt, Observer, Record, Schedule, Simulation, State, timed};
+use crate::simulation::{CheckpointsAt, Coupling, FramesAt, Observer, Record, Safety, Schedule, Simulation, State, timed};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +30,9 @@ pub struct MovingMesh {
     /// `[mesh]`.
     #[serde(default)]
     pub mesh: MeshTable,
+    /// `[safety]`.
+    #[serde(default)]
+    pub safety: Safety,
     /// `[compare]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compare: Option<Compare>,
@@ -124,9 +127,13 @@ pub struct Time {
     pub start: f64,
     /// Time of the last state.
     pub end: f64,
-    /// Longest step, or as the solution allows; steps are shortened evenly such that reports and end are met exactly.
-    #[serde(default)]
-    pub step: Auto<f64>,
+    /// Longest step, or as the solution allows; steps are shortened evenly such that reports and end are met exactly. Where
+    /// there is a tolerance, the first step too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<Auto<f64>>,
+    /// Error that a step may make in time, as a share of the range of the solution: steps are as long as that allows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
     /// Times at which `summary.json` reports; the end where none are given.
     #[serde(default)]
     pub report: Vec<f64>,
@@ -255,6 +262,8 @@ impl MovingMesh {
         self.pde.check().map_err(|error| error.within("pde"))?;
         self.check_axes()?;
         self.check_stepper()?;
+        self.check_tolerance()?;
+        self.safety.check().map_err(|error| error.within("safety"))?;
         self.check_size()?;
         let lattice = *self.uniform_mesh()?.lattice();
         self.mesh.generator.check(&lattice).map_err(|error| error.within("generator").within("mesh"))?;
@@ -341,6 +350,24 @@ impl MovingMesh {
             self.physics()?;
         }
         Ok(())
+    }
+
+    /// Refuses a tolerance that the rest of the study does not go with, and fills in the step where there is none.
+    fn check_tolerance(&mut self) -> Result<()> {
+        let Some(tolerance) = self.time.tolerance else {
+            self.time.step.get_or_insert_default();
+            return Ok(());
+        };
+        if self.time.step == Some(Auto::Auto) {
+            let rule = "time.tolerance decides on the steps; leave one of both out, or give the longest step as a number";
+            return Err(Error::invalid("time.step", "\"auto\"", rule));
+        }
+        let rule = match (&self.pde, self.time.stepper) {
+            (_, Some(Stepper::Rk4)) => "stepper = \"rk4\" has steps of its own; leave one of both out",
+            (PdeKind::Prescribed(_), _) => "pde.kind = \"prescribed\" has no error in time; leave it out",
+            _ => return Ok(()),
+        };
+        Err(Error::invalid("time.tolerance", tolerance, rule))
     }
 
     /// The equation with its stepper.
@@ -453,15 +480,19 @@ impl MovingMesh {
     }
 
     fn schedule(&self) -> Result<Schedule> {
-        let Time { start, end, step, report, .. } = &self.time;
-        match *step {
-            Auto::Value(step) => Schedule::new(*start, *end, step, report.clone()),
-            Auto::Auto => Schedule::automatic(*start, *end, report.clone()),
+        let Time { start, end, step, tolerance, report, .. } = &self.time;
+        match (*step, *tolerance) {
+            (Some(Auto::Value(longest)), Some(tolerance)) => {
+                Schedule::tolerant(*start, *end, tolerance, Some(longest), report.clone())
+            }
+            (_, Some(tolerance)) => Schedule::tolerant(*start, *end, tolerance, None, report.clone()),
+            (Some(Auto::Value(step)), None) => Schedule::new(*start, *end, step, report.clone()),
+            (None | Some(Auto::Auto), None) => Schedule::automatic(*start, *end, report.clone()),
         }
         .map_err(|error| error.within("time"))
     }
 
-    fn monitor(&self) -> MonitorKind {
+    pub(super) fn monitor(&self) -> MonitorKind {
         self.monitor.clone().unwrap_or_default()
     }
 
@@ -523,6 +554,7 @@ impl MovingMesh {
             generator: self.mesh.generator.clone().into_generator(),
             equation: self.equation(),
             coupling: self.mesh.coupling,
+            safety: self.safety,
             schedule: self.schedule()?,
         })
     }

@@ -1,6 +1,7 @@
 use crate::error::{Error, Failure};
 use crate::geometry::{Comparison, Quality};
 use crate::meshing::Interface;
+use crate::simulation::Retries;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +27,8 @@ pub struct Summary {
     pub parallel: Parallel,
     /// Steps and their cost.
     pub work: WorkTotal,
+    /// Steps that were tried again.
+    pub safety: Retries,
     /// One entry for each time of `time.report` that was reached.
     pub reports: Vec<Report>,
     /// What the user should know although nothing failed.
