@@ -305,22 +305,6 @@ impl Failure {
         Self::iter().map(|failure| [failure.name(), failure.get_documentation().unwrap_or_default(), failure.help()])
     }
 
-    /// True where a shorter step or a smoother density may do without.
-    pub fn may_pass(&self) -> bool {
-        matches!(
-            self,
-            Self::Folded { .. }
-                | Self::NonFinite { .. }
-                | Self::NotPositive { .. }
-                | Self::NewtonStalled { .. }
-                | Self::LinearStalled { .. }
-                | Self::SteepDensity { .. }
-                | Self::LongWalks { .. }
-                | Self::NoisyInterface { .. }
-                | Self::SchwarzStalled { .. }
-        )
-    }
-
     /// The keys of a study that may cure it.
     pub fn help(&self) -> &'static str {
         match self {

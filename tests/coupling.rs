@@ -47,8 +47,8 @@ fn simulate(
         generator: Box::new(Whole::default()),
         equation: Mmpde { relaxation: 0.2.into(), ..Mmpde::default() },
         coupling,
-        schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),
         safety: Safety::default(),
+        schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),
     };
     let mesh = Mesh::uniform(Lattice::bounded([20, 20]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
     let mut state = simulation.start(mesh).unwrap();

@@ -290,7 +290,7 @@ fn what_a_directory_holds_is_told() {
         "monitor.strength.relative=3000",
         "monitor.smoothing=0",
         "grid.cells=[40,40]",
-        "safety.substeps=0",
+        "safety.substeps=1",
         "safety.smoothing=0",
         "safety.halvings=0",
     ];

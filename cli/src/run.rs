@@ -3,7 +3,7 @@ use crate::{StudyArgs, equidistribution, poisson, progress::Progress, stefan, te
 use clap::Args;
 use driftmesh::Error;
 use driftmesh::meshing::Interface;
-use driftmesh::simulation::{Observer, RunDirectory, Standing, Summary};
+use driftmesh::simulation::{Observer, Retries, RunDirectory, Standing, Summary};
 use driftmesh::study::{self, Begin, MovingMesh, Study, UniformEquivalent};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -155,6 +155,15 @@ fn table(summary: &Summary) -> String {
     }
     if total.work.path_steps > 0 {
         text += &format!(", {} path steps", total.work.path_steps);
+    }
+    let Retries { substeps, smoothed, shortened } = summary.safety;
+    if total.rejected_steps > 0 {
+        text += &format!("\nrejected {} steps", total.rejected_steps);
+        let again = [(substeps, "with mesh sub-steps"), (smoothed, "with more smoothing"), (shortened, "shortened")];
+        let again: Vec<String> = again.iter().filter(|(n, _)| *n > 0).map(|(n, how)| format!("{n} {how}")).collect();
+        if !again.is_empty() {
+            text += &format!(", tried again {}", again.join(", "));
+        }
     }
     text += &format!("\nseconds  {:.2} (", s.wall);
     if s.interface > 0.0 {

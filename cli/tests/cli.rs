@@ -382,7 +382,7 @@ fn a_folded_mesh_is_named_and_the_frames_are_kept() {
     let sandbox = Sandbox::new();
     let steep =
         ["monitor.strength.relative=3000", "monitor.smoothing=0", "grid.cells=[40,40]", "output.frames.every=1"];
-    let first_failure_ends_it = ["safety.substeps=0", "safety.smoothing=0", "safety.halvings=0"];
+    let first_failure_ends_it = ["safety.substeps=1", "safety.smoothing=0", "safety.halvings=0"];
     let output = sandbox.run(&[&steep[..], &first_failure_ends_it, &["mesh.generator.kind=whole"]].concat());
     assert_eq!(output.status.code(), Some(1));
     let words = words(&output);

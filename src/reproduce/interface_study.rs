@@ -56,8 +56,8 @@ impl InterfaceStep {
             generator: Box::new(Whole::default()),
             equation: Mmpde::default(),
             coupling: Coupling::default(),
-            schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
             safety: Safety::default(),
+            schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
         };
         let mesh = Mesh::uniform(Lattice::bounded([cells, cells])?, [0.0; 2], [1.0; 2])?;
         let mut state = simulation.start(mesh)?;
@@ -398,8 +398,8 @@ fn coupled(options: Options) -> Result<Table> {
             generator,
             equation: Mmpde::default(),
             coupling: Coupling::default(),
-            schedule: Schedule::new(0.25, 0.75, 1e-3, vec![0.75])?,
             safety: Safety::default(),
+            schedule: Schedule::new(0.25, 0.75, 1e-3, vec![0.75])?,
         };
         let mut state = simulation.start(Mesh::uniform(lattice, [0.0; 2], [1.0; 2])?)?;
         simulation.run(&mut state, &mut Record::default(), &mut [])?;

@@ -2,7 +2,7 @@
 
 use super::pace::Pace;
 use super::report::{remove, sync_directory};
-use super::{Record, Schedule, State, write_file};
+use super::{Record, Safety, Schedule, State, write_file};
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Field, Mesh, check_unfolded};
 use crate::kept::{Kept, check_nodal, encoded};
@@ -251,7 +251,7 @@ fn decoded<C: DeserializeOwned>(content: &[u8]) -> Result<C, Unfit> {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Course {
     pub mass_at_start: f64,
-    pub pace: Option<Pace>,
+    pub pace: Pace,
     /// Since the run began, over all its parts.
     pub seconds: f64,
 }
@@ -288,7 +288,13 @@ impl Checkpoint {
     }
 
     /// The state, if one of the study can be so. `mesh` is any of its meshes.
-    pub fn state(&self, mesh: &Mesh<2>, physics: &dyn Physics, schedule: &Schedule) -> Result<State, Unfit> {
+    pub fn state(
+        &self,
+        mesh: &Mesh<2>,
+        physics: &dyn Physics,
+        schedule: &Schedule,
+        safety: Safety,
+    ) -> Result<State, Unfit> {
         let damaged = |reason: String| Err(Unfit::Damaged(reason));
         let (nodes, components) = (mesh.lattice().len(), physics.unknowns().len());
         let Self { t, step, x, u, rho, velocity, course, .. } = self;
@@ -305,7 +311,7 @@ impl Checkpoint {
         if ![course.mass_at_start, course.seconds].iter().all(|v| v.is_finite()) {
             return damaged(format!("its mass {} or its seconds {} cannot be", course.mass_at_start, course.seconds));
         }
-        if course.pace.as_ref().map(Pace::is_sound) != schedule.is_automatic().then_some(true) {
+        if !course.pace.is_sound(schedule, safety) {
             return damaged("its time steps are none of the run".into());
         }
         let mesh = mesh.moved(x.clone()).map_err(|failure| Unfit::Damaged(failure.to_string()))?;

@@ -1,9 +1,11 @@
 use super::prediction::{Predicted, blend};
-use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State, timed};
+use super::safety::Care;
+use super::{NOISE_WORTH_A_WARNING, Seconds, Simulation, State, timed};
 use crate::density::{Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
-use crate::meshing::{Interface, MeshGenerator, Mmpde};
+use crate::meshing::{Interface, Mmpde};
+use crate::numerics::larger;
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
 use schemars::JsonSchema;
@@ -52,123 +54,116 @@ pub(super) struct Advanced {
     pub state: State,
     pub work: Work,
     pub interface: Option<Interface>,
+    /// Error of the step in each unknown, where it was asked for.
+    pub errors: Option<Vec<f64>>,
 }
 
-/// One step to time `t`: mesh, then physics, as often as the coupling says. `scale` is the step that τ is measured in.
-pub(super) fn advance(
+/// What a step goes over, from the time of a state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    /// Time at its end.
+    pub t: f64,
+    /// Its length.
+    pub dt: f64,
+    /// The step that τ is measured in.
+    pub scale: f64,
+    /// Whether its error is estimated.
+    pub estimated: bool,
+}
+
+/// Which part of a step failed.
+pub(super) enum Setback {
+    Mesh(Failure),
+    Physics(Failure),
+}
+
+/// One step, tried once: mesh, then physics, as often as the coupling says.
+pub(super) fn attempt(
     simulation: &mut Simulation,
     state: &State,
-    t: f64,
-    dt: f64,
-    scale: f64,
-    record: &mut Record,
-) -> Result<Advanced, Failure> {
-    let Simulation { physics, monitor, generator, equation, coupling, safety, .. } = simulation;
-    let Record { seconds, safety: rescues, .. } = record;
+    stretch: Stretch,
+    care: Care,
+    seconds: &mut Seconds,
+) -> Result<Advanced, Setback> {
+    let Stretch { t, dt, scale, estimated } = stretch;
+    let Simulation { physics, monitor, generator, equation, coupling, .. } = simulation;
+    let mesh_steps = coupling.mesh_steps * care.substeps;
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
     // where steps are short against τ the velocity learns no faster in time
     let gain = equation.relaxation.prediction() * dt / scale;
     let equation = Mmpde { relaxation: equation.relaxation.at(scale), ..*equation };
-    let predicted = timed(&mut seconds.mesh, || Predicted::after(state, gain, dt))?;
+    let predicted = timed(&mut seconds.mesh, || Predicted::after(state, gain, dt)).map_err(Setback::Mesh)?;
     let mut latest = None;
     for _ in 0..coupling.iterations {
-        let mut attempts = safety.attempts().peekable();
-        let moved = loop {
-            let [parts, passes] = attempts.next().expect("there is a first attempt");
-            let substeps = coupling.mesh_steps * parts;
-            let moved = timed(&mut seconds.mesh, || {
-                let mut smoother = rho.clone();
-                smooth(predicted.mesh.lattice(), &mut smoother, passes);
-                moved(generator.as_mut(), &equation, &predicted.mesh, &smoother, dt, substeps)
-            });
-            match moved {
-                Err(failure) if failure.may_pass() && attempts.peek().is_some() => continue,
-                moved => {
-                    rescues.substeps += usize::from(moved.is_ok() && parts > 1);
-                    rescues.smoothed += usize::from(moved.is_ok() && passes > 0);
-                    break moved?;
-                }
+        let mut spent = 0.0;
+        let mesh = timed(&mut seconds.mesh, || {
+            let mut mesh = predicted.mesh.clone();
+            smooth(mesh.lattice(), &mut rho, care.smoothing);
+            for sub in 0..mesh_steps {
+                let carried = if sub == 0 { None } else { Some(interpolate(&predicted.mesh, &rho, &mesh)) };
+                let rho = carried.as_ref().unwrap_or(&rho);
+                let moved = generator.step(&equation, &mesh, rho, dt / mesh_steps as f64)?;
+                let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
+                check_unfolded(&moved.mesh).map_err(|failure| match failure {
+                    Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
+                    other => other,
+                })?;
+                mesh = moved.mesh;
+                work += moved.work;
+                spent += moved.interface.map_or(0.0, |i| i.seconds);
+                interface = moved.interface;
             }
-        };
-        work += moved.work;
-        interface = moved.interface;
-        seconds.mesh -= moved.between;
-        seconds.interface += moved.between;
-        let mesh = moved.mesh;
+            Ok(mesh)
+        });
+        let mesh = mesh.map_err(Setback::Mesh)?;
+        seconds.mesh -= spent;
+        seconds.interface += spent;
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
-        let (u, cost) = timed(&mut seconds.pde, || physics.step(motion, &state.u))?;
+        let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))
+            .map_err(Setback::Physics)?;
         work += cost;
-        rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
+        rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))
+            .map_err(Setback::Physics)?;
         if gain > 0.0 {
             blend(&state.rho, &mut rho);
         }
-        latest = Some((mesh, u));
+        latest = Some((mesh, u, errors));
     }
-    let (mesh, u) = latest.expect("a coupling has at least one iteration");
+    let (mesh, u, errors) = latest.expect("a coupling has at least one iteration");
     let velocity = predicted.corrected(&mesh, gain, dt);
-    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, velocity }, work, interface })
+    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, velocity }, work, interface, errors })
 }
 
-/// Where mesh sub-steps lead.
-struct Moved {
-    mesh: Mesh<2>,
-    work: Work,
-    interface: Option<Interface>,
-    /// Seconds on interfaces.
-    between: f64,
-}
-
-/// A mesh step in so many sub-steps, ρ carried along onto each sub-mesh.
-fn moved(
-    generator: &mut dyn MeshGenerator,
-    equation: &Mmpde,
-    from: &Mesh<2>,
-    rho: &[f64],
-    dt: f64,
-    substeps: usize,
-) -> Result<Moved, Failure> {
-    let mut all = Moved { mesh: from.clone(), work: Work::default(), interface: None, between: 0.0 };
-    for sub in 0..substeps {
-        let carried = if sub == 0 { None } else { Some(interpolate(from, rho, &all.mesh)) };
-        let rho = carried.as_deref().unwrap_or(rho);
-        let moved = generator.step(equation, &all.mesh, rho, dt / substeps as f64)?;
-        let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
-        check_unfolded(&moved.mesh).map_err(|failure| match failure {
-            Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
-            other => other,
-        })?;
-        all.mesh = moved.mesh;
-        all.work += moved.work;
-        all.between += moved.interface.map_or(0.0, |i| i.seconds);
-        all.interface = moved.interface;
+/// The physics over a step; where its error is asked for in two halves, on the same straight paths of the nodes, beside the
+/// whole
+///
+/// All steppers are trapezoidal: their error over a step is of the third order, that of two halves a quarter of it, and so
+/// a third of the difference. Formulas of several steps would be cheaper, but the nodes turn from step to step, and the
+/// bends would count as errors.
+fn stepped(
+    physics: &mut dyn Physics,
+    motion: Motion<'_>,
+    u: &Field,
+    estimated: bool,
+) -> Result<(Field, Work, Option<Vec<f64>>), Failure> {
+    let (whole, mut work) = physics.step(motion, u)?;
+    if !estimated {
+        return Ok((whole, work, None));
     }
-    Ok(all)
-}
-
-/// One step to time `t`, in halves where it fails, and these in halves, so many times.
-pub(super) fn advance_in_halves(
-    simulation: &mut Simulation,
-    state: &State,
-    [t, dt]: [f64; 2],
-    scale: f64,
-    halvings: u32,
-    record: &mut Record,
-) -> Result<Advanced, Failure> {
-    match advance(simulation, state, t, dt, scale, record) {
-        Err(failure) if halvings > 0 && failure.may_pass() => {
-            record.work.rejected_steps += 1;
-            record.safety.halved += 1;
-            let half = 0.5 * dt;
-            let first = advance_in_halves(simulation, state, [state.t + half, half], scale, halvings - 1, record)?;
-            let mut both = advance_in_halves(simulation, &first.state, [t, half], scale, halvings - 1, record)?;
-            both.state.step = state.step + 1;
-            both.work += first.work;
-            Ok(both)
-        }
-        done => done,
-    }
+    let Motion { t, dt, old, new } = motion;
+    let half = 0.5 * dt;
+    let between = old.x().iter().zip(new.x()).map(|(a, b)| [0, 1].map(|d| 0.5 * (a[d] + b[d])));
+    let middle = old.moved(between.collect())?;
+    check_unfolded(&middle)?;
+    let (first, cost) = physics.step(Motion { t, dt: half, old, new: &middle }, u)?;
+    work += cost;
+    let (second, cost) = physics.step(Motion { t: t + half, dt: half, old: &middle, new }, &first)?;
+    work += cost;
+    let error = |c: usize| whole.component(c).zip(second.component(c)).fold(0.0, |m, (a, b)| larger(m, (a - b) / 3.0));
+    let errors = (0..second.components()).map(error).collect();
+    Ok((second, work, Some(errors)))
 }
 
 /// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that
@@ -183,4 +178,71 @@ pub(super) fn density(
     let values = monitor.followed(t, mesh, u)?;
     let gradient = physics.gradient(t, mesh);
     monitor.density(mesh, &values, gradient.as_deref())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Lattice;
+    use crate::physics::{Burgers, Convection, FormulaPde, ShallowWater, WaterForm};
+
+    fn bent(periodic: bool, [s, c]: [f64; 2]) -> Mesh<2> {
+        use std::f64::consts::PI;
+        let lattice = Lattice::new([16, 16], [periodic; 2]).unwrap();
+        let mesh = Mesh::uniform(lattice, [0.0; 2], [1.0; 2]).unwrap();
+        let x = mesh.x().iter().map(|x| {
+            let [a, b] = x.map(|x| (2.0 * PI * x).sin());
+            [x[0] + s * a * b, x[1] + c * a * b]
+        });
+        mesh.moved(x.collect()).unwrap()
+    }
+
+    /// For every stepper, on nodes that move, the estimate is the error against a hundred steps along the same paths, and
+    /// of the third order.
+    #[test]
+    fn the_estimate_is_the_error() {
+        let formula = "{\"unknowns\": [\"u\", \"v\"], \"flux\": {\"u\": [\"u^2\", \"u\"]}, \"diffusivity\": {\"u\": \"0.02\", \"v\": \"0.01\"}, \
+                       \"source\": {\"v\": \"u*(1-v)\"}, \"initial\": {\"u\": \"2+sin(2*pi*x)*cos(2*pi*y)\", \"v\": \"0.2\"}}";
+        let formula: FormulaPde = serde_json::from_str(formula).unwrap();
+        let water = |form| {
+            let shape = ShallowWater { pile: 1.0, radius: 0.2, width: 0.15, ..ShallowWater::default() };
+            Box::new(ShallowWater { form, ..shape }) as Box<dyn Physics>
+        };
+        let burgers = |convection| Box::new(Burgers::new(0.05, convection).unwrap()) as Box<dyn Physics>;
+        let all: [(&str, bool, f64, Box<dyn Physics>); 6] = [
+            ("conservative", false, 0.01, burgers(Convection::Conservative)),
+            ("advective", false, 0.02, burgers(Convection::Advective)),
+            ("flux", false, 0.02, burgers(Convection::Flux)),
+            ("formula", true, 0.01, formula.into_physics().unwrap()),
+            ("water by flux", true, 0.004, water(WaterForm::Flux)),
+            ("water by advection", true, 0.004, water(WaterForm::Advective)),
+        ];
+        for (name, periodic, dt, mut physics) in all {
+            let old = bent(periodic, [0.02, -0.03]);
+            let u = physics.initial(0.25, &old);
+            let mut estimates = Vec::new();
+            for dt in [dt, 0.5 * dt] {
+                // the same velocity for both
+                let to = bent(periodic, [0.02 + dt, -0.03 + dt]);
+                let between = |share: f64| {
+                    let x = old.x().iter().zip(to.x()).map(|(a, b)| [0, 1].map(|d| a[d] + share * (b[d] - a[d])));
+                    old.moved(x.collect()).unwrap()
+                };
+                let (found, _, errors) =
+                    stepped(physics.as_mut(), Motion { t: 0.25, dt, old: &old, new: &to }, &u, true).unwrap();
+                let mut fine = u.clone();
+                for n in 0..100 {
+                    let [a, b] = [between(n as f64 / 100.0), between((n + 1) as f64 / 100.0)];
+                    let motion = Motion { t: 0.25 + dt * n as f64 / 100.0, dt: dt / 100.0, old: &a, new: &b };
+                    fine = physics.step(motion, &fine).unwrap().0;
+                }
+                let error = found.component(0).zip(fine.component(0)).fold(0.0, |m, (a, b)| larger(m, a - b));
+                let estimate = errors.unwrap()[0];
+                assert!((0.7..1.4).contains(&(estimate / error)), "{name}: {estimate:e} where it is {error:e}");
+                estimates.push(estimate);
+            }
+            let order = (estimates[0] / estimates[1]).log2();
+            assert!((2.5..3.3).contains(&order), "{name}: order {order:.2}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! The time loop: mesh, then physics, then whoever watches.
 
 mod checkpoint;
+mod control;
 mod coupling;
 mod observer;
 mod pace;
@@ -19,7 +20,7 @@ pub use report::{
 };
 pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
 pub(crate) use report::{status, write_file};
-pub use safety::{Rescues, Safety};
+pub use safety::{Retries, Safety};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
@@ -56,6 +57,10 @@ pub struct State {
 pub struct Record {
     /// Steps and their cost.
     pub work: WorkTotal,
+    /// Steps that were tried again.
+    pub safety: Retries,
+    /// How far nodes went: the sum over all steps of the longest way of a node.
+    pub travelled: f64,
     /// Where the time went.
     pub seconds: Seconds,
     /// One report for each time asked for.
@@ -64,10 +69,6 @@ pub struct Record {
     pub interface: Option<Interface>,
     /// What the user should know although nothing failed.
     pub warnings: Vec<String>,
-    /// What `[safety]` had to do.
-    pub safety: Rescues,
-    /// How far the mesh went: the longest way of a node in each step, in cells of the uniform mesh, added up.
-    pub motion: f64,
 }
 
 /// A moving mesh, the physics on it, and how they are advanced together.
@@ -83,8 +84,8 @@ pub struct Record {
 ///     generator: Box::new(Whole::default()),
 ///     equation: Mmpde::default(),
 ///     coupling: Coupling::default(),
-///     schedule: Schedule::new(0.25, 0.30, 1e-3, vec![0.30])?,
 ///     safety: Safety::default(),
+///     schedule: Schedule::new(0.25, 0.30, 1e-3, vec![0.30])?,
 /// };
 /// let mesh = Mesh::uniform(Lattice::bounded([20, 20])?, [0.0, 0.0], [1.0, 1.0])?;
 /// let mut state = simulation.start(mesh)?;
@@ -105,10 +106,10 @@ pub struct Simulation {
     pub equation: Mmpde,
     /// How often mesh and physics alternate in a step.
     pub coupling: Coupling,
+    /// How far a step that fails is tried again.
+    pub safety: Safety,
     /// When.
     pub schedule: Schedule,
-    /// What is tried where a step fails.
-    pub safety: Safety,
 }
 
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
@@ -118,11 +119,6 @@ const STEPS_OF_THE_START: f64 = 30.0;
 const MAX_STEPS_OF_THE_START: usize = 500;
 /// Motion in one step, as a share of the shortest edge, below which the mesh at the start rests.
 const AT_REST: f64 = 4e-3;
-/// Motion in a run, in cells, below which a mesh is said not to move where max/mean of ρ × area is above the second figure,
-/// or ρ the same everywhere but for the third.
-const MOTION: f64 = 0.01;
-const ASKED: f64 = 1.5;
-const FLAT: f64 = 1e-6;
 const HASTY: &str = "`mesh.relaxation` is short";
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
@@ -172,8 +168,7 @@ impl Simulation {
             if check_unfolded(&moved).is_err() {
                 break;
             }
-            let motion = state.mesh.x().iter().zip(moved.x()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
-            let at_rest = motion.fold(0.0, f64::max) <= AT_REST * moved.shortest_edge();
+            let at_rest = farthest(&state.mesh, &moved) <= AT_REST * moved.shortest_edge();
             mesh = moved;
             before = Some(state.rho);
             if at_rest {
@@ -229,36 +224,19 @@ impl Simulation {
         }
         let mut pace = match course {
             Some(course) => course.pace,
-            None if self.schedule.is_automatic() => {
-                let began = Instant::now();
-                let pace = Pace::new(self, state)?;
-                record.seconds.pde += began.elapsed().as_secs_f64();
-                Some(pace)
-            }
-            None => None,
+            None => timed(&mut record.seconds.pde, || Pace::new(self, state))?,
         };
-        let course = |pace: &Option<Pace>| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
+        let course = |pace: &Pace| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
         self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
-        while let Some((t, dt)) = self.next(state, pace.as_ref()) {
+        while let Some((t, dt)) = pace.next(&self.schedule, state) {
             let step = state.step + 1;
             self.warn_of_haste(state.t, dt, record);
-            let next = match &pace {
-                Some(pace) => coupling::advance(self, state, t, dt, pace.scale(), record),
-                None => coupling::advance_in_halves(self, state, [t, dt], dt, self.safety.halvings, record),
-            };
-            let judged = match &mut pace {
-                Some(pace) => pace.judge(state, next),
-                None => next.map(Some),
-            };
-            let next = match judged {
+            let next = match pace.step(self, state, (t, dt), record) {
                 Ok(Some(next)) => next,
-                Ok(None) => {
-                    record.work.rejected_steps += 1;
-                    continue;
-                }
+                Ok(None) => continue,
                 Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
             };
-            record.motion += self::motion(&state.mesh, &next.state.mesh);
+            record.travelled += farthest(&state.mesh, &next.state.mesh);
             *state = next.state;
             record.work.add(next.work);
             record.interface = next.interface;
@@ -270,8 +248,6 @@ impl Simulation {
             self.show(Event::Stepped, state, record, observers, dt, &clock)?;
             self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
         }
-        self.warn_of_rescues(record);
-        self.warn_of_rest(state, record);
         if let Some(checkpoints) = checkpoints.filter(|checkpoints| checkpoints.at_the_end) {
             self.checkpoint(state, record, observers, checkpoints, &clock, course(&pace))?;
         }
@@ -315,14 +291,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// The time after the next step, and its length.
-    fn next(&self, state: &State, pace: Option<&Pace>) -> Option<(f64, f64)> {
-        match pace {
-            None => Some((self.schedule.time(state.step + 1), self.schedule.step_from(state.step)?)),
-            Some(pace) => self.schedule.after(state.t, pace.step()).map(|t| (t, t - state.t)),
-        }
-    }
-
     /// Says once in a run that τ, given in units of time, is too few steps.
     fn warn_of_haste(&self, t: f64, dt: f64, record: &mut Record) {
         let Relaxation::Time(tau) = self.equation.relaxation else { return };
@@ -333,44 +301,6 @@ impl Simulation {
                 tau / dt
             ));
         }
-    }
-
-    /// Says at the end what `[safety]` had to do.
-    fn warn_of_rescues(&self, record: &mut Record) {
-        record.warnings.retain(|said| !said.starts_with(safety::SAFETY));
-        record.warnings.extend(record.safety.told());
-    }
-
-    /// Says at the end that the mesh did not move although its density asked it to, and why.
-    fn warn_of_rest(&self, state: &State, record: &mut Record) {
-        let asked = quality(&state.mesh, &state.rho).equidistribution;
-        if !self.generator.moves() || record.motion > MOTION || record.work.steps == 0 {
-            return;
-        }
-        let (low, high) = state.rho.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), r| (l.min(*r), h.max(*r)));
-        let duration = self.schedule.end() - self.schedule.start();
-        let reason = match self.equation.relaxation {
-            _ if high - low <= FLAT * high => {
-                let changes = (0..state.u.components()).any(|c| {
-                    let ends = state.u.component(c).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), u| (l.min(u), h.max(u)));
-                    ends.1 - ends.0 > FLAT * ends.0.abs().max(ends.1.abs())
-                });
-                if !changes {
-                    return;
-                }
-                "its density is the same everywhere although the solution is not: look at monitor.of and monitor.strength".into()
-            }
-            _ if asked <= ASKED => return,
-            Relaxation::Time(tau) if tau > duration => {
-                format!("mesh.relaxation = {tau} is longer than the run, {duration}; lower it")
-            }
-            _ => "the run is short against mesh.relaxation, or the mesh rests on a density that changes nowhere but in a few cells"
-                .into(),
-        };
-        record.warnings.push(format!(
-            "the mesh did not move: by {:.0e} of a cell in the whole run, with {asked:.2} for max/mean of density × area; {reason}",
-            record.motion
-        ));
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.
@@ -452,6 +382,11 @@ impl Simulation {
     }
 }
 
+/// The longest way of a node from one mesh to the next.
+pub(crate) fn farthest(from: &Mesh<2>, to: &Mesh<2>) -> f64 {
+    from.x().iter().zip(to.x()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
+}
+
 /// Ends a run where an observer asks for that.
 fn end_where_asked(observers: &[&mut dyn Observer], state: &State) -> Result<()> {
     match observers.iter().any(|observer| observer.interrupts()) {
@@ -497,14 +432,6 @@ impl Record {
         self.seconds.cpu = before.cpu + cpu.elapsed().as_secs_f64();
         result
     }
-}
-
-/// The longest way of a node between two meshes, in cells of the uniform one.
-fn motion(from: &Mesh<2>, to: &Mesh<2>) -> f64 {
-    let (extent, cells) = (from.extent(), from.lattice().cells());
-    let per = [0, 1].map(|d| cells[d] as f64 / extent[d]);
-    let ways = from.x().iter().zip(to.x()).map(|(a, b)| ((b[0] - a[0]) * per[0]).hypot((b[1] - a[1]) * per[1]));
-    ways.fold(0.0, f64::max)
 }
 
 /// Time and result of a computation.

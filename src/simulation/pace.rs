@@ -1,24 +1,102 @@
-use super::coupling::Advanced;
-use super::{Simulation, State};
+use super::control::Control;
+use super::coupling::{Advanced, Stretch};
+use super::safety::{Safety, advance, divided, is_curable};
+use super::schedule::{Schedule, Steps};
+use super::{Record, Simulation, State};
 use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{DualCells, Field, Lattice, padded};
 use crate::numerics::larger;
 use crate::physics::Motion;
 use serde::{Deserialize, Serialize};
 
+/// How long steps are, and what is remembered for the next
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) enum Pace {
+    /// As the schedule says; the last step was done in 2^`halvings` parts.
+    Even {
+        /// 0 where nothing failed.
+        halvings: usize,
+    },
+    /// As long as the solution and the mesh allow.
+    Free(Free),
+}
+
+impl Pace {
+    /// Before the first step from a state.
+    pub fn new(simulation: &mut Simulation, state: &State) -> Result<Self> {
+        match simulation.schedule.decided_by() {
+            Steps::Even => Ok(Self::Even { halvings: 0 }),
+            Steps::ByChange => Ok(Self::Free(Free::new(simulation, state, None, None)?)),
+            Steps::ByError { tolerance, longest } => {
+                Ok(Self::Free(Free::new(simulation, state, Some(Control::to(tolerance)), longest)?))
+            }
+        }
+    }
+
+    /// True where a run of this schedule and safety can be so.
+    pub fn is_sound(&self, schedule: &Schedule, safety: Safety) -> bool {
+        match (self, schedule.decided_by()) {
+            (Self::Even { halvings }, Steps::Even) => *halvings <= safety.halvings,
+            (Self::Free(free), Steps::ByChange) => free.control.is_none() && free.is_sound(),
+            (Self::Free(free), Steps::ByError { tolerance, .. }) => {
+                free.control.as_ref().is_some_and(|control| control.is_sound(tolerance)) && free.is_sound()
+            }
+            _ => false,
+        }
+    }
+
+    /// The time after the next step, and its length; none at the end.
+    pub fn next(&self, schedule: &Schedule, state: &State) -> Option<(f64, f64)> {
+        match self {
+            Self::Even { .. } => Some((schedule.time(state.step + 1), schedule.step_from(state.step)?)),
+            Self::Free(free) => schedule.after(state.t, free.dt).map(|t| (t, t - state.t)),
+        }
+    }
+
+    /// Tries the next step; none is returned where it is refused.
+    ///
+    /// # Errors
+    /// What it failed with when all was tried.
+    pub(super) fn step(
+        &mut self,
+        simulation: &mut Simulation,
+        state: &State,
+        (t, dt): (f64, f64),
+        record: &mut Record,
+    ) -> Result<Option<Advanced>, Failure> {
+        match self {
+            Self::Even { halvings } => {
+                let stretch = Stretch { t, dt, scale: dt, estimated: false };
+                let (next, took) = divided(simulation, state, stretch, [halvings.saturating_sub(1), 0], record)?;
+                *halvings = took;
+                Ok(Some(next))
+            }
+            Self::Free(free) => {
+                let stretch = Stretch { t, dt, scale: free.scale, estimated: free.control.is_some() };
+                let next = advance(simulation, state, stretch, record);
+                free.judge(state, next, simulation.safety.halvings, record)
+            }
+        }
+    }
+}
+
 /// Steps as long as the solution and the mesh allow: at no moving node does the first unknown change by much more than
-/// three hundredths of the largest range that it had
+/// three hundredths of the largest range that it had, or the error of a step stays below a tolerance
 ///
 /// Where the mesh goes along with a front, little changes at its nodes, and a step may carry the front over many times its
-/// width. The next step is chosen from the change in the last one; a step in which much more changes, or that fails, is
-/// refused and tried again with a shorter one. A trial on the resting mesh chooses the first.
+/// width. The next step is chosen from the last one; a step in which much more changes, or that fails, is refused and tried
+/// again with a shorter one. A trial on the resting mesh chooses the first.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Pace {
+pub(crate) struct Free {
     dt: f64,
     longest: f64,
     scale: f64,
-    /// The largest range of the first unknown so far.
-    range: f64,
+    /// The largest range of each unknown so far.
+    ranges: Vec<f64>,
+    /// Where errors decide, not changes.
+    control: Option<Control>,
+    /// Steps that failed since the last one that did not.
+    failures: usize,
 }
 
 /// Change in a step, as a share of the range.
@@ -34,23 +112,28 @@ const FEWEST: f64 = 20.0;
 /// The first trial, as a share of the longest step, and how many there may be, each a hundredth of the one before.
 const TRIAL: f64 = 1e-2;
 const TRIALS: usize = 3;
+/// An unknown whose range is so small beside the largest of all is of rounding.
+const OF_ROUNDING: f64 = 1e-9;
 
-impl Pace {
-    /// The first step from a state.
-    pub fn new(simulation: &mut Simulation, state: &State) -> Result<Self> {
+impl Free {
+    fn new(simulation: &mut Simulation, state: &State, control: Option<Control>, first: Option<f64>) -> Result<Self> {
+        let ranges: Vec<f64> = (0..state.u.components()).map(|c| range(&state.u, c)).collect();
+        let free =
+            |dt: f64, longest: f64| Self { dt, longest, scale: dt, ranges: ranges.clone(), control, failures: 0 };
+        if let Some(first) = first {
+            return Ok(free(first, first));
+        }
         let longest = (simulation.schedule.end() - simulation.schedule.start()) / FEWEST;
-        let range = range(&state.u);
         let mut trial = TRIAL * longest;
         let mut number = 1;
         loop {
             let motion = Motion { t: state.t, dt: trial, old: &state.mesh, new: &state.mesh };
             match simulation.physics.step(motion, &state.u) {
                 Ok((u, _)) => {
-                    let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), range);
+                    let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), ranges[0]);
                     // a trial in which too much happens says little
                     if share <= CHANGE || number == TRIALS {
-                        let dt = (trial * CHANGE / share).min(longest);
-                        return Ok(Self { dt, longest, scale: dt, range });
+                        return Ok(free((trial * CHANGE / share).min(longest), longest));
                     }
                 }
                 Err(failure) if number == TRIALS => {
@@ -63,62 +146,79 @@ impl Pace {
         }
     }
 
-    /// True where steps can be so.
-    pub fn is_sound(&self) -> bool {
+    fn is_sound(&self) -> bool {
         [self.dt, self.longest, self.scale].iter().all(|dt| dt.is_finite() && *dt > 0.0)
-            && self.range.is_finite()
-            && self.range >= 0.0
-    }
-
-    /// Length of the next step, if nothing ends before.
-    pub fn step(&self) -> f64 {
-        self.dt
-    }
-
-    /// The step that τ is measured in: the next one, or the time in which the solution changes as much at a fixed place.
-    /// A mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep faster.
-    pub fn scale(&self) -> f64 {
-        self.scale
+            && !self.ranges.is_empty()
+            && self.ranges.iter().all(|range| range.is_finite() && *range >= 0.0)
     }
 
     /// Learns from a step; none is returned where it is refused.
     ///
     /// # Errors
-    /// What a step failed with, or [`Failure::VanishingStep`], where the next would be too short.
-    pub(super) fn judge(
+    /// What a step failed with once it was halved `halvings` times, or [`Failure::VanishingStep`], where the next would be
+    /// too short.
+    fn judge(
         &mut self,
         before: &State,
         step: Result<Advanced, Failure>,
+        halvings: usize,
+        record: &mut Record,
     ) -> Result<Option<Advanced>, Failure> {
         let step = match step {
             Ok(step) => step,
             Err(failure) => {
-                self.dt *= GROWTH[0];
-                return if self.dt < SHORTEST * self.longest { Err(failure) } else { Ok(None) };
+                self.dt *= 0.5;
+                self.failures += 1;
+                if self.failures > halvings || self.dt < SHORTEST * self.longest || !is_curable(&failure) {
+                    return Err(failure);
+                }
+                record.work.rejected_steps += 1;
+                record.safety.shortened += 1;
+                return Ok(None);
             }
         };
+        self.failures = 0;
         let after = &step.state;
-        self.range = self.range.max(range(&after.u));
+        for (c, largest) in self.ranges.iter_mut().enumerate() {
+            *largest = largest.max(range(&after.u, c));
+        }
         let dt = after.t - before.t;
-        let share = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), self.range);
         // a step that was cut short to meet a report says what a whole one would have done
-        let whole = share * self.dt / dt;
-        let factor = if whole.is_finite() { (CHANGE / whole).clamp(GROWTH[0], GROWTH[1]) } else { GROWTH[0] };
+        let cut = self.dt / dt;
+        let (taken, factor) = match (&mut self.control, &step.errors) {
+            (Some(control), Some(errors)) => control.judge(relative(errors, &self.ranges), cut),
+            _ => {
+                let share = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), self.ranges[0]);
+                let whole = share * cut;
+                let factor = if whole.is_finite() { (CHANGE / whole).clamp(GROWTH[0], GROWTH[1]) } else { GROWTH[0] };
+                (share <= TOO_MUCH * CHANGE, factor)
+            }
+        };
         self.dt = (self.dt * factor).min(self.longest);
         if self.dt < SHORTEST * self.longest {
             return Err(Failure::VanishingStep { dt: self.dt });
         }
-        if share > TOO_MUCH * CHANGE {
+        if !taken {
+            record.work.rejected_steps += 1;
             return Ok(None);
         }
+        // a mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep
+        // faster: it keeps to the time in which the solution changes as much at a fixed place
         let mut scale = self.dt;
         if scale < self.scale {
-            let in_place = dt * CHANGE / self::share(change_in_place(before, after), self.range);
+            let in_place = dt * CHANGE / share(change_in_place(before, after), self.ranges[0]);
             scale = scale.max(in_place.min(self.scale));
         }
         self.scale = scale;
         Ok(Some(step))
     }
+}
+
+/// The largest error of all unknowns, each as a share of its range.
+fn relative(errors: &[f64], ranges: &[f64]) -> f64 {
+    let largest = ranges.iter().copied().fold(0.0, f64::max);
+    let counted = errors.iter().zip(ranges).filter(|(_, range)| **range > OF_ROUNDING * largest);
+    counted.fold(0.0, |m, (error, range)| larger(m, error / range))
 }
 
 /// The largest change of the first unknown at a node inside. On sides, where values are
@@ -150,10 +250,10 @@ fn change_in_place(before: &State, after: &State) -> f64 {
     changes.fold(0.0, larger)
 }
 
-/// The range of the first unknown; 0 where it is of rounding.
-fn range(u: &Field) -> f64 {
+/// The range of an unknown; 0 where it is of rounding.
+fn range(u: &Field, c: usize) -> f64 {
     let extremes = (f64::INFINITY, f64::NEG_INFINITY);
-    let (low, high) = u.component(0).fold(extremes, |(low, high), u| (low.min(u), high.max(u)));
+    let (low, high) = u.component(c).fold(extremes, |(low, high), u| (low.min(u), high.max(u)));
     if high - low > 1e-12 * low.abs().max(high.abs()) { high - low } else { 0.0 }
 }
 

@@ -1,94 +1,199 @@
-use crate::error::{Error, Result};
+//! What is done where a step fails: the mesh in smaller steps, a smoother density, a shorter step.
+
+use super::coupling::{Advanced, Setback, Stretch, attempt};
+use super::{Record, Simulation, State};
+use crate::error::{Error, Failure, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[safety]`: what is tried before a run ends, where the mesh folds or a solve fails
+/// `[safety]`: how far a step that fails is tried again
 ///
-/// No folded mesh is ever accepted. A mesh step that folds, or that cannot be solved, is repeated from the same mesh: in 2, 4, 8 …
-/// sub-steps, ρ carried along, so that the mesh follows ρ(x) rather than ρ(ξ); then so, with 2, 4, 8 … more passes of the
-/// filter over ρ. Where that does not help, or the physics fails, the time step is done in halves, these in halves, and
-/// so on. Automatic steps are shortened instead as far as they can be.
+/// Where the mesh of a step folds, or its equation cannot be solved, the mesh goes to the new time in 2, 4, … `substeps`
+/// parts, with ρ carried along. Where that does not help, ρ is smoothed by 2, 4, … `smoothing` further passes before it
+/// moves the mesh. Where that does not help either, or the equation on the mesh fails, the time step is halved, `halvings`
+/// times at most; a step of a fixed length is then done in parts that meet its end exactly. When all is spent the run ends
+/// with what the step failed with.
+///
+/// # Example
+/// ```
+/// use driftmesh::simulation::Safety;
+/// assert_eq!(Safety::default(), Safety { substeps: 8, smoothing: 8, halvings: 6 });
+/// assert_eq!(Safety::OFF, Safety { substeps: 1, smoothing: 0, halvings: 0 });
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Safety {
-    /// How often the number of mesh sub-steps may double.
-    pub substeps: u32,
-    /// How often the further passes of the filter may double, from one.
-    pub smoothing: u32,
-    /// How often a time step may be halved.
-    pub halvings: u32,
+    /// Most parts that a step of the mesh is divided in; 1 for none.
+    pub substeps: usize,
+    /// Most further passes of the filter of ρ; 0 for none.
+    pub smoothing: usize,
+    /// How often a time step is halved at most; 0 for never.
+    pub halvings: usize,
 }
+
+/// Steps that were tried again, by what was tried.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Retries {
+    /// With the mesh in more parts.
+    pub substeps: usize,
+    /// With a smoother density.
+    pub smoothed: usize,
+    /// With a shorter time step.
+    pub shortened: usize,
+}
+
+/// With more parts a step of the mesh costs more than shorter time steps do.
+const MOST_SUBSTEPS: usize = 64;
+/// A density is flat before.
+const MOST_SMOOTHING: usize = 1000;
+/// A step of 2⁻³⁰ is none.
+const MOST_HALVINGS: usize = 30;
 
 impl Default for Safety {
     fn default() -> Self {
-        Self { substeps: 3, smoothing: 3, halvings: 4 }
+        Self { substeps: 8, smoothing: 8, halvings: 6 }
     }
 }
 
-/// Most of each.
-const MOST: u32 = 12;
-
 impl Safety {
-    /// The first failure ends the run.
-    pub const NONE: Self = Self { substeps: 0, smoothing: 0, halvings: 0 };
+    /// The first failure ends a run.
+    pub const OFF: Self = Self { substeps: 1, smoothing: 0, halvings: 0 };
 
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] above 12: that is thousands of parts.
+    /// [`Error::Invalid`].
     pub fn check(&self) -> Result<()> {
-        for (key, value) in [("substeps", self.substeps), ("smoothing", self.smoothing), ("halvings", self.halvings)] {
-            if value > MOST {
-                return Err(Error::invalid(key, value, format!("must be at most {MOST}: each doubles the work")));
+        for (key, value, range) in [
+            ("substeps", self.substeps, 1..=MOST_SUBSTEPS),
+            ("smoothing", self.smoothing, 0..=MOST_SMOOTHING),
+            ("halvings", self.halvings, 0..=MOST_HALVINGS),
+        ] {
+            if !range.contains(&value) {
+                let rule = format!("must be between {} and {}", range.start(), range.end());
+                return Err(Error::invalid(key, value, rule));
             }
         }
         Ok(())
     }
 
-    /// Mesh sub-steps and further passes of the filter, attempt by attempt.
-    pub(super) fn attempts(self) -> impl Iterator<Item = [usize; 2]> {
-        let divided = (0..=self.substeps).map(|n| [1 << n, 0]);
-        divided.chain((1..=self.smoothing).map(move |n| [1 << self.substeps, 1 << n]))
+    /// What is tried after this, if anything.
+    fn beyond(self, care: Care) -> Option<Care> {
+        let Care { substeps, smoothing } = care;
+        if smoothing == 0 && substeps < self.substeps {
+            return Some(Care { substeps: (2 * substeps).min(self.substeps), smoothing });
+        }
+        (smoothing < self.smoothing).then(|| Care { substeps, smoothing: (2 * smoothing).max(2).min(self.smoothing) })
     }
 }
 
-/// What `[safety]` had to do.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Rescues {
-    /// Mesh steps that were done in sub-steps.
+/// The care with which a step of the mesh is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Care {
+    /// Parts of each step of the mesh.
     pub substeps: usize,
-    /// Those among them that took a smoother density.
-    pub smoothed: usize,
-    /// Time steps that were done in halves, halves of halves included.
-    pub halved: usize,
+    /// Further passes over ρ.
+    pub smoothing: usize,
 }
 
-impl Rescues {
-    /// What to tell the user, if anything.
-    pub(super) fn told(&self) -> Option<String> {
-        let Self { substeps, smoothed, halved } = self;
-        (substeps + halved > 0).then(|| {
-            format!(
-                "{SAFETY}: the mesh would have folded, or a step failed: {substeps} mesh steps were done in sub-steps, {smoothed} of \
-                 them with a smoother density, and {halved} time steps in halves; a shorter time.step, more monitor.smoothing or a \
-                 longer mesh.relaxation need less of it"
-            )
-        })
+/// One step, its mesh with as much care as it needs. What it fails with is what it failed with at first.
+pub(super) fn advance(
+    simulation: &mut Simulation,
+    state: &State,
+    stretch: Stretch,
+    record: &mut Record,
+) -> Result<Advanced, Failure> {
+    let mut care = Care { substeps: 1, smoothing: 0 };
+    let mut first = None;
+    loop {
+        match attempt(simulation, state, stretch, care, &mut record.seconds) {
+            Ok(advanced) => return Ok(advanced),
+            Err(Setback::Mesh(failure)) if is_curable(&failure) => {
+                let failure = first.get_or_insert(failure);
+                let Some(more) = simulation.safety.beyond(care) else { return Err(failure.clone()) };
+                record.work.rejected_steps += 1;
+                match more.smoothing > 0 {
+                    true => record.safety.smoothed += 1,
+                    false => record.safety.substeps += 1,
+                }
+                care = more;
+            }
+            Err(Setback::Mesh(failure) | Setback::Physics(failure)) => return Err(failure),
+        }
     }
 }
 
-/// Begins the warning.
-pub(super) const SAFETY: &str = "`[safety]`";
+/// One step in 2^`parts` parts, or in as many as it takes; with the halvings that it took.
+///
+/// What it fails with is what its last part failed with.
+pub(super) fn divided(
+    simulation: &mut Simulation,
+    state: &State,
+    stretch: Stretch,
+    [parts, done]: [usize; 2],
+    record: &mut Record,
+) -> Result<(Advanced, usize), Failure> {
+    if parts == 0 {
+        match advance(simulation, state, stretch, record) {
+            Ok(advanced) => return Ok((advanced, 0)),
+            Err(failure) if done == simulation.safety.halvings || !is_curable(&failure) => return Err(failure),
+            Err(_) => {
+                record.work.rejected_steps += 1;
+                record.safety.shortened += 1;
+            }
+        }
+    }
+    let half = 0.5 * stretch.dt;
+    let to_middle = Stretch { t: state.t + half, dt: half, ..stretch };
+    let (first, took) = divided(simulation, state, to_middle, [parts.saturating_sub(1), done + 1], record)?;
+    let to_end = Stretch { dt: half, ..stretch };
+    let (mut second, takes) = divided(simulation, &first.state, to_end, [took, done + 1], record)?;
+    second.work += first.work;
+    second.state.step = state.step + 1;
+    Ok((second, 1 + took.max(takes)))
+}
+
+/// False for what no step is short enough, and for formulas without a value, which a shorter step might only step over.
+pub(super) fn is_curable(failure: &Failure) -> bool {
+    !matches!(
+        failure,
+        Failure::Formula { .. }
+            | Failure::NotPeriodic { .. }
+            | Failure::NotUniform { .. }
+            | Failure::ManySubsteps { .. }
+            | Failure::Subdomains { .. }
+            | Failure::WrongLength { .. }
+    )
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn ladder(safety: Safety) -> Vec<(usize, usize)> {
+        let first = Some(Care { substeps: 1, smoothing: 0 });
+        let all = std::iter::successors(first, |care| safety.beyond(*care));
+        all.map(|care| (care.substeps, care.smoothing)).collect()
+    }
+
+    /// First the parts, then the passes, each doubled up to its limit and never beyond it.
     #[test]
-    fn attempts_grow() {
-        let all = |safety: Safety| safety.attempts().collect::<Vec<_>>();
-        assert_eq!(all(Safety::NONE), [[1, 0]]);
-        assert_eq!(all(Safety { substeps: 2, smoothing: 2, halvings: 0 }), [[1, 0], [2, 0], [4, 0], [4, 2], [4, 4]]);
-        assert!(Safety { halvings: 13, ..Safety::default() }.check().is_err());
+    fn the_ladder_ends_at_its_limits() {
+        assert_eq!(ladder(Safety::default()), [(1, 0), (2, 0), (4, 0), (8, 0), (8, 2), (8, 4), (8, 8)]);
+        assert_eq!(ladder(Safety { substeps: 3, smoothing: 1, halvings: 0 }), [(1, 0), (2, 0), (3, 0), (3, 1)]);
+        assert_eq!(ladder(Safety { substeps: 1, ..Safety::default() }), [(1, 0), (1, 2), (1, 4), (1, 8)]);
+        assert_eq!(ladder(Safety::OFF), [(1, 0)]);
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        for (safety, named) in [
+            (Safety { substeps: 0, ..Safety::default() }, "substeps"),
+            (Safety { smoothing: 1001, ..Safety::default() }, "smoothing"),
+            (Safety { halvings: 31, ..Safety::default() }, "halvings"),
+        ] {
+            assert!(matches!(safety.check(), Err(Error::Invalid { key, .. }) if key == named));
+        }
+        assert!(Safety::OFF.check().is_ok() && Safety::default().check().is_ok());
     }
 }

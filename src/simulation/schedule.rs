@@ -17,13 +17,30 @@ use crate::error::{Error, Result};
 pub struct Schedule {
     start: f64,
     reports: Vec<f64>,
-    /// True where the solution decides how long steps are.
-    automatic: bool,
+    steps: Steps,
     /// End of each interval, and the number of steps done there.
     intervals: Vec<(f64, usize)>,
 }
 
+/// What decides how long steps are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Steps {
+    /// The schedule alone.
+    Even,
+    /// The solution, by its change at the moving nodes.
+    ByChange,
+    /// The solution, by the error of a step.
+    ByError {
+        /// The error of a step, as a share of the range of the solution.
+        tolerance: f64,
+        /// The first and longest step, where one is given.
+        longest: Option<f64>,
+    },
+}
+
 const MAX_STEPS: f64 = 1e9;
+/// Errors of a step that the solvers of the equations do not drown.
+const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-5..=0.1;
 
 impl Schedule {
     /// From `start` to `end` with steps that the solution chooses, meeting all of `report`.
@@ -33,7 +50,23 @@ impl Schedule {
     pub fn automatic(start: f64, end: f64, report: Vec<f64>) -> Result<Self> {
         // one interval between two reports is one step to be divided
         let step = (end - start).abs().max(f64::MIN_POSITIVE);
-        Ok(Self { automatic: true, ..Self::new(start, end, step, report)? })
+        Ok(Self { steps: Steps::ByChange, ..Self::new(start, end, step, report)? })
+    }
+
+    /// From `start` to `end` with steps whose estimated error is no more than `tolerance`, as a share of the range of the
+    /// solution, meeting all of `report`. `longest` is the first step as well.
+    ///
+    /// # Errors
+    /// As [`Schedule::new`], and [`Error::Invalid`] for a tolerance that is not between 1e-5 and 0.1.
+    pub fn tolerant(start: f64, end: f64, tolerance: f64, longest: Option<f64>, report: Vec<f64>) -> Result<Self> {
+        if !TOLERANCES.contains(&tolerance) {
+            let rule = "must be between 1e-5, below which what equations leave unsolved would count, and 0.1";
+            return Err(Error::invalid("tolerance", tolerance, rule));
+        }
+        if let Some(longest) = longest {
+            Self::new(start, end, longest, report.clone())?;
+        }
+        Ok(Self { steps: Steps::ByError { tolerance, longest }, ..Self::automatic(start, end, report)? })
     }
 
     /// From `start` to `end` with steps no longer than `step`, meeting all of `report`.
@@ -80,7 +113,7 @@ impl Schedule {
                 from = to;
             }
         }
-        Ok(Self { start, reports, automatic: false, intervals })
+        Ok(Self { start, reports, steps: Steps::Even, intervals })
     }
 
     /// Time of the initial state.
@@ -95,12 +128,17 @@ impl Schedule {
 
     /// Number of steps; none where the solution decides.
     pub fn steps(&self) -> Option<usize> {
-        (!self.automatic).then(|| self.intervals.last().map_or(0, |i| i.1))
+        (!self.is_automatic()).then(|| self.intervals.last().map_or(0, |i| i.1))
     }
 
     /// True where the solution decides how long steps are.
     pub fn is_automatic(&self) -> bool {
-        self.automatic
+        self.steps != Steps::Even
+    }
+
+    /// What decides how long steps are.
+    pub(super) fn decided_by(&self) -> Steps {
+        self.steps
     }
 
     /// The time after a step from `t` of about `dt`, at most a third longer: the next report or the end is met exactly,
@@ -198,5 +236,13 @@ mod tests {
         assert_eq!(key(f64::NAN, 1.0, 0.1, vec![]), "start");
         assert_eq!(key(0.0, f64::INFINITY, 0.1, vec![]), "end");
         assert_eq!(key(0.0, 1.0, 0.1, vec![2.0]), "report");
+        for (tolerance, longest, named) in
+            [(0.0, None, "tolerance"), (f64::NAN, None, "tolerance"), (1e-3, Some(-1.0), "step")]
+        {
+            match Schedule::tolerant(0.0, 1.0, tolerance, longest, vec![]) {
+                Err(Error::Invalid { key, .. }) => assert_eq!(key, named),
+                other => panic!("{other:?}"),
+            }
+        }
     }
 }

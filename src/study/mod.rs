@@ -8,6 +8,7 @@ mod mapped;
 mod memory;
 mod moving_mesh;
 mod poisson;
+mod rest;
 mod run;
 mod source;
 mod stefan;

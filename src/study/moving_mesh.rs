@@ -129,9 +129,13 @@ pub struct Time {
     pub start: f64,
     /// Time of the last state.
     pub end: f64,
-    /// Longest step, or as the solution allows; steps are shortened evenly such that reports and end are met exactly.
-    #[serde(default)]
-    pub step: Auto<f64>,
+    /// Longest step, or as the solution allows; steps are shortened evenly such that reports and end are met exactly. Where
+    /// there is a tolerance, the first step too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<Auto<f64>>,
+    /// Error that a step may make in time, as a share of the range of the solution: steps are as long as that allows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
     /// Times at which `summary.json` reports; the end where none are given.
     #[serde(default)]
     pub report: Vec<f64>,
@@ -260,6 +264,8 @@ impl MovingMesh {
         self.pde.check().map_err(|error| error.within("pde"))?;
         self.check_axes()?;
         self.check_stepper()?;
+        self.check_tolerance()?;
+        self.safety.check().map_err(|error| error.within("safety"))?;
         self.check_size()?;
         let lattice = *self.uniform_mesh()?.lattice();
         self.mesh.generator.check(&lattice).map_err(|error| error.within("generator").within("mesh"))?;
@@ -287,7 +293,6 @@ impl MovingMesh {
         });
         self.equation().check().map_err(|error| error.within("mesh"))?;
         self.mesh.coupling.check().map_err(|error| error.within("coupling").within("mesh"))?;
-        self.safety.check().map_err(|error| error.within("safety"))?;
         if self.time.report.is_empty() {
             self.time.report = vec![self.time.end];
         }
@@ -347,6 +352,25 @@ impl MovingMesh {
             self.physics()?;
         }
         Ok(())
+    }
+
+    /// Refuses a tolerance that the rest of the study does not go with, and fills in the step where there is none.
+    fn check_tolerance(&mut self) -> Result<()> {
+        let Some(tolerance) = self.time.tolerance else {
+            self.time.step.get_or_insert_default();
+            return Ok(());
+        };
+        if self.time.step == Some(Auto::Auto) {
+            let rule =
+                "time.tolerance decides on the steps; leave one of both out, or give the longest step as a number";
+            return Err(Error::invalid("time.step", "\"auto\"", rule));
+        }
+        let rule = match (&self.pde, self.time.stepper) {
+            (_, Some(Stepper::Rk4)) => "stepper = \"rk4\" has steps of its own; leave one of both out",
+            (PdeKind::Prescribed(_), _) => "pde.kind = \"prescribed\" has no error in time; leave it out",
+            _ => return Ok(()),
+        };
+        Err(Error::invalid("time.tolerance", tolerance, rule))
     }
 
     /// The equation with its stepper.
@@ -459,15 +483,19 @@ impl MovingMesh {
     }
 
     fn schedule(&self) -> Result<Schedule> {
-        let Time { start, end, step, report, .. } = &self.time;
-        match *step {
-            Auto::Value(step) => Schedule::new(*start, *end, step, report.clone()),
-            Auto::Auto => Schedule::automatic(*start, *end, report.clone()),
+        let Time { start, end, step, tolerance, report, .. } = &self.time;
+        match (*step, *tolerance) {
+            (Some(Auto::Value(longest)), Some(tolerance)) => {
+                Schedule::tolerant(*start, *end, tolerance, Some(longest), report.clone())
+            }
+            (_, Some(tolerance)) => Schedule::tolerant(*start, *end, tolerance, None, report.clone()),
+            (Some(Auto::Value(step)), None) => Schedule::new(*start, *end, step, report.clone()),
+            (None | Some(Auto::Auto), None) => Schedule::automatic(*start, *end, report.clone()),
         }
         .map_err(|error| error.within("time"))
     }
 
-    fn monitor(&self) -> MonitorKind {
+    pub(super) fn monitor(&self) -> MonitorKind {
         self.monitor.clone().unwrap_or_default()
     }
 
@@ -529,8 +557,8 @@ impl MovingMesh {
             generator: self.mesh.generator.clone().into_generator(),
             equation: self.equation(),
             coupling: self.mesh.coupling,
-            schedule: self.schedule()?,
             safety: self.safety,
+            schedule: self.schedule()?,
         })
     }
 

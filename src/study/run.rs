@@ -1,5 +1,6 @@
 use super::MovingMesh;
 use super::any::Begin;
+use super::rest::at_rest;
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
 use crate::kept::{Kept, check_nodal};
@@ -99,7 +100,9 @@ fn run_from(
         watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
         let failure = simulation.run_on(&mut state, &mut record, &mut observers, Some(&mut checkpoints), course).err();
         let failure = match failure {
-            None => reference_into(&directory, &study, &meshes, &mut record, watchers).err(),
+            None => warn_of_rest(&study, &simulation, &state, &mut record)
+                .and_then(|()| reference_into(&directory, &study, &meshes, &mut record, watchers))
+                .err(),
             failure => failure,
         };
         let output = Instant::now();
@@ -181,7 +184,7 @@ impl Underway {
 /// What a checkpoint holds, if the study can go on from it.
 fn accept(study: &MovingMesh, simulation: &mut Simulation, found: &Checkpoint) -> Result<(State, Meshes), Unfit> {
     let mesh = study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
-    let state = found.state(&mesh, simulation.physics.as_ref(), &simulation.schedule)?;
+    let state = found.state(&mesh, simulation.physics.as_ref(), &simulation.schedule, simulation.safety)?;
     simulation.generator.resume(&mesh, &found.kept)?;
     Ok((state, Meshes::resume(study, &mesh, &found.kept)?))
 }
@@ -206,9 +209,18 @@ pub fn compute(study: &MovingMesh) -> Result<(Record, Option<Error>)> {
     let mut record = Record::default();
     let mut state = study.start(&simulation, &mut record, &mut [])?;
     let mut meshes = Meshes::of(&study);
-    let failure = simulation.run(&mut state, &mut record, &mut [&mut meshes]).err();
-    let failure = failure.map_or_else(|| compare_with_reference(&study, &meshes, &mut record, &mut []).err(), Some);
-    Ok((record, failure))
+    let outcome = simulation
+        .run(&mut state, &mut record, &mut [&mut meshes])
+        .and_then(|()| warn_of_rest(&study, &simulation, &state, &mut record))
+        .and_then(|()| compare_with_reference(&study, &meshes, &mut record, &mut []));
+    Ok((record, outcome.err()))
+}
+
+/// Says why the mesh did not move, where it should have.
+fn warn_of_rest(study: &MovingMesh, simulation: &Simulation, state: &State, record: &mut Record) -> Result<()> {
+    let warning = at_rest(study, simulation, state, record)?;
+    record.warnings.extend(warning);
+    Ok(())
 }
 
 /// Keeps the meshes at the report times, if there is something to compare them with.

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// `history.csv`: one row for the initial state and one a step; iterations and seconds are totals since the start.
+/// `history.csv`: one row for the initial state and one a step; iterations, rejected steps and seconds are totals since the start.
 #[derive(Debug)]
 pub struct History {
     path: PathBuf,
@@ -28,6 +28,7 @@ struct Row {
     interface_noise: Option<f64>,
     contraction_observed: Option<f64>,
     contraction_predicted: Option<f64>,
+    rejected_steps: usize,
     seconds: f64,
 }
 
@@ -104,6 +105,7 @@ impl Observer for History {
             interface_noise: snapshot.interface.and_then(|i| i.noise),
             contraction_observed: contraction.map(|c| c.observed),
             contraction_predicted: contraction.map(|c| c.predicted),
+            rejected_steps: snapshot.work.rejected_steps,
             seconds: snapshot.seconds,
         };
         // row by row, so that a run that is killed leaves whole rows

@@ -1,7 +1,7 @@
 use crate::error::{Error, Failure};
 use crate::geometry::{Comparison, Quality};
 use crate::meshing::Interface;
-use crate::simulation::Rescues;
+use crate::simulation::Retries;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
@@ -27,8 +27,8 @@ pub struct Summary {
     pub parallel: Parallel,
     /// Steps and their cost.
     pub work: WorkTotal,
-    /// What `[safety]` had to do.
-    pub safety: Rescues,
+    /// Steps that were tried again.
+    pub safety: Retries,
     /// One entry for each time of `time.report` that was reached.
     pub reports: Vec<Report>,
     /// What the user should know although nothing failed.

@@ -1,0 +1,95 @@
+use super::MovingMesh;
+use crate::density::{MonitorKind, Strength};
+use crate::error::Result;
+use crate::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde, Whole};
+use crate::simulation::{Record, Simulation, State, farthest};
+
+/// A mesh of which no node went so many cells in a whole run does not move.
+const MOVES: f64 = 0.25;
+/// A density by which a node should go so many cells asks the mesh to move.
+const ASKS: f64 = 0.5;
+/// Largest over smallest value of a density that is flat.
+const FLAT: f64 = 1.1;
+/// The same of a density that is not, before it was smoothed.
+const NOT_FLAT: f64 = 1.5;
+
+/// Why a mesh did not move in a run that ended, where it did not although something asked for it
+///
+/// What the density asks for is how far a node goes from the last mesh in one step of the mesh equation as long as τ. A
+/// density that is flat asks for nothing, but nobody means it.
+pub(super) fn at_rest(
+    study: &MovingMesh,
+    simulation: &Simulation,
+    state: &State,
+    record: &Record,
+) -> Result<Option<String>> {
+    let mesh = &state.mesh;
+    let cell = (0..2).map(|d| mesh.extent()[d] / mesh.lattice().cells()[d] as f64).fold(f64::INFINITY, f64::min);
+    let went = record.travelled / cell;
+    // a mesh that is meant to stay
+    if went > MOVES || matches!(study.mesh.generator, GeneratorKind::Fixed(_)) {
+        return Ok(None);
+    }
+    let equation = Mmpde { relaxation: 1.0.into(), form: Form::Conservative };
+    let moved = Whole::default().step(&equation, mesh, &state.rho, 1.0)?;
+    let asks = farthest(mesh, &moved.mesh) / cell;
+    let reason = match spread(&state.rho) {
+        _ if asks > ASKS => held_back(study, record),
+        spread if spread < FLAT => flattened(study, simulation, state, spread)?,
+        _ => return Ok(None),
+    };
+    Ok(Some(format!(
+        "the mesh does not move: no node went farther than {went:.2} cells, and the density at the end asks for {asks:.2}; {reason}"
+    )))
+}
+
+/// Largest over smallest value.
+fn spread(values: &[f64]) -> f64 {
+    let ends = values.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(*v), high.max(*v)));
+    ends.1 / ends.0
+}
+
+fn held_back(study: &MovingMesh, record: &Record) -> String {
+    let retries = record.safety.substeps + record.safety.smoothed + record.safety.shortened;
+    let span = study.time.end - study.time.start;
+    if 2 * retries > record.work.steps {
+        format!("{retries} tries of {} steps failed, so that [safety] held it back", record.work.steps)
+    } else {
+        let tau = study.mesh.relaxation.over(span / record.work.steps.max(1) as f64);
+        format!("with `mesh.relaxation` it follows in about τ = {tau:.3e}, and the run lasts {span:.3e}; lower it")
+    }
+}
+
+fn flattened(study: &MovingMesh, simulation: &Simulation, state: &State, spread: f64) -> Result<String> {
+    let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u)?;
+    let ends = followed.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    let mut bare = study.monitor();
+    let smoothing = match &mut bare {
+        MonitorKind::RootGradient(_) => 0,
+        MonitorKind::Arclength(arclength) => std::mem::take(&mut arclength.smoothing),
+        MonitorKind::Given(given) => std::mem::take(&mut given.smoothing),
+    };
+    let none = match &bare {
+        MonitorKind::Arclength(arclength) => match arclength.strength {
+            Strength::Relative(strength) | Strength::Absolute(strength) => strength == 0.0,
+        },
+        MonitorKind::RootGradient(_) | MonitorKind::Given(_) => false,
+    };
+    if none {
+        return Ok("its density is constant: `monitor.strength` is 0".into());
+    }
+    if ends.1 - ends.0 <= 1e-12 * ends.0.abs().max(ends.1.abs()) {
+        let followed = study.monitor().of().unwrap_or("the first unknown").to_string();
+        return Ok(format!(
+            "its density is constant, since what it follows is: {followed}; name another in `monitor.of`"
+        ));
+    }
+    let bare = bare.into_monitor(&simulation.physics.unknowns())?;
+    let without = self::spread(&bare.density(&state.mesh, &followed, None)?);
+    Ok(match without > NOT_FLAT {
+        true => format!(
+            "its density is flat, largest over smallest {spread:.3}: `monitor.smoothing` = {smoothing} passes leave that of {without:.3}"
+        ),
+        false => format!("its density is flat, largest over smallest {spread:.3}: raise `monitor.strength`"),
+    })
+}
