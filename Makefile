@@ -27,8 +27,9 @@ python: $(VENV)/ready
 	target/fresh/bin/python -m pip install --quiet target/wheels/*.whl
 	target/fresh/bin/python python/tests/readme.py
 
-# Tests that take minutes: 200 runs are killed, and go on.
+# Tests that take minutes: steep cases, 500 random studies, and 200 runs that are killed and go on.
 slow: test
+	$(CARGO) test --release --workspace -- --ignored --nocapture
 	$(VENV)/bin/python tests/python/kills.py
 
 # Speeds, as ratios measured in one run.

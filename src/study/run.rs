@@ -106,7 +106,7 @@ fn run_from(
             failure => failure,
         };
         let output = Instant::now();
-        let kept = keep(&study, &directory, &unknowns, &state, &mut frames);
+        let kept = history.flush().and_then(|()| keep(&study, &directory, &unknowns, &state, &mut frames));
         let spent = output.elapsed().as_secs_f64();
         record.seconds.output += spent;
         record.seconds.wall += spent;

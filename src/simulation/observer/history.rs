@@ -5,13 +5,22 @@ use serde::Serialize;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// `history.csv`: one row for the initial state and one a step; iterations, rejected steps and seconds are totals since the start.
+///
+/// Rows reach the file whole, so that a run that is killed leaves whole rows, and twice a second: a call of the system for
+/// each would cost as much as a small step.
 #[derive(Debug)]
 pub struct History {
     path: PathBuf,
     writer: csv::Writer<File>,
+    flushed: Instant,
 }
+
+const BETWEEN_FLUSHES: Duration = Duration::from_millis(500);
+/// Bytes for the rows of that time, at any speed.
+const BUFFER: usize = 1 << 20;
 
 #[derive(Serialize)]
 struct Row {
@@ -39,10 +48,23 @@ impl History {
     /// [`Error::Unwritable`].
     pub fn create(path: &Path) -> Result<Self> {
         let path = path.to_path_buf();
-        match csv::Writer::from_path(&path) {
-            Ok(writer) => Ok(Self { path, writer }),
+        match csv::WriterBuilder::new().buffer_capacity(BUFFER).from_path(&path) {
+            Ok(writer) => Ok(Self { path, writer, flushed: Instant::now() }),
             Err(error) => Err(Error::Unwritable { path, reason: error.to_string() }),
         }
+    }
+
+    /// Writes the rows that wait.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn flush(&mut self) -> Result<()> {
+        self.flushed = Instant::now();
+        self.writer.flush().map_err(|error| self.unwritable(error.to_string()))
+    }
+
+    fn unwritable(&self, reason: String) -> Error {
+        Error::Unwritable { path: self.path.clone(), reason }
     }
 
     /// Goes on behind the rows that a checkpoint knows of; later ones are dropped.
@@ -50,8 +72,9 @@ impl History {
     /// # Errors
     /// [`Unfit`] where they are not there.
     pub(crate) fn resume(path: &Path, kept: &Kept) -> Result<Self, Unfit> {
-        let writer = csv::WriterBuilder::new().has_headers(false).from_writer(reopened(path, kept.get("history")?)?);
-        Ok(Self { path: path.to_path_buf(), writer })
+        let file = reopened(path, kept.get("history")?)?;
+        let writer = csv::WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
+        Ok(Self { path: path.to_path_buf(), writer, flushed: Instant::now() })
     }
 }
 
@@ -86,8 +109,10 @@ pub(crate) fn synced(file: &File) -> std::io::Result<u64> {
 
 impl Observer for History {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        if matches!(event, Event::Resumed | Event::Finished) {
-            return Ok(());
+        match event {
+            Event::Resumed => return Ok(()),
+            Event::Finished => return self.flush(),
+            Event::Started | Event::Stepped => {}
         }
         let work = snapshot.work.work;
         let contraction = snapshot.interface.and_then(|i| i.contraction);
@@ -108,17 +133,14 @@ impl Observer for History {
             rejected_steps: snapshot.work.rejected_steps,
             seconds: snapshot.seconds,
         };
-        // row by row, so that a run that is killed leaves whole rows
-        let written = self.writer.serialize(row).map_err(|error| error.to_string());
-        let written = written.and_then(|()| self.writer.flush().map_err(|error| error.to_string()));
-        written.map_err(|reason| Error::Unwritable { path: self.path.clone(), reason })
+        self.writer.serialize(row).map_err(|error| self.unwritable(error.to_string()))?;
+        if self.flushed.elapsed() < BETWEEN_FLUSHES { Ok(()) } else { self.flush() }
     }
 
     fn keep(&mut self, kept: &mut Kept) -> Result<()> {
-        let length = synced(self.writer.get_ref());
-        let unwritable =
-            |error: std::io::Error| Error::Unwritable { path: self.path.clone(), reason: error.to_string() };
-        kept.put("history", &length.map_err(unwritable)?);
+        self.flush()?;
+        let length = synced(self.writer.get_ref()).map_err(|error| self.unwritable(error.to_string()))?;
+        kept.put("history", &length);
         Ok(())
     }
 }

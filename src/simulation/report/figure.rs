@@ -143,8 +143,9 @@ impl Figure {
         let font = |size: u32| ("DejaVu Sans", size * FINE).into_font();
         let area = SVGBackend::with_string(svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
         area.fill(&WHITE)?;
-        // room between the title and the plot
-        let below = area.titled(&self.title, font(17))?.margin(4 * FINE as i32, 0, 0, 0);
+        // room above the title, and between it and the plot
+        let inner = area.margin(8 * FINE as i32, 0, 0, 0);
+        let below = inner.titled(&self.title, font(17))?.margin(4 * FINE as i32, 0, 0, 0);
         let mut chart = ChartBuilder::on(&below)
             .margin(14 * FINE)
             .margin_right(24 * FINE)
