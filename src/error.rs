@@ -305,6 +305,20 @@ impl Failure {
         Self::iter().map(|failure| [failure.name(), failure.get_documentation().unwrap_or_default(), failure.help()])
     }
 
+    /// The same in a study whose mesh follows no density: of kind `poisson` or `stefan`.
+    pub fn help_without_density(&self) -> &'static str {
+        match self {
+            Self::NonFinite { .. } | Self::Formula { .. } | Self::NotPositive { .. } => {
+                "mend the formula that gives it"
+            }
+            Self::NewtonStalled { .. } => "lower time.step, refine grid.cells, or set front.stepping to \"explicit\"",
+            Self::LinearStalled { .. } => {
+                "make the flattest cells less flat by grid.grading, or give values in place of slopes on more sides"
+            }
+            _ => self.help(),
+        }
+    }
+
     /// The keys of a study that may cure it.
     pub fn help(&self) -> &'static str {
         match self {
@@ -583,6 +597,14 @@ impl Error {
                 Self::Formula { key: format!("{table}.{key}"), text, at, message, help }
             }
             other => other,
+        }
+    }
+
+    /// The same in a study of kind `poisson` or `stefan`, as [`Failure::help_without_density`].
+    pub fn help_without_density(&self) -> Option<String> {
+        match self {
+            Self::Failed { failure, .. } => Some(failure.help_without_density().into()),
+            _ => self.help(),
         }
     }
 

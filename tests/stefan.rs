@@ -108,6 +108,41 @@ fn automatic_steps_keep_to_the_limit() {
     assert!((finished.state.front[20] - 1.2328).abs() < 1e-3, "{}", finished.state.front[20]);
 }
 
+/// An automatic step that fails is halved: a boundary that heats up ever faster stops steps that are given.
+#[test]
+fn automatic_steps_that_fail_are_halved() {
+    let heated =
+        ["phase.lower.boundary=\"1.25 + 40*t\"", "front.stepping=\"implicit\"", "time.end=2.0", "time.report=[]"];
+    let ends = |step: &str| {
+        let set: Vec<String> = heated.iter().map(|s| s.to_string()).chain([format!("time.step={step}")]).collect();
+        compute("stefan-slides", &set)
+    };
+    let [given, automatic] = ["0.04", "\"auto\""].map(ends);
+    assert!(says(given.failure.as_ref().unwrap(), &["stalled", "time.step"]), "{:?}", given.failure);
+    assert!(given.state.t < 1.6 && given.summary.work.rejected_steps == 0);
+    assert!(automatic.failure.is_none(), "{:?}", automatic.failure);
+    assert!(automatic.state.t == 2.0 && automatic.summary.work.rejected_steps > 0);
+}
+
+/// Far from the origin the implicit front converges, too.
+#[test]
+fn an_implicit_front_may_be_anywhere() {
+    let error = |offset: &str| {
+        let [bottom, top] = [offset.to_string(), format!("{offset}+2")];
+        let set = [
+            "front.stepping=\"implicit\"".to_string(),
+            format!("exact.offset={offset}"),
+            format!("domain.bottom=\"{bottom}\""),
+            format!("domain.top=\"{top}\""),
+        ];
+        let finished = compute("stefan-planar", &set);
+        assert!(finished.failure.is_none(), "{offset}: {:?}", finished.failure);
+        finished.summary.reports[0].front.error_linf.unwrap()
+    };
+    let [near, far] = ["0", "1e6"].map(error);
+    assert!((far / near - 1.0).abs() < 1e-3, "{near:e} {far:e}");
+}
+
 fn says(error: &Error, words: &[&str]) -> bool {
     let text = format!("{error}\n{:?}", error.help());
     words.iter().all(|word| text.contains(word))
@@ -139,6 +174,9 @@ fn bad_studies_are_refused_at_their_place() {
         ("stefan-planar", "exact.wall=-1.0", &["exact.wall", "above 0"]),
         ("stefan-planar", "exact.centre=[0.0, 0.0]", &["exact.centre", "leave it out"]),
         ("stefan-planar", "exact.start_front=3.0", &["exact.start_front", "left the box"]),
+        ("stefan-slides", "phase.upper.initial=\"1/0\"", &["phase.upper.initial", "of the upper phase is inf"]),
+        ("stefan-line-source", "exact.centre=[0, 0.3]", &["exact.centre", "below bottom"]),
+        ("stefan-planar", "exact.far=-1e300", &["exact.far", "hardly moves"]),
         ("stefan-planar", "domain.front=\"1\"", &["domain.front", "[exact]"]),
         ("stefan-planar", "time.start=0.1", &["time.start", "of its own"]),
     ] {

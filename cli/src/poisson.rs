@@ -5,7 +5,10 @@ use std::process::ExitCode;
 
 /// Runs a study of kind `poisson`.
 pub fn run(study: &PoissonStudy, out: &Path, quiet: bool) -> driftmesh::Result<ExitCode> {
-    let summary = study.run(out)?;
+    let summary = match study.run(out) {
+        Ok(summary) => summary,
+        Err(error) => return Ok(terminal::complain(&error, error.help_without_density(), None)),
+    };
     summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {
         terminal::say(table(&summary));

@@ -36,7 +36,7 @@ pub fn run(study: &StefanStudy, out: &Path, begin: Begin, quiet: bool) -> driftm
         Some(error) => {
             let note =
                 format!("everything up to the last good state (step {}) is in {}", finished.state.step, out.display());
-            Ok(terminal::complain(&error, remedy(&error, out, error.help()), Some(note)))
+            Ok(terminal::complain(&error, remedy(&error, out, error.help_without_density()), Some(note)))
         }
     }
 }

@@ -9,6 +9,8 @@ use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport, Sparse
 
 /// Residual of the iteration, rows over their diagonal, as a share of the largest given value.
 const ITERATED: f64 = 1e-13;
+/// Condition number above which a derivative at a side is lost to rounding.
+const DEGENERATE: f64 = 1e7;
 
 /// Poisson's equation with given values or normal derivatives on the sides of a mesh
 ///
@@ -147,7 +149,11 @@ pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f
     [sign * t[1] / size, -sign * t[0] / size]
 }
 
-/// n·∇u at a node of a side from the 3 × 3 nodes next to it, exact for quadratics: (lattice index, weight).
+/// n·∇u at a node of a side from the 3 × 3 nodes next to it, exact for quadratics: (lattice index, weight)
+///
+/// Among those rows the one with the smallest Σ(|ξ_j|³ a_j)², ξ = J⁻¹(x − x₀). J is a length; where cells are so flat that
+/// rounding is all that is left then, its columns are half the way across the nodes along each axis: a quadratic of x is one
+/// of ξ, n·∇ₓ = (J⁻¹n)·∇_ξ, and distances are measured in cells.
 fn derivative(mesh: &Mesh<2>, index: usize, n: [f64; 2]) -> Result<[(usize, f64); 9], Failure> {
     let (lattice, x) = (mesh.lattice(), mesh.x());
     let (node, nodes) = (lattice.node(index), lattice.nodes());
@@ -157,23 +163,39 @@ fn derivative(mesh: &Mesh<2>, index: usize, n: [f64; 2]) -> Result<[(usize, f64)
     points[1..].iter_mut().zip(around).for_each(|(point, p)| *point = p);
     let away = points.map(|p| [x[p][0] - x[index][0], x[p][1] - x[index][1]]);
     let h = away.iter().flatten().fold(0.0_f64, |h, d| h.max(d.abs()));
-    let mut columns = [[Lanes::ZERO; 8]; 5];
-    let share: [f64; 8] = std::array::from_fn(|j| (h / away[j + 1][0].hypot(away[j + 1][1])).powi(3));
-    for j in 0..8 {
-        let [x, y] = away[j + 1].map(|d| d / h);
-        for (column, p) in columns.iter_mut().zip([x, y, x * y, x * x - y * y, x * x]) {
-            column[j] = Lanes::splat(p * share[j]);
+    let cell: [[f64; 2]; 2] = std::array::from_fn(|d| {
+        let [from, to] = [0, 2].map(|k| {
+            let mut end = node;
+            end[d] = first[d] + k;
+            x[lattice.index(end)]
+        });
+        [0, 1].map(|c| 0.5 * (to[c] - from[c]))
+    });
+    let mut condition = f64::NAN;
+    for [a, b] in [[[h, 0.0], [0.0, h]], cell] {
+        let det = a[0] * b[1] - b[0] * a[1];
+        let local = |v: [f64; 2]| [(v[0] * b[1] - b[0] * v[1]) / det, (a[0] * v[1] - v[0] * a[1]) / det];
+        let mut columns = [[Lanes::ZERO; 8]; 5];
+        let mut share = [0.0; 8];
+        for j in 0..8 {
+            let [x, y] = local(away[j + 1]);
+            share[j] = x.hypot(y).powi(-3);
+            for (column, p) in columns.iter_mut().zip([x, y, x * y, x * x - y * y, x * x]) {
+                column[j] = Lanes::splat(p * share[j]);
+            }
+        }
+        let qr = Qr::new(columns);
+        let [nx, ny] = local(n);
+        let a = qr.shortest(&[nx, ny, 0.0, 0.0, 0.0].map(Lanes::splat));
+        let mut row = points.map(|p| (p, 0.0));
+        for j in 0..8 {
+            row[j + 1].1 = a[j].0[0] * share[j];
+            row[0].1 -= row[j + 1].1;
+        }
+        condition = qr.condition().0[0];
+        if condition < DEGENERATE && row.iter().all(|(_, a)| a.is_finite()) {
+            return Ok(row);
         }
     }
-    let qr = Qr::new(columns);
-    let a = qr.shortest(&[n[0], n[1], 0.0, 0.0, 0.0].map(Lanes::splat));
-    let mut row = points.map(|p| (p, 0.0));
-    for j in 0..8 {
-        row[j + 1].1 = a[j].0[0] * share[j] / h;
-        row[0].1 -= row[j + 1].1;
-    }
-    match row.iter().all(|(_, a)| a.is_finite()) {
-        true => Ok(row),
-        false => Err(Failure::DegenerateStencil { node, x: x[index], condition: qr.condition().0[0] }),
-    }
+    Err(Failure::DegenerateStencil { node, x: x[index], condition })
 }

@@ -74,7 +74,7 @@ impl Pace {
             Self::Free(free) => {
                 let stretch = Stretch { t, dt, scale: free.scale, estimated: free.control.is_some() };
                 let next = advance(simulation, state, stretch, record);
-                free.judge(state, next, simulation.safety.halvings, record)
+                free.judge(simulation, state, next, record)
             }
         }
     }
@@ -109,6 +109,8 @@ const GROWTH: [f64; 2] = [0.5, 1.2];
 const SHORTEST: f64 = 1e-5;
 /// Steps in a run in which nothing changes.
 const FEWEST: f64 = 20.0;
+/// A share of the time in which the mesh follows: what would shorten it by more is asked of a mesh that rests.
+const DOUBTED: f64 = 0.5;
 /// The first trial, as a share of the longest step, and how many there may be, each a hundredth of the one before.
 const TRIAL: f64 = 1e-2;
 const TRIALS: usize = 3;
@@ -155,13 +157,13 @@ impl Free {
     /// Learns from a step; none is returned where it is refused.
     ///
     /// # Errors
-    /// What a step failed with once it was halved `halvings` times, or [`Failure::VanishingStep`], where the next would be
+    /// What a step failed with once it was halved as often as may be, or [`Failure::VanishingStep`], where the next would be
     /// too short.
     fn judge(
         &mut self,
+        simulation: &mut Simulation,
         before: &State,
         step: Result<Advanced, Failure>,
-        halvings: usize,
         record: &mut Record,
     ) -> Result<Option<Advanced>, Failure> {
         let step = match step {
@@ -169,7 +171,10 @@ impl Free {
             Err(failure) => {
                 self.dt *= 0.5;
                 self.failures += 1;
-                if self.failures > halvings || self.dt < SHORTEST * self.longest || !is_curable(&failure) {
+                if self.failures > simulation.safety.halvings
+                    || self.dt < SHORTEST * self.longest
+                    || !is_curable(&failure)
+                {
                     return Err(failure);
                 }
                 record.work.rejected_steps += 1;
@@ -206,11 +211,22 @@ impl Free {
         // faster: it keeps to the time in which the solution changes as much at a fixed place
         let mut scale = self.dt;
         if scale < self.scale {
-            let in_place = dt * CHANGE / share(change_in_place(before, after), self.ranges[0]);
+            let mut in_place = dt * CHANGE / share(change_in_place(before, after), self.ranges[0]);
+            if in_place < DOUBTED * self.scale {
+                // that counts what the mesh makes of the values, too, and a τ that is shortened by it sweeps the more
+                in_place = in_place.max(self.dt * CHANGE / self.share_at_rest(simulation, after));
+            }
             scale = scale.max(in_place.min(self.scale));
         }
         self.scale = scale;
         Ok(Some(step))
+    }
+
+    /// The change in the next step if the mesh rested; infinite where that fails.
+    fn share_at_rest(&self, simulation: &mut Simulation, State { t, mesh, u, .. }: &State) -> f64 {
+        let motion = Motion { t: *t, dt: self.dt, old: mesh, new: mesh };
+        let after = simulation.physics.step(motion, u);
+        after.map_or(f64::INFINITY, |(after, _)| share(change_at_nodes(mesh.lattice(), u, &after), self.ranges[0]))
     }
 }
 

@@ -67,8 +67,8 @@ impl Similarity {
             let melting = wall * warm * (-w * w).exp() / erf(w);
             let freezing = far * ice / scaled_erfc(i);
             l - mobility / PI.sqrt() * (melting + freezing)
-        })
-        .ok_or_else(|| Error::invalid("wall", wall, "gives no front; bring it nearer to 0"))?;
+        });
+        let lambda = within_reach(lambda, ["wall", "far"], [wall, far])?;
         let (sin, cos) = tilt.to_radians().sin_cos();
         Ok(Self { shape: Shape::Planar { wall, tilt: [sin, cos], offset }, far, diffusivity, lambda })
     }
@@ -96,9 +96,17 @@ impl Similarity {
             let melting = strength / (4.0 * PI) * (-z / warm).exp();
             let freezing = far * ice / scaled_e1(z / ice);
             z - mobility * (melting + freezing)
-        })
-        .ok_or_else(|| Error::invalid("strength", strength, "gives no front; lower it"))?;
+        });
+        let lambda = within_reach(lambda, ["strength", "far"], [strength, far])?;
         Ok(Self { shape: Shape::LineSource { strength, centre }, far, diffusivity, lambda })
+    }
+
+    /// Where it is singular, if anywhere: the line of a source.
+    pub fn source(&self) -> Option<[f64; 2]> {
+        match self.shape {
+            Shape::Planar { .. } => None,
+            Shape::LineSource { centre, .. } => Some(centre),
+        }
     }
 
     /// λ.
@@ -130,7 +138,11 @@ impl Similarity {
                 let over = |d: f64| s / (2.0 * (d * t).sqrt());
                 match s <= front {
                     true => wall * (1.0 - erf(over(warm)) / erf(self.lambda / warm.sqrt())),
-                    false => self.far * (1.0 - erfc(over(ice)) / erfc(self.lambda / ice.sqrt())),
+                    false => {
+                        // both vanish far away, their ratio does not
+                        let [a, b] = [over(ice), self.lambda / ice.sqrt()];
+                        self.far * (1.0 - (b * b - a * a).exp() * scaled_erfc(a) / scaled_erfc(b))
+                    }
                 }
             }
             Shape::LineSource { strength, centre } => {
@@ -138,7 +150,10 @@ impl Similarity {
                 let (over, z) = (|d: f64| r2 / (4.0 * d * t), self.lambda * self.lambda);
                 match r2 <= front * front {
                     true => strength / (4.0 * PI * warm) * (e1(over(warm)) - e1(z / warm)),
-                    false => self.far * (1.0 - e1(over(ice)) / e1(z / ice)),
+                    false => {
+                        let [a, b] = [over(ice), z / ice];
+                        self.far * (1.0 - (b - a).exp() * scaled_e1(a) / scaled_e1(b))
+                    }
                 }
             }
         }
@@ -159,20 +174,34 @@ fn cold(far: f64) -> Result<()> {
     }
 }
 
-/// The zero of a function that is negative near 0 and grows through it.
-fn root(f: impl Fn(f64) -> f64) -> Option<f64> {
+/// The zero of a function that is negative near 0 and grows through it: 0 or infinite where that is out of reach.
+fn root(f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (1e-12, 1.0);
+    if f(low) > 0.0 {
+        return 0.0;
+    }
     while f(high).is_nan() || f(high) <= 0.0 {
         high *= 2.0;
         if high > 1e6 {
-            return None;
+            return f64::INFINITY;
         }
     }
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         if f(middle) > 0.0 { high = middle } else { low = middle }
     }
-    Some(high)
+    high
+}
+
+/// λ, or the setting that makes the front too fast or too slow.
+fn within_reach(lambda: f64, [warm, cold]: [&'static str; 2], [heat, far]: [f64; 2]) -> Result<f64> {
+    if lambda == 0.0 {
+        return Err(Error::invalid(cold, far, "gives a front that hardly moves; bring it nearer to 0"));
+    }
+    if lambda.is_infinite() {
+        return Err(Error::invalid(warm, heat, "gives a front that runs away; bring it nearer to 0"));
+    }
+    Ok(lambda)
 }
 
 /// e^(z²) erfc z for z ≥ 0, where erfc itself vanishes too.
@@ -227,6 +256,26 @@ mod tests {
         assert!((planar.lambda() - 0.469851).abs() < 5e-7);
         let source = Similarity::line_source(8.0, -0.3, [1.0; 2], 1.0, [0.0, -0.5]).unwrap();
         assert!((source.lambda() - 0.511282).abs() < 5e-7);
+    }
+
+    /// Temperatures are finite, and steepen where they should, for diffusivities that differ by many orders.
+    #[test]
+    fn diffusivities_may_differ_by_orders_of_magnitude() {
+        // cold that spreads fast stops the melting around a line unless there is little of it
+        assert!(Similarity::line_source(8.0, -0.3, [1.0, 3000.0], 1.0, [0.0, -0.5]).is_err());
+        for (d, far) in [([1.0, 1e-4], -0.3), ([3000.0, 1.0], -0.3), ([1.0, 3000.0], -3e-3), ([1e-6, 1.0], -0.3)] {
+            for exact in [
+                Similarity::planar([1.0, -0.5], d, 1.0, 0.0, 0.0).unwrap(),
+                Similarity::line_source(8.0, far, d, 1.0, [0.0, -0.5]).unwrap(),
+            ] {
+                let t = exact.time(1.0);
+                let h = exact.height(0.0, t);
+                let cold: Vec<f64> =
+                    (0..50).map(|k| exact.temperature([0.0, h * (1.0 + 0.04 * f64::from(k))], t)).collect();
+                assert!(cold.iter().all(|u| u.is_finite()), "{d:?}: {cold:?}");
+                assert!(cold[0].abs() < 1e-9 && cold.windows(2).all(|u| u[1] <= u[0]), "{d:?}: {cold:?}");
+            }
+        }
     }
 
     /// h_t = L (D₀ u₀_ν − D₁ u₁_ν) by differences, with all parameters different from one.

@@ -93,8 +93,8 @@ impl HeatStep<'_> {
             x.iter_mut().zip(&self.sides[i * nodes..]).for_each(|(x, side)| x[0] = *side);
         }
         let size = self.sides.iter().chain(self.u).copied().fold(0.0, larger);
-        // what round-off allows
-        solver.solve(&matrix, &b, &mut x, [4e-15 * largest * size.max(f64::MIN_POSITIVE)])?;
+        // what round-off allows nine terms a row
+        solver.solve(&matrix, &b, &mut x, [2e-14 * largest * size.max(f64::MIN_POSITIVE)])?;
         let mut u = self.sides.to_vec();
         for (p, x) in x.chunks_exact(width).enumerate().skip(1).take(count) {
             let i = p + first - 1;

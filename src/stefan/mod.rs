@@ -24,4 +24,5 @@ pub use columns::{Columns, LOWER, UPPER};
 pub use energy::Energy;
 pub use exact::Similarity;
 pub use front::{Filter, Method};
+pub(crate) use solver::INITIAL;
 pub use solver::{Front, FrontState, Problem, Sides, Stepping, Transfer};

@@ -111,7 +111,12 @@ pub struct FrontState {
 }
 
 /// Newton's method ends where the front is met to this share of the box, times the largest temperature above 1.
-const NEWTON: f64 = 1e-12;
+const NEWTON: f64 = 1e-11;
+/// What may have no value at the start, by phase.
+pub(crate) const INITIAL: [&str; 2] =
+    ["the initial temperature of the lower phase", "the initial temperature of the upper phase"];
+/// What rounding leaves of a height, as a share of it.
+const ROUNDING: f64 = 1e-14;
 const NEWTON_ITERATIONS: usize = 40;
 
 impl Front {
@@ -175,13 +180,7 @@ impl Front {
                 let nodes = self.columns.rows(phase) + 1;
                 let x = [self.columns.x()[k / nodes], self.columns.heights(phase, &front)[k]];
                 let value = u[phase][k];
-                return Err(Failure::NonFinite {
-                    what: "the initial temperature",
-                    value,
-                    node: [k / nodes, k % nodes],
-                    x,
-                }
-                .into());
+                return Err(Failure::NonFinite { what: INITIAL[phase], value, node: [k / nodes, k % nodes], x }.into());
             }
         }
         let mut state = FrontState { t, step: 0, front, u, energy: Energy::default() };
@@ -348,7 +347,10 @@ impl Front {
             self.columns.wall(UPPER).iter().zip(self.columns.wall(LOWER)).fold(0.0_f64, |m, (c, b)| m.max(c - b));
         // jumps carry the round-off of the temperatures
         let size = state.u.iter().flatten().copied().fold(1.0, larger);
-        let tolerance = NEWTON * box_height * size;
+        // and heights that of their distance to the origin
+        let heights = LOWER..=UPPER;
+        let farthest = heights.flat_map(|phase| self.columns.wall(phase)).copied().fold(0.0, larger);
+        let tolerance = NEWTON * box_height * size + ROUNDING * farthest;
         // the front as it stands is in the box whatever the step; where sides are given it follows them
         let mut h = state.front.clone();
         if !self.mirrored() {

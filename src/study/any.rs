@@ -127,7 +127,8 @@ impl Study {
     pub fn remedy(&self, error: &Error) -> Option<String> {
         match self {
             Self::MovingMesh(study) => study.remedy(error),
-            _ => error.help(),
+            Self::Poisson(_) | Self::Stefan(_) => error.help_without_density(),
+            Self::Equidistribution(_) => error.help(),
         }
     }
 

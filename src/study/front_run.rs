@@ -117,6 +117,8 @@ const OF_THE_LIMIT: f64 = 0.5;
 const PARTS: f64 = 50.0;
 /// An implicit front has no limit but accuracy.
 const IMPLICIT_PARTS: f64 = 100.0;
+/// How often an automatic step that fails is halved. Each begins anew, so that a run that goes on takes the same steps.
+const HALVINGS: i32 = 6;
 /// Fronts drawn over time.
 const CURVES: usize = 16;
 
@@ -491,16 +493,26 @@ fn go(
         left
     };
     tell(begin, front, state, 0.0, summary)?;
-    while let Some(t) = next(front, state, schedule) {
+    let mut halvings = 0;
+    while let Some(t) = next(front, state, schedule, halvings) {
         let (clock, dt) = (Instant::now(), t - state.t);
         let stepped = front.step(given, state, t);
         summary.seconds.pde += clock.elapsed().as_secs_f64();
-        summary.work.work += stepped.map_err(|error| match error {
-            Error::Failed { failure, .. } => {
-                Error::Failed { failure, moment: Some(Moment { t, step: state.step + 1 }) }
+        summary.work.work += match stepped {
+            Ok(work) => work,
+            // the state is as it was
+            Err(Error::Failed { .. }) if schedule.is_automatic() && halvings < HALVINGS => {
+                halvings += 1;
+                summary.work.rejected_steps += 1;
+                continue;
             }
-            other => other,
-        })?;
+            Err(Error::Failed { failure, .. }) => {
+                let moment = Some(Moment { t, step: state.step + 1 });
+                return Err(Error::Failed { failure, moment });
+            }
+            Err(other) => return Err(other),
+        };
+        halvings = 0;
         summary.work.steps += 1;
         summary.seconds.wall = wall();
         tell(Event::Stepped, front, state, dt, summary)?;
@@ -509,7 +521,7 @@ fn go(
 }
 
 /// Time at the end of the next step; none at the end.
-fn next(front: &Front, state: &FrontState, schedule: &Schedule) -> Option<f64> {
+fn next(front: &Front, state: &FrontState, schedule: &Schedule, halvings: i32) -> Option<f64> {
     if !schedule.is_automatic() {
         return schedule.step_from(state.step).map(|_| schedule.time(state.step + 1));
     }
@@ -519,7 +531,7 @@ fn next(front: &Front, state: &FrontState, schedule: &Schedule) -> Option<f64> {
         Stepping::Explicit => (OF_THE_LIMIT * front.limit(state)).min(span / PARTS),
         Stepping::Implicit => span / IMPLICIT_PARTS,
     };
-    schedule.after(state.t, dt)
+    schedule.after(state.t, dt * 0.5_f64.powi(halvings))
 }
 
 fn reported(front: &Front, given: &dyn Problem, state: &FrontState) -> FrontReport {

@@ -34,7 +34,7 @@ pub struct Ends(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 
 /// x and y as formulas of s and r in the unit square.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table such as { x = \"s\", y = \"r*(1 + s)\" }")]
 pub struct Mapping {
     /// x(s, r).
     pub x: String,
@@ -44,7 +44,7 @@ pub struct Mapping {
 
 /// A distortion of the unit square: `perturb` with `seed`, or `shear`.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table such as { perturb = 0.2, seed = 1 }")]
 pub struct Distort {
     /// Each node inside moves by up to this share of a cell along each axis, at random.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -85,7 +85,7 @@ impl Side {
 
 /// `grid.grading`: smaller cells toward a side, by `power` or by `ratio`.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table such as { toward = \"top\", power = 1.5 }")]
 pub struct Grading {
     /// Where cells are smallest.
     pub toward: Side,
@@ -119,6 +119,15 @@ impl Grading {
             (None, None) => Err(Error::invalid("power", "not given", "give one of power and ratio")),
             _ => Err(Error::invalid("ratio", "given", "goes not with power; leave one of them out")),
         }
+    }
+
+    /// Names what makes a mesh fold that is none without grading.
+    fn blame(&self, failure: &Failure) -> Error {
+        let (key, value, cure) = match (self.power, self.ratio) {
+            (Some(power), _) => ("power", power, "bring it nearer to 1"),
+            (None, ratio) => ("ratio", ratio.unwrap_or_default(), "raise it"),
+        };
+        Error::invalid(format!("grid.grading.{key}"), value, format!("{failure}; {cure}"))
     }
 
     fn apply(&self, place: [f64; 2]) -> [f64; 2] {
@@ -164,7 +173,10 @@ impl MappedDomain {
         let mesh = Mesh::mapped(lattice, x)?;
         match check_unfolded(&mesh).and_then(|()| check_simple(&mesh)) {
             Ok(()) => Ok(mesh),
-            Err(failure) => Err(self.blame(&failure)),
+            Err(failure) => Err(match grading {
+                Some(grading) if self.mesh(cells, None).is_ok() => grading.blame(&failure),
+                _ => self.blame(&failure),
+            }),
         }
     }
 

@@ -220,6 +220,8 @@ pub struct Solved {
     pub error: Option<PoissonError>,
     /// Of the solver, 0 where it is direct.
     pub iterations: usize,
+    /// Whether the iteration was asked for, and the direct solver had to step in.
+    pub replaced: bool,
     seconds: PoissonSeconds,
 }
 
@@ -248,6 +250,9 @@ impl PoissonStudy {
     /// [`Error::Invalid`] or [`Error::Formula`] with the dotted key.
     pub fn check(&self) -> Result<()> {
         self.output.check()?;
+        if let Some(FramesAt::Every(0)) = self.output.frames {
+            return Err(Error::invalid("output.frames.every", 0, "must be 1 or more"));
+        }
         self.study.check_name()?;
         let laplacian = self.laplacian.laplacian()?;
         self.data()?;
@@ -347,21 +352,36 @@ impl PoissonStudy {
             seconds.stencils = seconds.stencils.min(clock.elapsed().as_secs_f64());
         }
 
-        let neumann = self.neumann();
-        let known =
-            data.exact.as_ref().map(|program| values(&mesh, "exact.u or a derivative of it", program)).transpose()?;
+        // formulas need a value only where it counts
+        let lattice = mesh.lattice();
+        let problem = Poisson { source: &[], side: &[], neumann: self.neumann() };
+        let mut counts = vec![false; lattice.len()];
+        for k in 0..stencils.patch().len() {
+            stencils.row(k).into_iter().for_each(|(index, _, source)| counts[index] |= source != 0.0);
+        }
+        let flows: Vec<bool> = (0..lattice.len()).map(|k| problem.neumann_side(lattice, k).is_some()).collect();
+        let given: Vec<bool> = (0..lattice.len()).map(|k| lattice.on_side(k) && !flows[k]).collect();
+        let known = match &data.exact {
+            Some(program) => {
+                let slopes: Vec<bool> = flows.iter().map(|flows| *flows && data.flux.is_none()).collect();
+                let sources: Vec<bool> = counts.iter().map(|counts| *counts && data.source.is_none()).collect();
+                let everywhere = vec![true; lattice.len()];
+                let needed = [&everywhere, &slopes, &slopes, &sources, &sources];
+                Some(values(&mesh, "exact.u or a derivative of it", program, needed)?)
+            }
+            None => None,
+        };
         let source = match &data.source {
-            Some(program) => values(&mesh, "equation.source", program)?.into_iter().map(|[f]| f).collect(),
+            Some(program) => values(&mesh, "equation.source", program, [&counts])?.into_iter().map(|[f]| f).collect(),
             None => known.iter().flatten().map(|[_, _, _, xx, yy]| xx + yy).collect::<Vec<f64>>(),
         };
         let mut side = match &data.boundary {
-            Some(program) => values(&mesh, "equation.boundary", program)?.into_iter().map(|[u]| u).collect(),
+            Some(program) => values(&mesh, "equation.boundary", program, [&given])?.into_iter().map(|[u]| u).collect(),
             None => known.iter().flatten().map(|v| v[0]).collect::<Vec<f64>>(),
         };
-        let flux = data.flux.as_ref().map(|program| values(&mesh, "equation.flux", program)).transpose()?;
-        let problem = Poisson { source: &source, side: &[], neumann };
-        for index in mesh.lattice().sides() {
-            if let Some(at) = problem.neumann_side(mesh.lattice(), index) {
+        let flux = data.flux.as_ref().map(|program| values(&mesh, "equation.flux", program, [&flows])).transpose()?;
+        for index in lattice.sides() {
+            if let Some(at) = problem.neumann_side(lattice, index) {
                 let n = outward(&mesh, index, at);
                 side[index] = match (&flux, &known) {
                     (Some(flux), _) => flux[index][0],
@@ -372,21 +392,35 @@ impl PoissonStudy {
             }
         }
         let clock = Instant::now();
-        let problem = Poisson { side: &side, ..problem };
+        let problem = Poisson { source: &source, side: &side, ..problem };
         let (u, iterations) = match self.solver.kind {
             SolverKind::Lu => (problem.solve(&mesh, &stencils)?, 0),
             SolverKind::Krylov => problem.iterate(&mesh, &stencils)?,
         };
         seconds.solve = clock.elapsed().as_secs_f64();
+        if let Some(k) = u.iter().position(|u| !u.is_finite()) {
+            return Err(Failure::NonFinite {
+                what: "the solution",
+                value: u[k],
+                node: lattice.node(k),
+                x: mesh.x()[k],
+            }
+            .into());
+        }
         let exact: Option<Vec<f64>> = known.map(|known| known.iter().map(|v| v[0]).collect());
         let error = exact.as_ref().map(|exact| {
             let areas = node_areas(&mesh);
             let off = || u.iter().zip(exact).map(|(u, e)| u - e);
-            let squares = sum(off().zip(&areas).map(|(e, area)| e * e * area));
+            let linf = off().fold(0.0, larger);
+            // squares of what is large are not finite
+            let unit = if linf > 0.0 { linf } else { 1.0 };
+            let squares = sum(off().zip(&areas).map(|(e, area)| (e / unit).powi(2) * area));
             let area = sum(areas.iter().copied());
-            PoissonError { linf: off().fold(0.0, larger), l2: (squares / area).sqrt(), l2_integral: squares.sqrt() }
+            PoissonError { linf, l2: unit * (squares / area).sqrt(), l2_integral: unit * squares.sqrt() }
         });
-        Ok(Solved { mesh, u, exact, stencils, error, iterations, seconds })
+        let zero = u.iter().all(|u| *u == 0.0);
+        let replaced = self.solver.kind == SolverKind::Krylov && iterations == 0 && !zero;
+        Ok(Solved { mesh, u, exact, stencils, error, iterations, replaced, seconds })
     }
 
     /// Runs the study into a directory.
@@ -470,6 +504,10 @@ impl Solved {
     /// Stencils that come near to none, and kinds that are not exact for quadratics.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
+        if self.replaced {
+            let told = "the iteration of solver.kind = \"krylov\" did not converge, and the direct solver took its place; set it to \"lu\"";
+            warnings.push(told.into());
+        }
         let near = self.stencils.near_degenerate();
         if let Some(worst) = near.iter().max_by(|a, b| a.condition.total_cmp(&b.condition)) {
             let ([i, j], [x, y]) = (worst.node, worst.x);
@@ -491,10 +529,22 @@ struct Data {
     flux: Option<Program<2, 1>>,
 }
 
-/// Formulas at every node.
-fn values<const K: usize>(mesh: &Mesh<2>, what: &str, program: &Program<2, K>) -> Result<Vec<[f64; K]>, Failure> {
+/// Formulas at every node, 0 where they have no value and need none.
+fn values<const K: usize>(
+    mesh: &Mesh<2>,
+    what: &str,
+    program: &Program<2, K>,
+    needed: [&Vec<bool>; K],
+) -> Result<Vec<[f64; K]>, Failure> {
     let mut out = vec![[0.0; K]; mesh.x().len()];
     program.eval_each(mesh.x(), &[], &mut out);
+    for (k, values) in out.iter_mut().enumerate() {
+        for (value, needed) in values.iter_mut().zip(needed) {
+            if !value.is_finite() && !needed[k] {
+                *value = 0.0;
+            }
+        }
+    }
     match out.iter().position(|v| !v.iter().all(|v| v.is_finite())) {
         None => Ok(out),
         Some(k) => {

@@ -8,7 +8,7 @@ use crate::laplacian::Laplacian;
 use crate::setting::{Auto, fixed, pair};
 use crate::simulation::{FramesAt, Schedule};
 use crate::stefan::{
-    Columns, Filter, Front, FrontState, LOWER, Method, Problem, Sides, Similarity, Stepping, Transfer, UPPER,
+    Columns, Filter, Front, FrontState, INITIAL, LOWER, Method, Problem, Sides, Similarity, Stepping, Transfer, UPPER,
 };
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -252,10 +252,14 @@ impl ExactFront {
                 ("start_radius", start, Similarity::line_source(strength, self.far, diffusivity, mobility, centre)?)
             }
         };
-        match distance > 0.0 && distance.is_finite() {
-            true => Ok((solution, solution.time(distance))),
-            false => Err(Error::invalid(key, distance, "must be above 0")),
+        if !(distance > 0.0 && distance.is_finite()) {
+            return Err(Error::invalid(key, distance, "must be above 0"));
         }
+        let start = solution.time(distance);
+        if !start.is_normal() {
+            return Err(Error::invalid(key, distance, format!("is where the front is at t = {start:e}, out of range")));
+        }
+        Ok((solution, start))
     }
 }
 
@@ -433,6 +437,14 @@ impl StefanStudy {
         }
         let given = self.given()?;
         let schedule = self.schedule(&given).map_err(|error| error.within("time"))?;
+        if let Given::Exact(solution, _) = &given
+            && let Some([cx, cy]) = solution.source()
+            && (x[0]..=x[1]).contains(&cx)
+            && (bottom.eval(&[cx])..=top.eval(&[cx])).contains(&cy)
+        {
+            let rule = "the temperature is infinite there, inside the box; move it below bottom or beyond the sides";
+            return Err(Error::invalid("exact.centre", format!("[{cx}, {cy}]"), rule));
+        }
         let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
         let [start, end] = [schedule.start(), schedule.end()];
         let frames = self.output.frames.clone().unwrap_or_else(|| match schedule.steps() {
@@ -478,7 +490,8 @@ impl StefanStudy {
         let Error::Failed { failure, .. } = &error else { return error };
         let key = match (failure, self.exact.as_ref().map(|exact| exact.kind)) {
             (Failure::WrongSide { .. }, None) => "phase.lower.initial",
-            (Failure::NonFinite { what: "the initial temperature", .. }, None) => "phase.lower.initial",
+            (Failure::NonFinite { what, .. }, None) if *what == INITIAL[LOWER] => "phase.lower.initial",
+            (Failure::NonFinite { what, .. }, None) if *what == INITIAL[UPPER] => "phase.upper.initial",
             (_, None) => "domain.front",
             (_, Some(ExactKind::Planar)) => "exact.start_front",
             (_, Some(ExactKind::LineSource)) => "exact.start_radius",
@@ -486,7 +499,7 @@ impl StefanStudy {
         let table = toml::Table::try_from(self).unwrap_or_default();
         let present = key.split('.').try_fold(toml::Value::Table(table), |value, part| value.get(part).cloned());
         let value = present.map_or("not given".into(), |value| value.to_string());
-        Error::invalid(key, value, format!("{failure}; {}", failure.help()))
+        Error::invalid(key, value, format!("{failure}; {}", failure.help_without_density()))
     }
 
     /// Says so where an exact solution flows through sides that are insulated.
