@@ -48,6 +48,7 @@ mod kind;
 mod parallel;
 mod random;
 mod setting;
+mod stopwatch;
 mod work;
 
 pub mod geometry;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Lowest floor first; modules on one floor are siblings that do not know each other.
 const FLOORS: [&[&str]; 10] = [
     &["error"],
-    &["formula", "kept", "kind", "parallel", "random", "setting", "work"],
+    &["formula", "kept", "kind", "parallel", "random", "setting", "stopwatch", "work"],
     &["geometry"],
     &["numerics"],
     &["density", "equidistribution", "laplacian", "meshing", "physics"],

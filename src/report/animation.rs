@@ -61,6 +61,7 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
             x: &frame.x,
             u: &frame.fields[0].1,
             range: Some(range),
+            line: &[],
         };
         let pixels = sheet.pixels();
         let [width, height] = pixels.size.map(|n| n.min(u32::from(u16::MAX)) as u16);

@@ -29,6 +29,7 @@ use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
 use crate::kept::Kept;
 use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Whole};
 use crate::physics::Physics;
+use crate::stopwatch::Stopwatch;
 use crate::work::Work;
 use pace::Pace;
 use prediction::blend;
@@ -397,39 +398,35 @@ fn end_where_asked(observers: &[&mut dyn Observer], state: &State) -> Result<()>
 
 /// The time that a run takes, over all its parts.
 struct Clock {
-    wall: Instant,
-    cpu: cpu_time::ProcessTime,
-    /// Seconds of the steps before this part, and of everything.
-    before: f64,
-    spent: Seconds,
+    all: Stopwatch,
+    /// Of the steps alone.
+    steps: Stopwatch,
 }
 
 impl Clock {
     fn start(course: Option<&Course>, record: &Record) -> Self {
         let before = course.map_or(0.0, |course| course.seconds);
-        Self { wall: Instant::now(), cpu: cpu_time::ProcessTime::now(), before, spent: record.seconds }
+        let Seconds { wall, cpu, .. } = record.seconds;
+        Self { all: Stopwatch::start().after([wall, cpu]), steps: Stopwatch::start().after([before, 0.0]) }
     }
 
     fn seconds(&self) -> f64 {
-        self.before + self.wall.elapsed().as_secs_f64()
+        self.steps.elapsed()[0]
     }
 
     /// The record with the time up to now.
     fn counted(&self, record: &Record) -> Record {
-        let (wall, cpu) = (self.wall.elapsed().as_secs_f64(), self.cpu.elapsed().as_secs_f64());
-        let seconds = Seconds { wall: self.spent.wall + wall, cpu: self.spent.cpu + cpu, ..record.seconds };
-        Record { seconds, ..record.clone() }
+        let [wall, cpu] = self.all.elapsed();
+        Record { seconds: Seconds { wall, cpu, ..record.seconds }, ..record.clone() }
     }
 }
 
 impl Record {
     /// Adds the time that a computation takes.
     pub(crate) fn timed<T>(&mut self, compute: impl FnOnce(&mut Self) -> T) -> T {
-        let (wall, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
-        let before = self.seconds;
+        let clock = Stopwatch::start().after([self.seconds.wall, self.seconds.cpu]);
         let result = compute(self);
-        self.seconds.wall = before.wall + wall.elapsed().as_secs_f64();
-        self.seconds.cpu = before.cpu + cpu.elapsed().as_secs_f64();
+        [self.seconds.wall, self.seconds.cpu] = clock.elapsed();
         result
     }
 }

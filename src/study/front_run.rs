@@ -12,6 +12,7 @@ use crate::simulation::{
     WorkTotal, draw, draw_curves, final_arrays, reopened, status, synced,
 };
 use crate::stefan::{Energy, Front, FrontState, LOWER, Problem, Stepping, UPPER};
+use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -51,6 +52,8 @@ pub struct StefanSummary {
 pub struct FrontSeconds {
     /// By the clock.
     pub wall: f64,
+    /// Of all threads.
+    pub cpu: f64,
     /// Moving the front and solving the heat equation.
     pub pde: f64,
     /// History, frames, pictures.
@@ -247,7 +250,7 @@ impl StefanStudy {
     }
 
     fn run_from(&self, path: &Path, watchers: &mut [&mut dyn Observer], begin: Begin) -> Result<FrontFinished> {
-        let clock = Instant::now();
+        let clock = Stopwatch::start();
         let mut prepared = self.prepare()?;
         let mut summary = self.summary();
         summary.warnings = self.warnings()?;
@@ -280,8 +283,7 @@ impl StefanStudy {
         };
         directory.write("study.toml", self.to_toml().as_bytes())?;
         directory.write_summary(&summary)?;
-        let before = summary.seconds.wall;
-        let wall = || before + clock.elapsed().as_secs_f64();
+        let clock = clock.after([summary.seconds.wall, summary.seconds.cpu]);
         let failure = {
             let mut leave =
                 |event, snapshot: &Snapshot<'_>, row: Option<Row>, state: &FrontState, so_far: &StefanSummary| {
@@ -306,14 +308,14 @@ impl StefanStudy {
                         false => Ok(()),
                     }
                 };
-            go(&mut prepared, &mut summary, event, &wall, &mut leave).err()
+            go(&mut prepared, &mut summary, event, &clock, &mut leave).err()
         };
         let output = Instant::now();
         let mut finished = FrontFinished::of(summary, prepared, fronts, failure)?;
         let kept = self.keep(&directory, &finished, &mut frames);
         let FrontFinished { summary, failure, .. } = &mut finished;
         summary.seconds.output += output.elapsed().as_secs_f64();
-        summary.seconds.wall = wall();
+        [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         summary.status = status(failure.as_ref()).into();
         summary.error = failure.as_ref().map(Failed::from);
         let finish = || {
@@ -322,7 +324,7 @@ impl StefanStudy {
             let output = Instant::now();
             report::finish(directory.path(), self.output.report, self.output.animation)?;
             summary.seconds.output += output.elapsed().as_secs_f64();
-            summary.seconds.wall = wall();
+            [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
             directory.write_summary(summary)?;
             if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() }
         };
@@ -354,9 +356,8 @@ impl StefanStudy {
             row.iter().for_each(|_| collect(&mut fronts, snapshot.share, state));
             Ok(())
         };
-        let clock = Instant::now();
-        let wall = || clock.elapsed().as_secs_f64();
-        let failure = go(&mut prepared, &mut summary, Event::Started, &wall, &mut leave).err();
+        let clock = Stopwatch::start();
+        let failure = go(&mut prepared, &mut summary, Event::Started, &clock, &mut leave).err();
         summary.status = status(failure.as_ref()).into();
         FrontFinished::of(summary, prepared, fronts, failure)
     }
@@ -419,9 +420,10 @@ impl FrontFinished {
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
         let margin = (0.05 * (high - low)).max(1e-3 * high.abs().max(1e-12));
         let (x, last) = (&self.columns, self.columns.len() - 1);
+        let line: Vec<[f64; 2]> = x.iter().zip(&self.state.front).map(|(x, y)| [*x, *y]).collect();
         let over_time = format!("{title}, the front over time");
         [
-            draw(&format!("{title}, t = {t}"), "u", &self.whole),
+            draw(&format!("{title}, t = {t}"), "u", &self.whole, &line),
             draw_curves(&over_time, "t", x, &self.fronts, [x[0], low - margin], [x[last], high + margin]),
         ]
     }
@@ -438,12 +440,12 @@ fn pictured(front: &Front, state: &FrontState) -> Result<State> {
 
 type Leave<'a> = dyn FnMut(Event, &Snapshot<'_>, Option<Row>, &FrontState, &StefanSummary) -> Result<()> + 'a;
 
-/// The time loop, which begins with an event; `wall` tells the seconds since the run began.
+/// The time loop, which begins with an event; `clock` began with the run.
 fn go(
     prepared: &mut Prepared,
     summary: &mut StefanSummary,
     begin: Event,
-    wall: &dyn Fn() -> f64,
+    clock: &Stopwatch,
     leave: &mut Leave<'_>,
 ) -> Result<()> {
     let Prepared { front, given, state, schedule, .. } = prepared;
@@ -454,7 +456,7 @@ fn go(
         let picture = pictured(front, state)?;
         let quality = quality(&picture.mesh, &picture.rho);
         let report = reported(front, given, state);
-        let seconds = wall();
+        let [seconds, _] = clock.elapsed();
         let new = matches!(event, Event::Started | Event::Stepped);
         let row = new.then(|| Row {
             t: state.t,
@@ -495,9 +497,9 @@ fn go(
     tell(begin, front, state, 0.0, summary)?;
     let mut halvings = 0;
     while let Some(t) = next(front, state, schedule, halvings) {
-        let (clock, dt) = (Instant::now(), t - state.t);
+        let (began, dt) = (Instant::now(), t - state.t);
         let stepped = front.step(given, state, t);
-        summary.seconds.pde += clock.elapsed().as_secs_f64();
+        summary.seconds.pde += began.elapsed().as_secs_f64();
         summary.work.work += match stepped {
             Ok(work) => work,
             // the state is as it was
@@ -514,7 +516,7 @@ fn go(
         };
         halvings = 0;
         summary.work.steps += 1;
-        summary.seconds.wall = wall();
+        [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         tell(Event::Stepped, front, state, dt, summary)?;
     }
     tell(Event::Finished, front, state, 0.0, summary)

@@ -7,6 +7,7 @@ use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::check_nodal;
 use crate::report;
 use crate::simulation::{Checkpoints, Curve, Failed, Figure, Observer, Parallel, RunDirectory, Scale, status};
+use crate::stopwatch::Stopwatch;
 use ndarray::{Array1, Array2, arr0};
 use ndarray_npy::{NpzWriter, WriteNpzError};
 use serde::{Deserialize, Serialize};
@@ -62,6 +63,8 @@ pub struct EquidistributionSummary {
 pub struct LineSeconds {
     /// By the clock.
     pub wall: f64,
+    /// Of all threads.
+    pub cpu: f64,
     /// Solving, the single-domain solution for comparison included.
     pub mesh: f64,
     /// Writing.
@@ -297,7 +300,7 @@ impl EquidistributionStudy {
     /// # Errors
     /// As [`EquidistributionStudy::run`], and [`Error::Checkpoint`] where there are checkpoints, but none that will do.
     pub fn run_from(&self, path: &Path, watchers: &[&mut dyn Observer], begin: Begin) -> Result<LineFinished> {
-        let clock = Instant::now();
+        let clock = Stopwatch::start();
         let mut study = self.clone();
         study.resolve()?;
         let line = study.problem()?;
@@ -317,9 +320,12 @@ impl EquidistributionStudy {
         let mut summary = study.summary();
         directory.write_summary(&summary)?;
         let (LineCheckpoint { mut evolution, seconds }, refused) = resumed.unwrap_or_default();
-        let wall = || seconds.wall + clock.elapsed().as_secs_f64();
+        let clock = clock.after([seconds.wall, seconds.cpu]);
         let solving = Instant::now();
-        let spent = || LineSeconds { wall: wall(), mesh: seconds.mesh + solving.elapsed().as_secs_f64(), ..seconds };
+        let spent = || {
+            let [wall, cpu] = clock.elapsed();
+            LineSeconds { wall, cpu, mesh: seconds.mesh + solving.elapsed().as_secs_f64(), ..seconds }
+        };
         let outcome = study.evolve(&line, &mut evolution, &mut |t, evolution| {
             let step = evolution.done;
             let ends = study.time.is_some() && watchers.iter().any(|watcher| watcher.interrupts());
@@ -346,12 +352,12 @@ impl EquidistributionStudy {
         let mut finish = || {
             keep(&study, &line, &directory, &evolution)?;
             summary.seconds.output += output.elapsed().as_secs_f64();
-            summary.seconds.wall = wall();
+            [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
             directory.write_summary(&summary)?;
             let output = Instant::now();
             report::finish(directory.path(), study.output.report, study.output.animation)?;
             summary.seconds.output += output.elapsed().as_secs_f64();
-            summary.seconds.wall = wall();
+            [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
             directory.write_summary(&summary)?;
             if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() }
         };

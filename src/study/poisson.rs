@@ -8,6 +8,7 @@ use crate::numerics::{larger, sum};
 use crate::report;
 use crate::setting::pair;
 use crate::simulation::{Failed, Frames, FramesAt, Parallel, Picture, RunDirectory, State, draw, final_arrays};
+use crate::stopwatch::Stopwatch;
 use crate::study::Source;
 use crate::work::Work;
 use schemars::JsonSchema;
@@ -175,6 +176,8 @@ pub struct PoissonSummary {
 pub struct PoissonSeconds {
     /// By the clock.
     pub wall: f64,
+    /// Of all threads.
+    pub cpu: f64,
     /// Computing stencils.
     pub stencils: f64,
     /// Solving the system.
@@ -429,7 +432,7 @@ impl PoissonStudy {
     /// As [`PoissonStudy::solve`], and what hinders writing. `summary.json` tells of a failure of the computation too.
     pub fn run(&self, directory: &Path) -> Result<PoissonSummary> {
         self.check()?;
-        let begin = Instant::now();
+        let clock = Stopwatch::start();
         let directory = RunDirectory::claim(directory)?;
         directory.write("study.toml", self.to_toml().as_bytes())?;
         let mut summary = PoissonSummary {
@@ -461,13 +464,13 @@ impl PoissonStudy {
             summary.stencil = Some(solved.report());
             summary.warnings = solved.warnings();
         }
-        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         directory.write_summary(&summary)?;
         outcome?;
         let output = Instant::now();
         report::finish(directory.path(), self.output.report, self.output.animation)?;
         summary.seconds.output += output.elapsed().as_secs_f64();
-        summary.seconds.wall = begin.elapsed().as_secs_f64();
+        [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         directory.write_summary(&summary)?;
         Ok(summary)
     }
@@ -489,7 +492,7 @@ impl Solved {
 
     /// The mesh over the solution.
     pub fn picture(&self, title: &str) -> Picture {
-        draw(title, "u", &self.state().1)
+        draw(title, "u", &self.state().1, &[])
     }
 
     /// What is known of the stencils.

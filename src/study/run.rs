@@ -316,7 +316,7 @@ fn keep(
 ) -> Result<()> {
     frames.write(unknowns, state)?;
     directory.write("final.npz", &final_arrays(unknowns, state))?;
-    let picture = draw(&format!("{}, t = {}", study.study.name, rounded(state.t)), &unknowns[0], state);
+    let picture = draw(&format!("{}, t = {}", study.study.name, rounded(state.t)), &unknowns[0], state, &[]);
     directory.write("mesh.svg", picture.svg.as_bytes())?;
     directory.write("mesh.png", &picture.png)
 }

@@ -25,76 +25,85 @@ pub(super) struct Grid {
 impl Grid {
     pub fn new(cells: [usize; 2]) -> Self {
         let (count, row) = (cells[0] * cells[1], cells[1] + 1);
+        let mut xml = Xml::of("<Cells>\n".into());
         let corners = (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| i * row + j));
         let connectivity = corners.flat_map(|k| [k, k + row, k + row + 1, k + 1]);
-        let mut topology = String::from("<Cells>\n");
-        array(&mut topology, "Int64", "connectivity", 1, connectivity.map(|k| (k as u64).to_le_bytes()));
-        array(&mut topology, "Int64", "offsets", 1, (1..=count as u64).map(|n| (4 * n).to_le_bytes()));
-        array(&mut topology, "UInt8", "types", 1, std::iter::repeat_n([QUAD], count));
-        topology.push_str("</Cells>\n");
-        Self { cells, topology }
+        xml.array("Int64", "connectivity", 1, connectivity.map(|k| (k as u64).to_le_bytes()));
+        xml.array("Int64", "offsets", 1, (1..=count as u64).map(|n| (4 * n).to_le_bytes()));
+        xml.array("UInt8", "types", 1, std::iter::repeat_n([QUAD], count));
+        Self { cells, topology: xml.text + "</Cells>\n" }
     }
 
     /// One document: `points` and `nodes` have shape cells + 1 in lattice order, `cells` one value a cell.
     pub fn document(&self, points: &[[f64; 2]], nodes: &[(String, Values)], cells: &[(String, Values)]) -> String {
         let count = self.cells[0] * self.cells[1];
-        let mut xml = format!(
+        let mut xml = Xml::of(format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
              header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n\
              <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{count}\">\n<Points>\n",
             points.len()
-        );
-        vectors(&mut xml, "Points", points);
-        xml.push_str("</Points>\n");
-        xml.push_str(&self.topology);
+        ));
+        xml.vectors("Points", points);
+        xml.text.push_str("</Points>\n");
+        xml.text.push_str(&self.topology);
         for (tag, fields) in [("PointData", nodes), ("CellData", cells)] {
-            let _ = writeln!(xml, "<{tag}>");
+            let _ = writeln!(xml.text, "<{tag}>");
             for (name, values) in fields {
                 match values {
-                    Values::Scalars(v) => array(&mut xml, "Float64", name, 1, v.iter().map(|v| v.to_le_bytes())),
-                    Values::Vectors(v) => vectors(&mut xml, name, v),
-                    Values::Numbers(v) => {
-                        array(&mut xml, "Int32", name, 1, v.iter().map(|n| (*n as i32).to_le_bytes()))
-                    }
+                    Values::Scalars(v) => xml.array("Float64", name, 1, v.iter().map(|v| v.to_le_bytes())),
+                    Values::Vectors(v) => xml.vectors(name, v),
+                    Values::Numbers(v) => xml.array("Int32", name, 1, v.iter().map(|n| (*n as i32).to_le_bytes())),
                 }
             }
-            let _ = writeln!(xml, "</{tag}>");
+            let _ = writeln!(xml.text, "</{tag}>");
         }
-        xml.push_str("</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
-        xml
+        xml.text + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
     }
 }
 
-/// VTK's vectors have three components.
-fn vectors(xml: &mut String, name: &str, values: &[[f64; 2]]) {
-    let three = |v: &[f64; 2]| {
-        let mut bytes = [0; 24];
-        bytes[..8].copy_from_slice(&v[0].to_le_bytes());
-        bytes[8..16].copy_from_slice(&v[1].to_le_bytes());
-        bytes
-    };
-    array(xml, "Float64", name, 3, values.iter().map(three));
+/// A document in the making. Its arrays share one compressor: a new one costs more than a small array.
+struct Xml {
+    text: String,
+    encoder: ZlibEncoder<Vec<u8>>,
 }
 
-/// One array: a header of block count, block size, last block size and compressed size, then the one block.
-fn array<const N: usize>(
-    xml: &mut String,
-    kind: &str,
-    name: &str,
-    components: usize,
-    values: impl Iterator<Item = [u8; N]>,
-) {
-    let mut bytes = Vec::new();
-    values.for_each(|value| bytes.extend_from_slice(&value));
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
-    let compressed = encoder.write_all(&bytes).and_then(|()| encoder.finish()).expect("writing to memory cannot fail");
-    let size = bytes.len() as u64;
-    let header: Vec<u8> = [1, size, size, compressed.len() as u64].into_iter().flat_map(u64::to_le_bytes).collect();
-    let parts = if components > 1 { format!(" NumberOfComponents=\"{components}\"") } else { String::new() };
-    let _ = write!(xml, "<DataArray type=\"{kind}\" Name=\"{}\"{parts} format=\"binary\">", escape(name));
-    STANDARD.encode_string(header, xml);
-    STANDARD.encode_string(compressed, xml);
-    xml.push_str("</DataArray>\n");
+impl Xml {
+    fn of(text: String) -> Self {
+        Self { text, encoder: ZlibEncoder::new(Vec::new(), Compression::fast()) }
+    }
+
+    /// VTK's vectors have three components.
+    fn vectors(&mut self, name: &str, values: &[[f64; 2]]) {
+        let three = |v: &[f64; 2]| {
+            let mut bytes = [0; 24];
+            bytes[..8].copy_from_slice(&v[0].to_le_bytes());
+            bytes[8..16].copy_from_slice(&v[1].to_le_bytes());
+            bytes
+        };
+        self.array("Float64", name, 3, values.iter().map(three));
+    }
+
+    /// One array: a header of block count, block size, last block size and compressed size, then the one block.
+    fn array<const N: usize>(
+        &mut self,
+        kind: &str,
+        name: &str,
+        components: usize,
+        values: impl Iterator<Item = [u8; N]>,
+    ) {
+        let mut bytes = Vec::new();
+        values.for_each(|value| bytes.extend_from_slice(&value));
+        let written = self.encoder.write_all(&bytes).and_then(|()| self.encoder.reset(Vec::new()));
+        let compressed = written.expect("writing to memory cannot fail");
+        let size = bytes.len() as u64;
+        let header: Vec<u8> = [1, size, size, compressed.len() as u64].into_iter().flat_map(u64::to_le_bytes).collect();
+        let parts = if components > 1 { format!(" NumberOfComponents=\"{components}\"") } else { String::new() };
+        let name = escape(name);
+        let _ = write!(self.text, "<DataArray type=\"{kind}\" Name=\"{name}\"{parts} format=\"binary\">");
+        STANDARD.encode_string(header, &mut self.text);
+        STANDARD.encode_string(compressed, &mut self.text);
+        self.text.push_str("</DataArray>\n");
+    }
 }
 
 /// A name as an attribute value.

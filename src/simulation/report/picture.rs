@@ -45,10 +45,12 @@ pub struct Sheet<'a> {
     pub u: &'a [f64],
     /// Values of the first and the last colour; those that occur where nothing is said.
     pub range: Option<[f64; 2]>,
+    /// A line over all of it, such as a front.
+    pub line: &'a [[f64; 2]],
 }
 
-/// Draws the mesh of a state over its first unknown, with axes and a colour bar.
-pub fn draw(title: &str, unknown: &str, state: &State) -> Picture {
+/// Draws the mesh of a state over its first unknown, with axes and a colour bar, and a line where there is one.
+pub fn draw(title: &str, unknown: &str, state: &State, line: &[[f64; 2]]) -> Picture {
     let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
     let values: Vec<f64> = state.u.component(0).collect();
     let sheet = Sheet {
@@ -61,6 +63,7 @@ pub fn draw(title: &str, unknown: &str, state: &State) -> Picture {
         x: &mesh.closed(),
         u: &lattice.closed(&values),
         range: None,
+        line,
     };
     picture(svg(&sheet))
 }
@@ -84,7 +87,7 @@ pub struct Pixels {
 }
 
 fn svg(sheet: &Sheet<'_>) -> String {
-    let Sheet { title, unknown, cells, periodic, lower: [lx, ly], extent: [wx, wy], x, u, range } = *sheet;
+    let Sheet { title, unknown, cells, periodic, lower: [lx, ly], extent: [wx, wy], x, u, range, line } = *sheet;
     let ends = || u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
     let [low, high] = range.unwrap_or_else(ends);
     let scale = LONGER / wx.max(wy);
@@ -167,6 +170,16 @@ fn svg(sheet: &Sheet<'_>) -> String {
             "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"0.5\" stroke-width=\"0.7\"/>"
         );
     }
+    if !line.is_empty() {
+        let points: Vec<String> = line.iter().map(|p| point(to(*p))).collect();
+        let points = points.join(" ");
+        for (colour, width) in [("white", 4.5), ("#d55e00", 2.5)] {
+            let _ = writeln!(
+                s,
+                "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"/>"
+            );
+        }
+    }
     s.push_str("</g>\n");
 
     axes(&mut s, [lx, ly], [wx, wy], [width, height]);
@@ -181,7 +194,8 @@ pub(super) fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, he
         s,
         "<g stroke=\"#222\" fill=\"none\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></g>"
     );
-    for (value, label) in ticks(lower[0], lower[0] + extent[0]) {
+    let [along, up] = [0, 1].map(|d| Ticks::between(lower[d], lower[d] + extent[d]));
+    for (value, label) in &along.marks {
         let x = LEFT + (value - lower[0]) / extent[0] * width;
         let _ = writeln!(
             s,
@@ -189,7 +203,7 @@ pub(super) fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, he
             bottom + 20.0
         );
     }
-    for (value, label) in ticks(lower[1], lower[1] + extent[1]) {
+    for (value, label) in &up.marks {
         let y = bottom - (value - lower[1]) / extent[1] * height;
         let _ = writeln!(
             s,
@@ -199,9 +213,13 @@ pub(super) fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, he
         );
     }
     let (x, y) = (LEFT + 0.5 * width, TOP + 0.5 * height);
+    let name = along.named("x");
+    let below = bottom + 44.0;
+    let _ = writeln!(s, "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"middle\" font-size=\"14\">{name}</text>");
+    let (name, beside) = (up.named("y"), y + 5.0);
+    let turned = if name == "y" { String::new() } else { format!(" transform=\"rotate(-90 20 {beside:.1})\"") };
     let _ =
-        writeln!(s, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">x</text>", bottom + 44.0);
-    let _ = writeln!(s, "<text x=\"20\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">y</text>", y + 5.0);
+        writeln!(s, "<text x=\"20\" y=\"{beside:.1}\" text-anchor=\"middle\" font-size=\"14\"{turned}>{name}</text>");
 }
 
 pub(super) fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: f64, height: f64) {
@@ -217,7 +235,8 @@ pub(super) fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: 
         s,
         "<rect x=\"{x:.1}\" y=\"{TOP}\" width=\"16\" height=\"{height:.1}\" fill=\"none\" stroke=\"#222\"/>"
     );
-    for (value, label) in ticks(low, high) {
+    let ticks = Ticks::between(low, high);
+    for (value, label) in &ticks.marks {
         let y = if high > low { TOP + height - (value - low) / (high - low) * height } else { TOP + 0.5 * height };
         let _ = writeln!(
             s,
@@ -232,23 +251,64 @@ pub(super) fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: 
         "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">{}</text>",
         x + 8.0,
         TOP - 12.0,
-        escape(unknown)
+        ticks.named(&escape(unknown))
     );
 }
 
-/// Round values 1, 2 or 5 times a power of ten apart, four to nine of them, with their labels.
-pub(super) fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
-    let span = high - low;
-    let scale = low.abs().max(high.abs());
-    if !(span > 1e-12 * scale && span.is_finite()) {
-        return vec![(low, format!("{low:.4}"))];
+/// Round values 1, 2 or 5 times a power of ten apart, four to nine of them, with short labels.
+#[derive(Debug)]
+struct Ticks {
+    marks: Vec<(f64, String)>,
+    /// What the labels are less, and the unit they are in, where they would be long.
+    less: Option<String>,
+    unit: Option<String>,
+}
+
+impl Ticks {
+    fn between(low: f64, high: f64) -> Self {
+        let span = high - low;
+        let scale = low.abs().max(high.abs());
+        if !(span > 1e-12 * scale && span.is_finite()) {
+            let plain = low == 0.0 || (1e-3..1e5).contains(&low.abs());
+            let label = if plain { format!("{low:.4}") } else { format!("{low:.3e}") };
+            return Self { marks: vec![(low, label)], less: None, unit: None };
+        }
+        let power = 10_f64.powf((span / 4.0).log10().floor());
+        let step = power * [5.0, 2.0, 1.0].into_iter().find(|m| m * power <= span / 4.0).unwrap_or(1.0);
+        let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+        // what all of them begin with
+        let ten = 10_f64.powf(span.log10().ceil());
+        let start = if span < 2e-3 * scale { (low / ten + 1e-9).floor() } else { 0.0 };
+        let less = (start != 0.0).then(|| {
+            let digits = (start.abs().log10().floor() as usize).min(15);
+            let decimals = (-ten.log10().round()).max(0.0) as usize;
+            let plain = decimals <= 6 && scale < 1e7;
+            match (plain, decimals) {
+                (true, 0) => format!("{:.0}", start * ten),
+                (true, _) => format!("{:.decimals$}", start * ten).trim_end_matches('0').trim_end_matches('.').into(),
+                (false, _) => format!("{:.digits$e}", start * ten),
+            }
+        });
+        let size = scale.min(if start != 0.0 { 2.0 * ten } else { f64::INFINITY });
+        let exponent = if (1e-2..1e5).contains(&size) { 0 } else { size.log10().floor() as i32 };
+        let unit = 10_f64.powi(exponent);
+        let decimals = (-(step / unit).log10().floor()).max(0.0) as usize;
+        let marks = (first..=last).map(|k| {
+            let value = k as f64 * step;
+            (value, format!("{:.decimals$}", (value - start * ten) / unit))
+        });
+        Self { marks: marks.collect(), less, unit: (exponent != 0).then(|| format!("1e{exponent}")) }
     }
-    let power = 10_f64.powf((span / 4.0).log10().floor());
-    let step = power * [5.0, 2.0, 1.0].into_iter().find(|m| m * power <= span / 4.0).unwrap_or(1.0);
-    let decimals = (-step.log10().floor()).max(0.0) as usize;
-    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
-    let label = |v: f64| if decimals > 6 || scale >= 1e6 { format!("{v:.3e}") } else { format!("{v:.decimals$}") };
-    (first..=last).map(|k| (k as f64 * step, label(k as f64 * step))).collect()
+
+    /// The name of an axis with these labels.
+    fn named(&self, name: &str) -> String {
+        let less = self.less.as_ref().map(|less| match less.strip_prefix('-') {
+            Some(more) => format!(" + {more}"),
+            None => format!(" − {less}"),
+        });
+        let unit = self.unit.as_ref().map(|unit| format!(", in {unit}"));
+        [name, &less.unwrap_or_default(), &unit.unwrap_or_default()].concat()
+    }
 }
 
 pub(super) fn colour(fraction: f64) -> String {
@@ -304,4 +364,31 @@ fn pixels(svg: &str, times: u32) -> tiny_skia::Pixmap {
         tiny_skia::Pixmap::new(times * size.width(), times * size.height()).expect("the drawing has a size");
     resvg::render(&tree, tiny_skia::Transform::from_scale(times as f32, times as f32), &mut pixels.as_mut());
     pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_short_and_differ() {
+        for (low, high, name) in [
+            (0.0, 1.0, "x"),
+            (-1.0, 2.5, "x"),
+            (999_999.0, 1_000_001.0, "x − 999990"),
+            (0.0, 1e-6, "x, in 1e-6"),
+            (0.76, 0.7604, "x − 0.76, in 1e-3"),
+            (-1e6, -1e6 + 1e-3, "x + 1000000"),
+            (0.0, 3e9, "x, in 1e9"),
+            (1e-300, 2e-300, "x, in 1e-300"),
+        ] {
+            let ticks = Ticks::between(low, high);
+            let labels: std::collections::BTreeSet<&str> =
+                ticks.marks.iter().map(|(_, label)| label.as_str()).collect();
+            assert!(labels.len() == ticks.marks.len() && (3..=10).contains(&labels.len()), "{low} {high}: {ticks:?}");
+            assert!(labels.iter().all(|label| label.len() <= 7), "{low} {high}: {ticks:?}");
+            assert_eq!(ticks.named("x"), name, "{ticks:?}");
+        }
+        assert_eq!(Ticks::between(2.0, 2.0).marks.len(), 1);
+    }
 }

@@ -1,0 +1,28 @@
+//! Seconds that a run takes.
+
+use cpu_time::ProcessTime;
+use std::time::Instant;
+
+/// Seconds by the clock, and of the processor over all threads.
+pub(crate) struct Stopwatch {
+    wall: Instant,
+    cpu: ProcessTime,
+    before: [f64; 2],
+}
+
+impl Stopwatch {
+    pub fn start() -> Self {
+        Self { wall: Instant::now(), cpu: ProcessTime::now(), before: [0.0; 2] }
+    }
+
+    /// Goes on from what an earlier part of the run took.
+    pub fn after(self, before: [f64; 2]) -> Self {
+        Self { before, ..self }
+    }
+
+    /// By the clock, and of the processor.
+    pub fn elapsed(&self) -> [f64; 2] {
+        let [wall, cpu] = self.before;
+        [wall + self.wall.elapsed().as_secs_f64(), cpu + self.cpu.elapsed().as_secs_f64()]
+    }
+}
