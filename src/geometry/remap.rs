@@ -14,7 +14,7 @@ use crate::error::Failure;
 ///
 /// # Errors
 /// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where values
-/// are not finite or so large that their differences are not.
+/// are not finite or so large that their integrals are not.
 ///
 /// # Example
 /// ```
@@ -40,7 +40,10 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
     check_unfolded(to)?;
     let (mut cells, last) = (DualCells::new(from), DualCells::new(to));
     let steps = (largest_share(&cells, &last) / SHARE).ceil().max(1.0);
-    let mut u = values.to_vec();
+    // differences of the largest numbers are not finite
+    let [low, high] = values.iter().fold([0.0_f64; 2], |[low, high], &u| [low.min(u), high.max(u)]);
+    let unit = if high.max(-low) > LARGE { LARGE.recip() } else { 1.0 };
+    let mut u: Vec<f64> = values.iter().map(|u| u * unit).collect();
     for step in 1..=steps as usize {
         let next =
             if step as f64 == steps { last.clone() } else { DualCells::new(&between(from, to, step as f64 / steps)?) };
@@ -48,7 +51,8 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
         cells = next;
     }
     match u.iter().position(|u| !u.is_finite()) {
-        None => Ok(u),
+        None if unit == 1.0 => Ok(u),
+        None => Ok(u.into_iter().map(|u| (u / unit).clamp(low, high)).collect()),
         Some(k) => {
             let (what, value, node, x) = ("the carried field", u[k], to.lattice().node(k), to.x()[k]);
             Err(Failure::NonFinite { what, value, node, x })
@@ -56,6 +60,8 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
     }
 }
 
+/// Values above this are carried in units of it: a power of two, so that they keep their bits.
+const LARGE: f64 = (1_u128 << 127) as f64;
 /// The most that the faces of a dual cell may sweep in a step, over its area.
 const SHARE: f64 = 0.5;
 
@@ -172,6 +178,18 @@ mod tests {
         };
         let order = (error(32) / error(128)).log(4.0);
         assert!((1.7..2.3).contains(&order), "observed order {order:.2}, expected 2");
+    }
+
+    /// The largest numbers there are can be carried, too: the same bits, shifted.
+    #[test]
+    fn large_values_are_carried() {
+        let [from, to] = [bent(8, false, -0.05), bent(8, false, 0.05)];
+        let u: Vec<f64> = from.x().iter().map(|[x, y]| (5.0 * x).sin() * (3.0 * y).cos()).collect();
+        let large = |u: &[f64]| u.iter().map(|u| u * 2.0_f64.powi(1000)).collect::<Vec<f64>>();
+        assert_eq!(remap(&from, &large(&u), &to).unwrap(), large(&remap(&from, &u, &to).unwrap()));
+        let most = vec![f64::MAX; u.len()];
+        let carried = remap(&from, &most, &to).unwrap();
+        assert!(carried.iter().all(|u| u / f64::MAX > 1.0 - 1e-14));
     }
 
     /// Meshes that are no meshes are named instead of being carried to.
