@@ -1,6 +1,6 @@
 //! Δu = f on any structured mesh.
 
-use super::Stencils;
+use super::{NEAR_DEGENERATE, Stencils};
 use crate::error::Failure;
 use crate::geometry::{Lattice, Mesh};
 use crate::numerics::lanes::{Lanes, Qr};
@@ -76,7 +76,7 @@ impl Poisson<'_> {
         for &index in &unknown {
             if let Some(side) = self.neumann_side(lattice, index) {
                 let row = place[index];
-                for (index, a) in derivative(mesh, index, outward(mesh, index, side))? {
+                for (index, a) in derivative(mesh, index, side, outward(mesh, index, side))? {
                     couple(row, index, a, &mut b[row]);
                 }
                 b[row] += self.side[index];
@@ -154,7 +154,16 @@ pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f
 /// Among those rows the one with the smallest Σ(|ξ_j|³ a_j)², ξ = J⁻¹(x − x₀). J is a length; where cells are so flat that
 /// rounding is all that is left then, its columns are half the way across the nodes along each axis: a quadratic of x is one
 /// of ξ, n·∇ₓ = (J⁻¹n)·∇_ξ, and distances are measured in cells.
-fn derivative(mesh: &Mesh<2>, index: usize, n: [f64; 2]) -> Result<[(usize, f64); 9], Failure> {
+///
+/// The node itself may end up with next to no weight, and its value would be anything. Where it has less than half of what it
+/// has in the one-sided difference inward, (d₁ + d₂)/(d₁ d₂) with distances d from the side, it is given that, unless cells
+/// are flat.
+fn derivative(
+    mesh: &Mesh<2>,
+    index: usize,
+    (axis, upper): (usize, bool),
+    n: [f64; 2],
+) -> Result<[(usize, f64); 9], Failure> {
     let (lattice, x) = (mesh.lattice(), mesh.x());
     let (node, nodes) = (lattice.node(index), lattice.nodes());
     let first: [usize; 2] = std::array::from_fn(|d| (node[d].max(1) - 1).min(nodes[d] - 3));
@@ -171,31 +180,47 @@ fn derivative(mesh: &Mesh<2>, index: usize, n: [f64; 2]) -> Result<[(usize, f64)
         });
         [0, 1].map(|c| 0.5 * (to[c] - from[c]))
     });
+    let inward: [f64; 2] = std::array::from_fn(|k| {
+        let mut next = node;
+        next[axis] = if upper { nodes[axis] - 2 - k } else { 1 + k };
+        let [dx, dy] = [0, 1].map(|c| x[lattice.index(next)][c] - x[index][c]);
+        -(n[0] * dx + n[1] * dy)
+    });
+    let own = (inward[0] + inward[1]) / (inward[0] * inward[1]);
     let mut condition = f64::NAN;
     for [a, b] in [[[h, 0.0], [0.0, h]], cell] {
         let det = a[0] * b[1] - b[0] * a[1];
         let local = |v: [f64; 2]| [(v[0] * b[1] - b[0] * v[1]) / det, (a[0] * v[1] - v[0] * a[1]) / det];
-        let mut columns = [[Lanes::ZERO; 8]; 5];
-        let mut share = [0.0; 8];
-        for j in 0..8 {
-            let [x, y] = local(away[j + 1]);
-            share[j] = x.hypot(y).powi(-3);
-            for (column, p) in columns.iter_mut().zip([x, y, x * y, x * x - y * y, x * x]) {
-                column[j] = Lanes::splat(p * share[j]);
-            }
-        }
-        let qr = Qr::new(columns);
+        let places: [[f64; 2]; 8] = std::array::from_fn(|j| local(away[j + 1]));
         let [nx, ny] = local(n);
-        let a = qr.shortest(&[nx, ny, 0.0, 0.0, 0.0].map(Lanes::splat));
-        let mut row = points.map(|p| (p, 0.0));
-        for j in 0..8 {
-            row[j + 1].1 = a[j].0[0] * share[j];
-            row[0].1 -= row[j + 1].1;
-        }
-        condition = qr.condition().0[0];
-        if condition < DEGENERATE && row.iter().all(|(_, a)| a.is_finite()) {
+        let free = shortest(&places, [nx, ny, 0.0, 0.0, 0.0]);
+        let weak = -free.0.iter().sum::<f64>() < 0.5 * own;
+        let pinned = weak.then(|| shortest(&places, [nx, ny, 0.0, 0.0, 0.0, -own]));
+        let (weights, found) = pinned.filter(|pinned| pinned.1 < NEAR_DEGENERATE).unwrap_or(free);
+        condition = found;
+        if condition < DEGENERATE && weights.iter().all(|a| a.is_finite()) {
+            let mut row = points.map(|p| (p, 0.0));
+            for (j, a) in weights.into_iter().enumerate() {
+                row[j + 1].1 = a;
+                row[0].1 -= a;
+            }
             return Ok(row);
         }
     }
     Err(Failure::DegenerateStencil { node, x: x[index], condition })
+}
+
+/// The a with the smallest Σ(|ξ_j|³ a_j)² among those with Σ a_j p_k(ξ_j) as wanted, p = x, y, xy, x² − y², x², 1, and the
+/// condition number.
+fn shortest<const N: usize>(places: &[[f64; 2]; 8], wanted: [f64; N]) -> ([f64; 8], f64) {
+    let share = places.map(|[x, y]| x.hypot(y).powi(-3));
+    let mut columns = [[Lanes::ZERO; 8]; N];
+    for (j, [x, y]) in places.iter().enumerate() {
+        for (column, p) in columns.iter_mut().zip([*x, *y, x * y, x * x - y * y, x * x, 1.0]) {
+            column[j] = Lanes::splat(p * share[j]);
+        }
+    }
+    let qr = Qr::new(columns);
+    let a = qr.shortest(&wanted.map(Lanes::splat));
+    (std::array::from_fn(|j| a[j].0[0] * share[j]), qr.condition().0[0])
 }
