@@ -161,7 +161,6 @@ fn neumann_sides_are_of_second_order() {
     }
 }
 
-/// The iteration gives what the direct solver gives.
 /// Cells a hundred thousand times wider than high: derivatives at insulated sides keep what rounding leaves.
 #[test]
 fn neumann_sides_of_flat_cells_are_not_lost() {
@@ -212,6 +211,7 @@ fn formulas_count_where_they_are_needed() {
     assert!(error.linf > 1e270 && error.l2.is_finite() && error.l2 <= error.linf, "{error:?}");
 }
 
+/// The iteration gives what the direct solver gives.
 #[test]
 fn both_solvers_agree() {
     let mut study = study(40, "kind = \"optimised\"", SHEAR);

@@ -235,7 +235,7 @@ fn a_mesh_that_moves_is_not_warned_of() {
 
 /// Case B with ten times its density: all of it.
 #[test]
-#[ignore = "half a minute: make slow"]
+#[ignore = "seconds: make slow"]
 fn case_b_with_ten_times_the_density_completes() {
     let ran = ran(&study("burgers-b-conservative", &["monitor.strength.relative=300"]));
     assert!(ran.failure.is_none() && ran.record.work.steps == 1000, "{:?}", ran.failure);
