@@ -59,6 +59,11 @@ impl Field {
         &self.values
     }
 
+    /// The values of each node.
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = &[f64]> + '_ {
+        self.values.chunks_exact(self.components)
+    }
+
     /// All values, to be changed.
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values

@@ -48,10 +48,37 @@ fn for_each_cell(mesh: &Mesh<2>, mut visit: impl FnMut([usize; 2], [usize; 4], C
     }
 }
 
-/// The Jacobian at each corner: the cross product of the two edges that meet there.
-fn corner_jacobians([a, b, c, d]: Corners) -> [f64; 4] {
-    let (south, east, north, west) = (minus(b, a), minus(c, b), minus(c, d), minus(d, a));
-    [cross(south, west), cross(south, east), cross(north, east), cross(north, west)]
+/// A cell by its edges south, east, north and west, each along its axis.
+struct Edges([[f64; 2]; 4]);
+
+impl Edges {
+    fn of([a, b, c, d]: Corners) -> Self {
+        Self([minus(b, a), minus(c, b), minus(c, d), minus(d, a)])
+    }
+
+    /// The Jacobian at each corner: the cross product of the two edges that meet there.
+    fn corner_jacobians(&self) -> [f64; 4] {
+        let Self([south, east, north, west]) = *self;
+        [cross(south, west), cross(south, east), cross(north, east), cross(north, west)]
+    }
+
+    fn least_jacobian(&self) -> f64 {
+        let [a, b, c, d] = self.corner_jacobians();
+        a.min(b).min(c.min(d))
+    }
+
+    /// Edges averaged over opposite sides.
+    fn averaged(&self) -> [[f64; 2]; 2] {
+        let Self([south, east, north, west]) = *self;
+        [[south, north], [west, east]].map(|[p, q]| [0, 1].map(|d| 0.5 * (p[d] + q[d])))
+    }
+
+    /// Q and the area.
+    fn shape(&self) -> [f64; 2] {
+        let [e, f] = self.averaged();
+        let area = cross(e, f);
+        [0.5 * (e[0] * e[0] + e[1] * e[1] + f[0] * f[0] + f[1] * f[1]) / area.abs(), area]
+    }
 }
 
 fn area([a, b, c, d]: Corners) -> f64 {
@@ -105,19 +132,21 @@ pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
 pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
     let rho = mesh.lattice().closed(rho);
     // its scale cancels, and must not overflow
-    let scale = rho.iter().fold(0.0_f64, |m, &rho| m.max(rho)).recip();
+    let quarter = 0.25 * rho.iter().fold(0.0_f64, |m, &rho| m.max(rho)).recip();
     let (mut q_max, mut q_sum, mut j_min) = (0.0_f64, 0.0, f64::INFINITY);
-    let (mut share_max, mut share_sum, mut count) = (0.0_f64, 0.0, 0.0);
+    let (mut share_max, mut share_sum) = (0.0_f64, 0.0);
     for_each_cell(mesh, |_, nodes, corners| {
-        let q = shape(corners);
-        let share = 0.25 * nodes.iter().map(|&k| rho[k] * scale).sum::<f64>() * area(corners);
+        let edges = Edges::of(corners);
+        let [q, area] = edges.shape();
+        let [a, b, c, d] = nodes.map(|k| rho[k] * quarter);
+        let share = (a + b + (c + d)) * area;
         q_max = q_max.max(q);
         q_sum += q;
         share_max = share_max.max(share);
         share_sum += share;
-        count += 1.0;
-        j_min = corner_jacobians(corners).into_iter().fold(j_min, f64::min);
+        j_min = j_min.min(edges.least_jacobian());
     });
+    let count = mesh.lattice().cells().iter().product::<usize>() as f64;
     Quality {
         q_max,
         q_mean: q_sum / count,
@@ -165,7 +194,7 @@ pub fn cell_jacobians(mesh: &Mesh<2>) -> Vec<f64> {
     let uniform = uniform_jacobian(mesh);
     let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
     for_each_cell(mesh, |_, _, corners| {
-        all.push(corner_jacobians(corners).into_iter().fold(f64::INFINITY, f64::min) / uniform);
+        all.push(Edges::of(corners).least_jacobian() / uniform);
     });
     all
 }
@@ -173,15 +202,8 @@ pub fn cell_jacobians(mesh: &Mesh<2>) -> Vec<f64> {
 /// Q of every cell, in lattice order.
 pub fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
     let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
-    for_each_cell(mesh, |_, _, corners| all.push(shape(corners)));
+    for_each_cell(mesh, |_, _, corners| all.push(Edges::of(corners).shape()[0]));
     all
-}
-
-/// Q of a cell.
-fn shape([a, b, c, d]: Corners) -> f64 {
-    let e = [0, 1].map(|k| 0.5 * (b[k] - a[k] + c[k] - d[k]));
-    let f = [0, 1].map(|k| 0.5 * (d[k] - a[k] + c[k] - b[k]));
-    0.5 * (e[0] * e[0] + e[1] * e[1] + f[0] * f[0] + f[1] * f[1]) / cross(e, f).abs()
 }
 
 /// Refuses a mesh with a node that is not finite or a cell that is folded.
@@ -196,7 +218,7 @@ pub fn check_unfolded(mesh: &Mesh<2>) -> Result<(), Failure> {
     }
     let mut worst: Option<(f64, [usize; 2], [f64; 2])> = None;
     for_each_cell(mesh, |cell, _, corners| {
-        for (jacobian, x) in corner_jacobians(corners).into_iter().zip(corners) {
+        for (jacobian, x) in Edges::of(corners).corner_jacobians().into_iter().zip(corners) {
             // not `<=`: a Jacobian that overflowed to NaN is not positive either
             if jacobian.is_nan() || jacobian <= worst.map_or(0.0, |w| w.0) {
                 worst = Some((jacobian, cell, x));

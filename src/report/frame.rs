@@ -28,7 +28,7 @@ impl Frame {
         let points = doubles(array("Points", "Points")?)?;
         let x: Vec<[f64; 2]> = points.chunks_exact(3).map(|p| [p[0], p[1]]).collect();
         // the first cell names node (1, 0), which begins the second row
-        let row = integers::<8>(array("Cells", "connectivity")?)?.get(1).copied().unwrap_or(0);
+        let row = integers::<8>(array("Cells", "connectivity")?, 2)?.get(1).copied().unwrap_or(0);
         if row < 2 || x.len() < 2 * row || !x.len().is_multiple_of(row) {
             return Err("its nodes are not those of a structured mesh".into());
         }
@@ -44,8 +44,10 @@ impl Frame {
         if !x.as_flattened().iter().chain(fields.iter().flat_map(|(_, values)| values)).all(|v| v.is_finite()) {
             return Err("it holds a value that is not finite".into());
         }
-        let subdomains = array("CellData", "subdomain").and_then(integers::<4>).unwrap_or_default();
-        let cuts = if subdomains.len() == cells[0] * cells[1] { cuts(cells, &subdomains) } else { Default::default() };
+        let count = cells[0] * cells[1];
+        let subdomains =
+            array("CellData", "subdomain").and_then(|array| integers::<4>(array, count)).unwrap_or_default();
+        let cuts = if subdomains.len() == count { cuts(cells, &subdomains) } else { Default::default() };
         Ok(Self { t, cells, x, fields, cuts })
     }
 
@@ -96,21 +98,24 @@ pub fn attribute(tag: &str, name: &str) -> Option<String> {
 }
 
 fn doubles(array: &Array<'_>) -> Result<Vec<f64>, String> {
-    Ok(bytes(array)?.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect())
+    let bytes = bytes(array, usize::MAX)?;
+    Ok(bytes.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect())
 }
 
-fn integers<const N: usize>(array: &Array<'_>) -> Result<Vec<usize>, String> {
+/// The first `count` numbers, of N bytes each.
+fn integers<const N: usize>(array: &Array<'_>, count: usize) -> Result<Vec<usize>, String> {
     let number = |b: &[u8]| b.iter().rev().fold(0, |n, &byte| n << 8 | usize::from(byte));
-    Ok(bytes(array)?.chunks_exact(N).map(number).collect())
+    Ok(bytes(array, N * count)?.chunks_exact(N).map(number).collect())
 }
 
-/// One block behind a header of four numbers.
-fn bytes(array: &Array<'_>) -> Result<Vec<u8>, String> {
+/// One block behind a header of four numbers, up to so many bytes of it.
+fn bytes(array: &Array<'_>, most: usize) -> Result<Vec<u8>, String> {
     const HEADER: usize = 44;
     let damaged = |what: &str| format!("its array {:?} is damaged ({what})", array.name);
     let compressed = array.text.get(HEADER..).ok_or_else(|| damaged("too short"))?;
     let compressed = STANDARD.decode(compressed).map_err(|error| damaged(&error.to_string()))?;
     let mut bytes = Vec::new();
-    ZlibDecoder::new(compressed.as_slice()).read_to_end(&mut bytes).map_err(|error| damaged(&error.to_string()))?;
+    let mut decoder = ZlibDecoder::new(compressed.as_slice()).take(most as u64);
+    decoder.read_to_end(&mut bytes).map_err(|error| damaged(&error.to_string()))?;
     Ok(bytes)
 }

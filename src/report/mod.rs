@@ -9,7 +9,7 @@ mod tables;
 mod viewer;
 
 use crate::error::Result;
-use crate::parallel::join;
+use crate::parallel::{join, map};
 use crate::simulation::write_file;
 use files::RunFiles;
 use std::path::{Path, PathBuf};
@@ -36,13 +36,14 @@ pub fn build(directory: &Path) -> Result<Built> {
     let mut run = RunFiles::read(directory)?;
     let plots = plots::of(&run);
     let pictures = || {
-        plots.iter().try_for_each(|(name, figure)| {
+        let drawn = map(&plots, |(name, figure)| {
             let picture = figure.draw();
             write_file(&directory.join(format!("{name}.svg")), picture.svg.as_bytes())?;
             write_file(&directory.join(format!("{name}.png")), &picture.png)
-        })
+        });
+        drawn.into_iter().collect::<Result<()>>()
     };
-    let (viewer, drawn) = join(|| viewer::Viewer::of(&mut run), pictures);
+    let (drawn, viewer) = join(pictures, || viewer::Viewer::of(&mut run));
     drawn?;
     if run.asks_for("animation") {
         animation::write(&mut run)?;

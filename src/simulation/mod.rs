@@ -359,10 +359,11 @@ impl Simulation {
         let exact = self.physics.exact(state.t, &state.mesh)?;
         let areas = node_areas(&state.mesh);
         let (mut linf, mut square, mut area) = (0.0_f64, 0.0, 0.0);
-        for (e, c) in self.physics.known().into_iter().enumerate() {
-            for ((u, e), share) in state.u.component(c).zip(exact.component(e)).zip(&areas) {
-                linf = linf.max((u - e).abs());
-                square += (u - e) * (u - e) * share;
+        let known = self.physics.known();
+        for ((u, exact), share) in state.u.nodes().zip(exact.nodes()).zip(&areas) {
+            for (&c, exact) in known.iter().zip(exact) {
+                linf = linf.max((u[c] - exact).abs());
+                square += (u[c] - exact) * (u[c] - exact) * share;
                 area += share;
             }
         }

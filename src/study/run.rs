@@ -4,6 +4,7 @@ use super::rest::at_rest;
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
 use crate::kept::{Kept, check_nodal};
+use crate::parallel::join;
 use crate::report;
 use crate::simulation::{
     Checkpoint, Checkpoints, Course, Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory,
@@ -106,7 +107,7 @@ fn run_from(
             failure => failure,
         };
         let output = Instant::now();
-        let kept = history.flush().and_then(|()| keep(&study, &directory, &unknowns, &state, &mut frames));
+        let kept = history.flush().and_then(|()| keep(&directory, &unknowns, &state, &mut frames));
         let spent = output.elapsed().as_secs_f64();
         record.seconds.output += spent;
         record.seconds.wall += spent;
@@ -122,24 +123,28 @@ fn run_from(
     summary.safety = record.safety;
     summary.reports = record.reports;
     summary.warnings = record.warnings;
-    let resumable = failure.is_some_and(Error::is_resumable);
     let written = directory.write_summary(&summary);
     let (state, failure) = outcome?;
-    let finish = || {
-        written?;
-        // the report shows the summary; what it took itself is added afterwards
-        let output = Instant::now();
-        report::finish(directory.path(), study.output.report, study.output.animation)?;
-        let spent = output.elapsed().as_secs_f64();
-        summary.seconds.output += spent;
-        summary.seconds.wall += spent;
-        directory.write_summary(&summary)?;
-        if resumable { Ok(()) } else { checkpoints.remove() }
-    };
-    match (finish(), failure) {
-        (Err(error), None) => Err(error),
-        (_, failure) => Ok(Finished { summary, state, failure }),
-    }
+
+    // the report shows the summary; what it took itself, or failed with, is added afterwards
+    let output = Instant::now();
+    let drawn = written.and_then(|()| {
+        let (picture, report) = join(
+            || draw_mesh(&study, &directory, &unknowns, &state),
+            || report::finish(directory.path(), study.output.report, study.output.animation),
+        );
+        picture.and(report)
+    });
+    let spent = output.elapsed().as_secs_f64();
+    summary.seconds.output += spent;
+    summary.seconds.wall += spent;
+    let failure = failure.or(drawn.err());
+    summary.status = status(failure.as_ref()).into();
+    summary.error = failure.as_ref().map(Failed::from);
+    let written = directory.write_summary(&summary);
+    let failure = failure.or(written.err());
+    let removed = if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() };
+    Ok(Finished { summary, state, failure: failure.or(removed.err()) })
 }
 
 /// A run between two steps, with what leaves its traces on the disk.
@@ -306,16 +311,14 @@ fn compare_with_reference(
     Ok(())
 }
 
-/// Writes the last good state: as a frame, as arrays, as a picture.
-fn keep(
-    study: &MovingMesh,
-    directory: &RunDirectory,
-    unknowns: &[String],
-    state: &State,
-    frames: &mut Frames,
-) -> Result<()> {
+/// Writes the last good state, as a frame and as arrays.
+fn keep(directory: &RunDirectory, unknowns: &[String], state: &State, frames: &mut Frames) -> Result<()> {
     frames.write(unknowns, state)?;
-    directory.write("final.npz", &final_arrays(unknowns, state))?;
+    directory.write("final.npz", &final_arrays(unknowns, state))
+}
+
+/// Draws the last good state.
+fn draw_mesh(study: &MovingMesh, directory: &RunDirectory, unknowns: &[String], state: &State) -> Result<()> {
     let picture = draw(&format!("{}, t = {}", study.study.name, rounded(state.t)), &unknowns[0], state, &[]);
     directory.write("mesh.svg", picture.svg.as_bytes())?;
     directory.write("mesh.png", &picture.png)

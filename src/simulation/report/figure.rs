@@ -5,6 +5,7 @@ use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
+use std::fmt::Write;
 
 /// Curves over linear or logarithmic axes, drawn as SVG and PNG.
 #[derive(Debug, Clone, Default)]
@@ -58,8 +59,13 @@ const SIZE: (u32, u32) = (760, 520);
 const FINE: u32 = 8;
 /// More marks than this are small.
 const MANY: usize = 40;
-/// Share of an axis that a legend may take.
-const CORNER: f64 = 0.4;
+/// Size of the plot itself, of a row of the legend, and of what is beside its words, in pixels; a letter is so wide at most.
+const PLOT: [f64; 2] = [640.0, 410.0];
+const ROW: f64 = 22.0;
+const BESIDE: f64 = 64.0;
+const LETTER: f64 = 7.0;
+/// Places on a line between two points that are looked at.
+const BETWEEN: usize = 16;
 /// Room around the points, as a factor.
 const ROOM: f64 = 1.1;
 
@@ -73,6 +79,8 @@ impl Figure {
     pub fn svg(&self) -> String {
         let mut svg = String::new();
         self.plot(&mut svg).expect("drawing into memory cannot fail");
+        // lines of the grid are sharp
+        let svg = with_opacity_of_paint(&svg).replace("<line ", "<line shape-rendering=\"crispEdges\" ");
         // shown at its size, in units that are finer
         let size = |fine: u32| format!("width=\"{}\" height=\"{}\"", SIZE.0 * fine, SIZE.1 * fine);
         svg.replacen(&size(FINE), &size(1), 1)
@@ -97,8 +105,21 @@ impl Figure {
         placed(0) && placed(1)
     }
 
-    /// From where to where an axis goes: around the points, and from power to power where it is logarithmic.
+    /// From where to where an axis goes: around the points, and from power to power where it is logarithmic; further up
+    /// where a legend would find no free corner.
     fn ends(&self, d: usize) -> [f64; 2] {
+        let [low, high] = self.around(d);
+        if d == 0 || !self.is_named() || self.free_corner().is_some() {
+            return [low, high];
+        }
+        let room = self.legend()[1] / (1.0 - self.legend()[1]);
+        match self.scales[d] {
+            Scale::Linear => [low, high + room * (high - low)],
+            Scale::Logarithmic => [low, high * (high / low).powf(room)],
+        }
+    }
+
+    fn around(&self, d: usize) -> [f64; 2] {
         let points = self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
         let around = |[low, high]: [f64; 2], p: &[f64; 2]| [low.min(p[d]), high.max(p[d])];
         let [low, high] = points.filter(|p| self.shown(p)).fold([f64::INFINITY, f64::NEG_INFINITY], around);
@@ -113,15 +134,46 @@ impl Figure {
         }
     }
 
-    /// The corner of the plot in which the fewest points lie.
-    fn free_corner(&self) -> SeriesLabelPosition {
+    /// What a curve goes through, as it is drawn.
+    fn line(&self, curve: &Curve) -> Vec<[f64; 2]> {
+        let mut line: Vec<[f64; 2]> =
+            curve.points.iter().chain(&curve.extrapolated).filter(|p| self.shown(p)).copied().collect();
+        if !curve.plain {
+            line.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        }
+        line
+    }
+
+    /// Whether there is a legend.
+    fn is_named(&self) -> bool {
+        self.curves.iter().any(|curve| !curve.name.is_empty())
+    }
+
+    /// Width and height of the legend, as shares of the plot.
+    fn legend(&self) -> [f64; 2] {
+        let names = || self.curves.iter().map(|curve| curve.name.chars().count()).filter(|letters| *letters > 0);
+        let size = [BESIDE + LETTER * names().max().unwrap_or(0) as f64, ROW * (names().count() + 1) as f64];
+        [0, 1].map(|d| (size[d] / PLOT[d]).min(0.5))
+    }
+
+    /// A corner of the plot where no curve would lie under the legend.
+    fn free_corner(&self) -> Option<SeriesLabelPosition> {
         let on = |x: f64, d: usize| if self.scales[d] == Scale::Linear { x } else { x.log10() };
-        let ends = [0, 1].map(|d| self.ends(d).map(|end| on(end, d)));
-        let place = |p: &[f64; 2], d: usize| (on(p[d], d) - ends[d][0]) / (ends[d][1] - ends[d][0]);
-        let inside = |[right, top]: [bool; 2]| {
-            let points = self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
-            let near = |at: f64, end: bool| if end { 1.0 - at } else { at } < CORNER;
-            points.filter(|p| self.shown(p) && near(place(p, 0), right) && near(place(p, 1), top)).count()
+        let ends = [0, 1].map(|d| self.around(d).map(|end| on(end, d)));
+        let place = |p: &[f64; 2]| [0, 1].map(|d| (on(p[d], d) - ends[d][0]) / (ends[d][1] - ends[d][0]));
+        let lines: Vec<Vec<[f64; 2]>> =
+            self.curves.iter().map(|curve| self.line(curve).iter().map(place).collect()).collect();
+        let legend = self.legend();
+        let under =
+            |p: [f64; 2], corner: [bool; 2]| (0..2).all(|d| if corner[d] { 1.0 - p[d] } else { p[d] } < legend[d]);
+        let crossed = |line: &[[f64; 2]], corner: [bool; 2]| {
+            let between = |w: &[[f64; 2]]| {
+                (0..=BETWEEN).any(|k| {
+                    let s = k as f64 / BETWEEN as f64;
+                    under([0, 1].map(|d| w[0][d] + s * (w[1][d] - w[0][d])), corner)
+                })
+            };
+            line.first().is_some_and(|p| under(*p, corner)) || line.windows(2).any(between)
         };
         let corners = [
             ([true, true], SeriesLabelPosition::UpperRight),
@@ -129,8 +181,8 @@ impl Figure {
             ([true, false], SeriesLabelPosition::LowerRight),
             ([false, true], SeriesLabelPosition::UpperLeft),
         ];
-        let free = corners.into_iter().min_by_key(|(corner, _)| inside(*corner));
-        free.map_or(SeriesLabelPosition::UpperRight, |(_, position)| position)
+        let free = |corner: [bool; 2]| !lines.iter().any(|line| crossed(line, corner));
+        corners.into_iter().find(|(corner, _)| free(*corner)).map(|(_, position)| position)
     }
 
     fn chart<X, Y>(&self, svg: &mut String, x: X, y: Y) -> Result<(), Box<dyn std::error::Error>>
@@ -171,10 +223,7 @@ impl Figure {
         for (curve, colour) in self.curves.iter().zip(COLOURS.iter().cycle()) {
             let measured = || curve.points.iter().filter(|p| self.shown(p)).map(|p| (p[0], p[1]));
             let open = || curve.extrapolated.iter().filter(|p| self.shown(p)).map(|p| (p[0], p[1]));
-            let mut line: Vec<(f64, f64)> = measured().chain(open()).collect();
-            if !curve.plain {
-                line.sort_by(|a, b| a.0.total_cmp(&b.0));
-            }
+            let line = self.line(curve).into_iter().map(|[x, y]| (x, y));
             let style = if curve.faint { BLACK.mix(0.25).stroke_width(FINE) } else { colour.stroke_width(2 * FINE) };
             let drawn = chart.draw_series(LineSeries::new(line, style))?;
             if !curve.name.is_empty() {
@@ -188,7 +237,7 @@ impl Figure {
                 chart.draw_series(open().map(|p| Circle::new(p, 5 * FINE, colour.stroke_width(2 * FINE))))?;
             }
         }
-        if self.curves.iter().any(|curve| !curve.name.is_empty()) {
+        if self.is_named() {
             chart
                 .configure_series_labels()
                 .label_font(font(14))
@@ -196,12 +245,27 @@ impl Figure {
                 .border_style(BLACK.mix(0.4).stroke_width(FINE))
                 .margin(8 * FINE)
                 .legend_area_size(30 * FINE)
-                .position(self.free_corner())
+                .position(self.free_corner().unwrap_or(SeriesLabelPosition::UpperRight))
                 .draw()?;
         }
         area.present()?;
         Ok(())
     }
+}
+
+/// A drawing in which nothing has both a fill and a stroke, with the opacity of elements as that of their paint: it looks
+/// the same, and takes no layer for each of them.
+fn with_opacity_of_paint(svg: &str) -> String {
+    let mut parts = svg.split(" opacity=\"");
+    let mut out = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        let (value, rest) = part.split_once('"').unwrap_or((part, ""));
+        if value != "1" {
+            let _ = write!(out, " fill-opacity=\"{value}\" stroke-opacity=\"{value}\"");
+        }
+        out.push_str(rest);
+    }
+    out
 }
 
 /// The next power of ten, down or up.
@@ -225,5 +289,33 @@ fn label(x: f64, scale: Scale) -> String {
         Some("1" | "2" | "5") if (0.0099..1.1e4).contains(&x) => format!("{}", (x * 1e6).round() / 1e6),
         Some("1" | "2" | "5") => text,
         _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Curves through all four corners: the axis goes further up, and the legend stands above them.
+    #[test]
+    fn a_legend_finds_room() {
+        let curve = |name: &str, points: Vec<[f64; 2]>| Curve { name: name.into(), points, ..Curve::default() };
+        let crossed = |scale: Scale| Figure {
+            scales: [Scale::Linear, scale],
+            curves: vec![curve("up", vec![[0.0, 1.1], [1.0, 9.0]]), curve("down", vec![[0.0, 9.0], [1.0, 1.1]])],
+            ..Figure::default()
+        };
+        for scale in [Scale::Linear, Scale::Logarithmic] {
+            let mut figure = crossed(scale);
+            assert!(figure.free_corner().is_none());
+            let [height, upper] = [figure.legend()[1], figure.ends(1)[1]];
+            let [low, high] = figure.around(1).map(|end| if scale == Scale::Linear { end } else { end.log10() });
+            let upper = if scale == Scale::Linear { upper } else { upper.log10() };
+            assert!(((high - low) / (upper - low) - (1.0 - height)).abs() < 1e-12, "{low} {high} {upper}");
+            // one of them alone leaves two corners
+            figure.curves.pop();
+            assert!(matches!(figure.free_corner(), Some(SeriesLabelPosition::LowerRight)));
+            assert_eq!(figure.ends(1), figure.around(1));
+        }
     }
 }
