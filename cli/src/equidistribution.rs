@@ -15,13 +15,7 @@ pub fn run(study: &EquidistributionStudy, out: &Path, begin: Begin, quiet: bool)
     finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {
         terminal::say(table(&finished.summary));
-        terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
-        if !finished.summary.iterations.is_empty() {
-            terminal::say(format_args!("history  {}", out.join("convergence.png").display()));
-        }
-        if study.output.report {
-            terminal::say(format_args!("report   {}", out.join("report.html").display()));
-        }
+        terminal::say_files(out, &[("picture", "mesh.png"), ("history", "convergence.png"), ("report", "report.html")]);
         terminal::say(format_args!("run      {}", out.display()));
     }
     match finished.failure {

@@ -12,10 +12,7 @@ pub fn run(study: &PoissonStudy, out: &Path, quiet: bool) -> driftmesh::Result<E
     summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {
         terminal::say(table(&summary));
-        terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
-        if study.output.report {
-            terminal::say(format_args!("report   {}", out.join("report.html").display()));
-        }
+        terminal::say_files(out, &[("picture", "mesh.png"), ("report", "report.html")]);
         terminal::say(format_args!("run      {}", out.display()));
     }
     Ok(ExitCode::SUCCESS)

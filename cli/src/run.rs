@@ -84,10 +84,7 @@ impl Run {
             {
                 terminal::say(line);
             }
-            terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
-            if study.output.report {
-                terminal::say(format_args!("report   {}", out.join("report.html").display()));
-            }
+            terminal::say_files(out, &[("picture", "mesh.png"), ("report", "report.html")]);
             terminal::say(format_args!("run      {}", out.display()));
         }
         match finished.failure {

@@ -24,11 +24,7 @@ pub fn run(study: &StefanStudy, out: &Path, begin: Begin, quiet: bool) -> driftm
     finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {
         terminal::say(table(&finished.summary));
-        terminal::say(format_args!("picture  {}", out.join("mesh.png").display()));
-        terminal::say(format_args!("front    {}", out.join("front.png").display()));
-        if study.output.report {
-            terminal::say(format_args!("report   {}", out.join("report.html").display()));
-        }
+        terminal::say_files(out, &[("picture", "mesh.png"), ("front", "front.png"), ("report", "report.html")]);
         terminal::say(format_args!("run      {}", out.display()));
     }
     match finished.failure {

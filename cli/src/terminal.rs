@@ -2,11 +2,22 @@
 
 use driftmesh::Error;
 use std::io::{Write, stderr, stdout};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Prints to standard output.
 pub fn say(text: impl std::fmt::Display) {
     let _ = writeln!(stdout(), "{text}");
+}
+
+/// Prints where the files of a run are, those that there are.
+pub fn say_files(out: &Path, files: &[(&str, &str)]) {
+    for (label, name) in files {
+        let path = out.join(name);
+        if path.is_file() {
+            say(format_args!("{label:8} {}", path.display()));
+        }
+    }
 }
 
 /// Prints something that did not stop the program.

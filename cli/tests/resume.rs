@@ -188,6 +188,35 @@ fn a_full_disk_is_named_and_the_run_goes_on() {
     }
 }
 
+/// A disk that is full only once everything is computed: no run of any kind is then called completed, and each is with
+/// space again.
+#[test]
+fn a_picture_that_cannot_be_written_fails_the_run() {
+    let sandbox = Sandbox::new(STUDY);
+    let studies = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("studies");
+    // limits of a file in blocks of half a kilobyte, below the size of the one named
+    for (study, more, blocks, named) in [
+        ("burgers-b-conservative", "--set time.end=0.26 --set time.report=[0.26] --set grid.cells=[5,4]", 130, "mesh.svg"),
+        ("stefan-slides", "--set time.end=0.05 --set time.report=[0.05]", 600, "mesh.png"),
+        ("moving-front-1d", "", 700, "report.html"),
+        ("annulus-perturbed-published", "", 1000, "mesh.png"),
+    ] {
+        let run = format!("exec '{PROGRAM}' run '{}/{study}.toml' --out {study} {more}", studies.display());
+        let output = sandbox.command("sh", &["-c", &format!("ulimit -f {blocks}; {run}")]).output().unwrap();
+        let said = words(&output);
+        assert_eq!(output.status.code(), Some(1), "{study}: {said}");
+        assert!(said.contains("error: cannot write ") && said.contains(named), "{study}: {said}");
+        assert!(!said.contains("picture  ") || sandbox.path(study).join("mesh.png").is_file(), "{study}: {said}");
+        assert_eq!(sandbox.status(study), "failed", "{study}");
+        let output = sandbox.command("sh", &["-c", &format!("{run} --resume")]).output().unwrap();
+        assert!(output.status.success(), "{study}: {}", words(&output));
+        assert_eq!(sandbox.status(study), "completed", "{study}");
+        for file in ["mesh.png", "report.html"] {
+            assert!(sandbox.path(study).join(file).is_file(), "{study}: {file}");
+        }
+    }
+}
+
 /// Readers that close the pipe early do not end a run.
 #[test]
 fn a_closed_pipe_does_not_end_a_run() {

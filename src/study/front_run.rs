@@ -2,6 +2,7 @@
 
 use super::StefanStudy;
 use super::any::Begin;
+use super::ending::end;
 use super::stefan::Prepared;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::geometry::{Field, quality};
@@ -315,24 +316,20 @@ impl StefanStudy {
         let kept = self.keep(&directory, &finished, &mut frames);
         let FrontFinished { summary, failure, .. } = &mut finished;
         summary.seconds.output += output.elapsed().as_secs_f64();
-        [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
-        summary.status = status(failure.as_ref()).into();
-        summary.error = failure.as_ref().map(Failed::from);
-        let finish = || {
-            directory.write_summary(summary)?;
-            kept?;
-            let output = Instant::now();
-            report::finish(directory.path(), self.output.report, self.output.animation)?;
-            summary.seconds.output += output.elapsed().as_secs_f64();
+        let note = |summary: &mut StefanSummary, failure: Option<&Error>, output: f64| {
+            summary.status = status(failure).into();
+            summary.error = failure.map(Failed::from);
+            summary.seconds.output += output;
             [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
-            directory.write_summary(summary)?;
-            if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() }
         };
         // what went wrong first is what is reported
-        match (finish(), &finished.failure) {
-            (Err(error), None) => Err(error),
-            _ => Ok(finished),
+        *failure = end(&directory, summary, failure.take().or(kept.err()), note, || {
+            report::finish(directory.path(), self.output.report, self.output.animation)
+        });
+        if !failure.as_ref().is_some_and(Error::is_resumable) {
+            *failure = failure.take().or(checkpoints.remove().err());
         }
+        Ok(finished)
     }
 
     /// See [`Study::decode`](super::Study::decode).

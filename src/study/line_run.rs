@@ -2,6 +2,7 @@
 
 use super::EquidistributionStudy;
 use super::any::Begin;
+use super::ending::end;
 use crate::equidistribution::{FaceDensity, History, Iterate, Line};
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::check_nodal;
@@ -347,25 +348,20 @@ impl EquidistributionStudy {
         let told = summary.tell(&study, &line, &evolution);
         let failure = failure.or(told.err());
         summary.warnings.extend(refused);
-        summary.failure = failure.as_ref().map(Failed::from);
-        summary.status = status(failure.as_ref()).into();
-        let mut finish = || {
-            keep(&study, &line, &directory, &evolution)?;
-            summary.seconds.output += output.elapsed().as_secs_f64();
-            [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
-            directory.write_summary(&summary)?;
-            let output = Instant::now();
-            report::finish(directory.path(), study.output.report, study.output.animation)?;
-            summary.seconds.output += output.elapsed().as_secs_f64();
-            [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
-            directory.write_summary(&summary)?;
-            if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() }
-        };
         // what went wrong first is what is reported
-        match (finish(), &failure) {
-            (Err(error), None) => Err(error),
-            _ => Ok(LineFinished { summary, evolution, failure }),
-        }
+        let failure = failure.or(keep(&study, &line, &directory, &evolution).err());
+        summary.seconds.output += output.elapsed().as_secs_f64();
+        let note = |summary: &mut EquidistributionSummary, failure: Option<&Error>, output: f64| {
+            summary.status = status(failure).into();
+            summary.failure = failure.map(Failed::from);
+            summary.seconds.output += output;
+            [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
+        };
+        let failure = end(&directory, &mut summary, failure, note, || {
+            report::finish(directory.path(), study.output.report, study.output.animation)
+        });
+        let removed = if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() };
+        Ok(LineFinished { summary, evolution, failure: failure.or(removed.err()) })
     }
 
     fn summary(&self) -> EquidistributionSummary {

@@ -1,6 +1,7 @@
 //! From a study file to a run: text → checked parts → simulation → run directory.
 
 mod any;
+mod ending;
 mod equidistribution;
 mod front_run;
 mod line_run;

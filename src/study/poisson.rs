@@ -1,3 +1,4 @@
+use super::ending::end;
 use super::mapped::{Grading, MappedDomain, Side, mistaken, parse};
 use super::{Header, Output};
 use crate::error::{Error, Failure, Result};
@@ -450,29 +451,32 @@ impl PoissonStudy {
             warnings: Vec::new(),
         };
         directory.write_summary(&summary)?;
-        let outcome = self.solve().and_then(|solved| {
-            let output = Instant::now();
-            keep(self, &directory, &solved)?;
-            Ok((solved, output.elapsed().as_secs_f64()))
+        let failure = match self.solve() {
+            Err(failure) => Some(failure),
+            Ok(solved) => {
+                summary.seconds = solved.seconds;
+                summary.error = solved.error;
+                summary.work.linear_iterations = solved.iterations;
+                summary.stencil = Some(solved.report());
+                summary.warnings = solved.warnings();
+                let output = Instant::now();
+                let kept = keep(self, &directory, &solved);
+                summary.seconds.output += output.elapsed().as_secs_f64();
+                kept.err()
+            }
+        };
+        let note = |summary: &mut PoissonSummary, failure: Option<&Error>, output: f64| {
+            summary.status = if failure.is_none() { "completed" } else { "failed" }.into();
+            summary.failure = failure.map(Failed::from);
+            summary.seconds.output += output;
+            [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
+        };
+        let computed = failure.is_none();
+        let failure = end(&directory, &mut summary, failure, note, || match computed {
+            true => report::finish(directory.path(), self.output.report, self.output.animation),
+            false => Ok(()),
         });
-        summary.status = if outcome.is_ok() { "completed" } else { "failed" }.into();
-        summary.failure = outcome.as_ref().err().map(Failed::from);
-        if let Ok((solved, output)) = &outcome {
-            summary.seconds = PoissonSeconds { output: *output, ..solved.seconds };
-            summary.error = solved.error;
-            summary.work.linear_iterations = solved.iterations;
-            summary.stencil = Some(solved.report());
-            summary.warnings = solved.warnings();
-        }
-        [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
-        directory.write_summary(&summary)?;
-        outcome?;
-        let output = Instant::now();
-        report::finish(directory.path(), self.output.report, self.output.animation)?;
-        summary.seconds.output += output.elapsed().as_secs_f64();
-        [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
-        directory.write_summary(&summary)?;
-        Ok(summary)
+        failure.map_or(Ok(summary), Err)
     }
 }
 

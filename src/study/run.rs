@@ -1,5 +1,6 @@
 use super::MovingMesh;
 use super::any::Begin;
+use super::ending::end;
 use super::rest::at_rest;
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
@@ -115,34 +116,32 @@ fn run_from(
         (state, failure.or(kept.err()))
     });
 
-    let failure = outcome.as_ref().map_or_else(Some, |(_, failure)| failure.as_ref());
-    summary.status = status(failure).into();
-    summary.error = failure.map(Failed::from);
+    let note = |summary: &mut Summary, failure: Option<&Error>, output: f64| {
+        summary.status = status(failure).into();
+        summary.error = failure.map(Failed::from);
+        summary.seconds.output += output;
+        summary.seconds.wall += output;
+    };
     summary.seconds = record.seconds;
     summary.work = record.work;
     summary.safety = record.safety;
     summary.reports = record.reports;
     summary.warnings = record.warnings;
-    let written = directory.write_summary(&summary);
-    let (state, failure) = outcome?;
-
-    // the report shows the summary; what it took itself, or failed with, is added afterwards
-    let output = Instant::now();
-    let drawn = written.and_then(|()| {
+    let (state, failure) = match outcome {
+        Ok(ended) => ended,
+        Err(error) => {
+            note(&mut summary, Some(&error), 0.0);
+            let _ = directory.write_summary(&summary);
+            return Err(error);
+        }
+    };
+    let failure = end(&directory, &mut summary, failure, note, || {
         let (picture, report) = join(
             || draw_mesh(&study, &directory, &unknowns, &state),
             || report::finish(directory.path(), study.output.report, study.output.animation),
         );
         picture.and(report)
     });
-    let spent = output.elapsed().as_secs_f64();
-    summary.seconds.output += spent;
-    summary.seconds.wall += spent;
-    let failure = failure.or(drawn.err());
-    summary.status = status(failure.as_ref()).into();
-    summary.error = failure.as_ref().map(Failed::from);
-    let written = directory.write_summary(&summary);
-    let failure = failure.or(written.err());
     let removed = if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() };
     Ok(Finished { summary, state, failure: failure.or(removed.err()) })
 }

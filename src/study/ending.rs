@@ -1,0 +1,23 @@
+use crate::error::{Error, Result};
+use crate::simulation::RunDirectory;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Ends a run of any kind: its summary, then the report and what else is drawn, then the summary again with what that took
+/// or failed with. What went wrong first is returned.
+///
+/// `note(summary, failure, seconds)` puts into the summary how the run ended, and adds seconds of output.
+pub(super) fn end<S: Serialize>(
+    directory: &RunDirectory,
+    summary: &mut S,
+    failure: Option<Error>,
+    note: impl Fn(&mut S, Option<&Error>, f64),
+    draw: impl FnOnce() -> Result<()>,
+) -> Option<Error> {
+    note(summary, failure.as_ref(), 0.0);
+    let written = directory.write_summary(summary);
+    let output = Instant::now();
+    let failure = failure.or(written.and_then(|()| draw()).err());
+    note(summary, failure.as_ref(), output.elapsed().as_secs_f64());
+    failure.or(directory.write_summary(summary).err())
+}
