@@ -352,7 +352,7 @@ class Viewer {
     stage.place = place;
     const theirs = Number.isInteger(place) ? mesh.times[place] : t;
     const pair = this.stages.length > 1, role = stage.m ? "compared with: " : "generator: ";
-    stage.caption.textContent = (mesh.name && role + mesh.name) + (pair ? `, t = ${number(theirs)}` : "");
+    stage.caption.textContent = (mesh.name && role + mesh.name) + (pair ? `, t\u00a0=\u00a0${number(theirs)}` : "");
     stage.caption.hidden = !stage.caption.textContent;
 
     const field = this.controls.field.value, [n, m] = mesh.lines, nodes = n * m;

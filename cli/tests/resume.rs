@@ -196,7 +196,12 @@ fn a_picture_that_cannot_be_written_fails_the_run() {
     let studies = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("studies");
     // limits of a file in blocks of half a kilobyte, below the size of the one named
     for (study, more, blocks, named) in [
-        ("burgers-b-conservative", "--set time.end=0.26 --set time.report=[0.26] --set grid.cells=[5,4]", 130, "mesh.svg"),
+        (
+            "burgers-b-conservative",
+            "--set time.end=0.26 --set time.report=[0.26] --set grid.cells=[5,4]",
+            130,
+            "mesh.svg",
+        ),
         ("stefan-slides", "--set time.end=0.05 --set time.report=[0.05]", 600, "mesh.png"),
         ("moving-front-1d", "", 700, "report.html"),
         ("annulus-perturbed-published", "", 1000, "mesh.png"),

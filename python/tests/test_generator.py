@@ -237,7 +237,7 @@ def test_a_step_does_not_wait_for_a_run(tmp_path):
 def test_ctrl_c_gives_up_a_long_step():
     """The rest of the step goes on in the background, and the generator says so."""
     mesh = Mesh.uniform(cells=(24, 24))
-    generator = MeshGenerator(method=Stochastic(estimator=MonteCarlo(paths=20_000, substeps=50)))
+    generator = MeshGenerator(method=Stochastic(estimator=MonteCarlo(paths=100_000, substeps=50)))
     threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):

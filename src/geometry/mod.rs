@@ -17,6 +17,7 @@ pub(crate) use lattice::strides;
 pub use locate::interpolate;
 pub use mesh::Mesh;
 pub use patch::Patch;
+pub(crate) use quality::integral;
 pub use quality::{
     Comparison, Quality, cell_areas, cell_jacobians, cell_qualities, check_unfolded, compare, node_areas, quality,
 };

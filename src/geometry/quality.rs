@@ -1,5 +1,6 @@
 use super::Mesh;
 use crate::error::Failure;
+use std::ops::Range;
 
 /// How good a mesh is
 ///
@@ -48,6 +49,39 @@ fn for_each_cell(mesh: &Mesh<2>, mut visit: impl FnMut([usize; 2], [usize; 4], C
     }
 }
 
+/// Nodes before and after a row of cells: x and y of each, as arrays that the compiler makes vectors of.
+struct Row<'a> {
+    before: [&'a [f64]; 2],
+    after: [&'a [f64]; 2],
+}
+
+impl Row<'_> {
+    fn cell(&self, j: usize) -> Edges {
+        let [before, after] = [self.before, self.after].map(|[x, y]| [[x[j], y[j]], [x[j + 1], y[j + 1]]]);
+        Edges::of([before[0], after[0], after[1], before[1]])
+    }
+}
+
+/// Calls `visit(nodes before, nodes after, row)` for every row of cells, in lattice order: the ranges of arrays of shape
+/// cells + 1 in which they stand, and where they are.
+fn for_each_row_of_cells(mesh: &Mesh<2>, mut visit: impl FnMut([Range<usize>; 2], &Row<'_>)) {
+    let x = mesh.closed();
+    let [n, m] = mesh.lattice().cells();
+    let range = |i: usize| i * (m + 1)..(i + 1) * (m + 1);
+    let column = |i: usize, d: usize| x[range(i)].iter().map(move |x| x[d]);
+    let mut before = [0, 1].map(|d| column(0, d).collect::<Vec<f64>>());
+    let mut after = before.clone();
+    for i in 0..n {
+        for (d, after) in after.iter_mut().enumerate() {
+            after.iter_mut().zip(column(i + 1, d)).for_each(|(to, from)| *to = from);
+        }
+        // of a length that is known where they are read
+        let [before_it, after_it] = [&before, &after].map(|[x, y]| [&x[..m + 1], &y[..m + 1]]);
+        visit([range(i), range(i + 1)], &Row { before: before_it, after: after_it });
+        std::mem::swap(&mut before, &mut after);
+    }
+}
+
 /// A cell by its edges south, east, north and west, each along its axis.
 struct Edges([[f64; 2]; 4]);
 
@@ -64,7 +98,7 @@ impl Edges {
 
     fn least_jacobian(&self) -> f64 {
         let [a, b, c, d] = self.corner_jacobians();
-        a.min(b).min(c.min(d))
+        smaller(smaller(a, b), smaller(c, d))
     }
 
     /// Edges averaged over opposite sides.
@@ -73,12 +107,22 @@ impl Edges {
         [[south, north], [west, east]].map(|[p, q]| [0, 1].map(|d| 0.5 * (p[d] + q[d])))
     }
 
+    fn area(&self) -> f64 {
+        let [e, f] = self.averaged();
+        cross(e, f)
+    }
+
     /// Q and the area.
     fn shape(&self) -> [f64; 2] {
         let [e, f] = self.averaged();
         let area = cross(e, f);
         [0.5 * (e[0] * e[0] + e[1] * e[1] + f[0] * f[0] + f[1] * f[1]) / area.abs(), area]
     }
+}
+
+/// The minimum of two numbers, in one instruction: `f64::min` takes four, for NaN.
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
 fn area([a, b, c, d]: Corners) -> f64 {
@@ -133,26 +177,48 @@ pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
     let rho = mesh.lattice().closed(rho);
     // its scale cancels, and must not overflow
     let quarter = 0.25 * rho.iter().fold(0.0_f64, |m, &rho| m.max(rho)).recip();
+    let [n, m] = mesh.lattice().cells();
+    let [mut q, mut share, mut least] = [0, 1, 2].map(|_| vec![0.0; m]);
     let (mut q_max, mut q_sum, mut j_min) = (0.0_f64, 0.0, f64::INFINITY);
     let (mut share_max, mut share_sum) = (0.0_f64, 0.0);
-    for_each_cell(mesh, |_, nodes, corners| {
-        let edges = Edges::of(corners);
-        let [q, area] = edges.shape();
-        let [a, b, c, d] = nodes.map(|k| rho[k] * quarter);
-        let share = (a + b + (c + d)) * area;
-        q_max = q_max.max(q);
-        q_sum += q;
-        share_max = share_max.max(share);
-        share_sum += share;
-        j_min = j_min.min(edges.least_jacobian());
+    for_each_row_of_cells(mesh, |nodes, row| {
+        let [before, after] = nodes.map(|nodes| &rho[nodes]);
+        let (q, share, least) = (&mut q[..m], &mut share[..m], &mut least[..m]);
+        for j in 0..m {
+            let cell = row.cell(j);
+            let area;
+            [q[j], area] = cell.shape();
+            share[j] = (before[j] + after[j] + (after[j + 1] + before[j + 1])) * quarter * area;
+            least[j] = cell.least_jacobian();
+        }
+        for ((&q, &share), &least) in q.iter().zip(&*share).zip(&*least) {
+            q_max = if q > q_max { q } else { q_max };
+            q_sum += q;
+            share_max = if share > share_max { share } else { share_max };
+            share_sum += share;
+            j_min = smaller(least, j_min);
+        }
     });
-    let count = mesh.lattice().cells().iter().product::<usize>() as f64;
+    let count = (n * m) as f64;
     Quality {
         q_max,
         q_mean: q_sum / count,
         min_scaled_jacobian: j_min / uniform_jacobian(mesh),
         equidistribution: share_max * count / share_sum,
     }
+}
+
+/// The integral of nodal values: of each cell, its area times the mean over its corners.
+pub(crate) fn integral(mesh: &Mesh<2>, values: &[f64]) -> f64 {
+    let values = mesh.lattice().closed(values);
+    let mut total = 0.0;
+    for_each_row_of_cells(mesh, |nodes, row| {
+        let [before, after] = nodes.map(|nodes| &values[nodes]);
+        let cells = 0..before.len() - 1;
+        let parts = cells.map(|j| row.cell(j).area() * (before[j] + after[j] + (after[j + 1] + before[j + 1])));
+        total += 0.25 * parts.sum::<f64>();
+    });
+    total
 }
 
 /// How a mesh compares with a reference over the same lattice.
@@ -259,6 +325,20 @@ mod tests {
             mesh.moved(mesh.x().iter().map(|&[x, y]| [x * x, (y + 0.2 * x * (1.0 - y) * y)]).collect()).unwrap();
         assert!((node_areas(&moved).iter().sum::<f64>() - 1.0).abs() < 1e-14);
         assert!((cell_areas(&moved).iter().sum::<f64>() - 1.0).abs() < 1e-14);
+    }
+
+    /// On bounded and on periodic meshes it is the sum over the nodes with their areas.
+    #[test]
+    fn an_integral_is_a_sum_over_the_areas_of_nodes() {
+        for periodic in [[false; 2], [true, false], [true; 2]] {
+            let mesh = Mesh::uniform(Lattice::new([7, 5], periodic).unwrap(), [0.0, 0.0], [1.0, 2.0]).unwrap();
+            let moved =
+                mesh.moved(mesh.x().iter().map(|&[x, y]| [x, y + 0.01 * (6.3 * x).sin() * y * (2.0 - y)]).collect());
+            let moved = moved.unwrap();
+            let values: Vec<f64> = moved.x().iter().map(|[x, y]| 1.0 + x * x + 3.0 * y).collect();
+            let sum: f64 = node_areas(&moved).iter().zip(&values).map(|(area, value)| area * value).sum();
+            assert!((integral(&moved, &values) - sum).abs() < 1e-13 * sum, "{periodic:?}");
+        }
     }
 
     /// Moving node (2, 2) of a 4 × 4 mesh past (3, 3) folds the cell between them.

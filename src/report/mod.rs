@@ -36,11 +36,7 @@ pub fn build(directory: &Path) -> Result<Built> {
     let mut run = RunFiles::read(directory)?;
     let plots = plots::of(&run);
     let pictures = || {
-        let drawn = map(&plots, |(name, figure)| {
-            let picture = figure.draw();
-            write_file(&directory.join(format!("{name}.svg")), picture.svg.as_bytes())?;
-            write_file(&directory.join(format!("{name}.png")), &picture.png)
-        });
+        let drawn = map(&plots, |(name, figure)| figure.draw().write(directory, name));
         drawn.into_iter().collect::<Result<()>>()
     };
     let (drawn, viewer) = join(pictures, || viewer::Viewer::of(&mut run));

@@ -18,10 +18,10 @@ const GROUPS: [Group; 9] = [
     Group {
         name: "error",
         title: "Error over time",
-        label: "error (units of u)",
+        label: "error (units of the solution)",
         scale: Scale::Logarithmic,
         line: false,
-        columns: &[("error_linf", "largest error of u"), ("error_l2", "root mean square error of u")],
+        columns: &[("error_linf", "largest error"), ("error_l2", "root mean square error")],
     },
     Group {
         name: "front-error",

@@ -25,7 +25,7 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Field, Mesh, check_unfolded, node_areas, quality};
+use crate::geometry::{Field, Mesh, check_unfolded, integral, quality};
 use crate::kept::Kept;
 use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Whole};
 use crate::physics::Physics;
@@ -357,17 +357,19 @@ impl Simulation {
 
     fn error(&self, state: &State) -> Option<ErrorNorms> {
         let exact = self.physics.exact(state.t, &state.mesh)?;
-        let areas = node_areas(&state.mesh);
-        let (mut linf, mut square, mut area) = (0.0_f64, 0.0, 0.0);
         let known = self.physics.known();
-        for ((u, exact), share) in state.u.nodes().zip(exact.nodes()).zip(&areas) {
-            for (&c, exact) in known.iter().zip(exact) {
-                linf = linf.max((u[c] - exact).abs());
-                square += (u[c] - exact) * (u[c] - exact) * share;
-                area += share;
-            }
-        }
-        Some(ErrorNorms { linf, l2: (square / area).sqrt() })
+        let mut linf = 0.0_f64;
+        let square = |(u, exact): (&[f64], &[f64])| {
+            let errors = known.iter().zip(exact).map(|(&c, exact)| u[c] - exact);
+            errors.fold(0.0, |square, error| {
+                linf = if error.abs() > linf { error.abs() } else { linf };
+                square + error * error
+            })
+        };
+        let squares: Vec<f64> = state.u.nodes().zip(exact.nodes()).map(square).collect();
+        let [width, height] = state.mesh.extent();
+        let mean = integral(&state.mesh, &squares) / (width * height * known.len() as f64);
+        Some(ErrorNorms { linf, l2: mean.sqrt() })
     }
 
     fn report(&self, state: &State, mass_at_start: f64, interface: Option<Interface>) -> Report {

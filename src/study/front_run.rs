@@ -381,8 +381,7 @@ impl StefanStudy {
         frames.write(&names, &finished.whole)?;
         directory.write("final.npz", &final_arrays(&names, &finished.whole))?;
         for (name, picture) in ["mesh", "front"].into_iter().zip(finished.pictures(&self.study.name)) {
-            directory.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
-            directory.write(&format!("{name}.png"), &picture.png)?;
+            picture.write(directory.path(), name)?;
         }
         Ok(())
     }

@@ -513,9 +513,7 @@ fn keep(study: &EquidistributionStudy, line: &Line, directory: &RunDirectory, ev
     )];
     pictures.extend(evolution.last.as_ref().map(|history| ("convergence", convergence(&study.study.name, history))));
     for (name, figure) in pictures {
-        let picture = figure.draw();
-        directory.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
-        directory.write(&format!("{name}.png"), &picture.png)?;
+        figure.draw().write(directory.path(), name)?;
     }
     Ok(())
 }

@@ -569,6 +569,5 @@ fn keep(study: &PoissonStudy, directory: &RunDirectory, solved: &Solved) -> Resu
     directory.write("final.npz", &final_arrays(&names, &state))?;
     let title = format!("{}, {}", study.study.name, study.laplacian.kind);
     let picture = solved.picture(&title);
-    directory.write("mesh.svg", picture.svg.as_bytes())?;
-    directory.write("mesh.png", &picture.png)
+    picture.write(directory.path(), "mesh")
 }

@@ -319,8 +319,7 @@ fn keep(directory: &RunDirectory, unknowns: &[String], state: &State, frames: &m
 /// Draws the last good state.
 fn draw_mesh(study: &MovingMesh, directory: &RunDirectory, unknowns: &[String], state: &State) -> Result<()> {
     let picture = draw(&format!("{}, t = {}", study.study.name, rounded(state.t)), &unknowns[0], state, &[]);
-    directory.write("mesh.svg", picture.svg.as_bytes())?;
-    directory.write("mesh.png", &picture.png)
+    picture.write(directory.path(), "mesh")
 }
 
 /// A time without the tail that binary fractions have.

@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -24,7 +25,7 @@ browser_is_here = pytest.mark.skipif(
 
 def study(name, out, *settings):
     """Runs a study into a directory."""
-    command = [ROOT / "target/release/driftmesh", "run", ROOT / f"studies/{name}.toml", "--quiet", "--out", out]
+    command = [ROOT / "target/release/driftmesh", "run", ROOT / "studies" / f"{name}.toml", "--quiet", "--out", out]
     subprocess.run(command + [part for setting in settings for part in ("--set", setting)], check=True)
     return out
 
@@ -219,6 +220,26 @@ def test_screenshots_of_every_kind(name, source, settings, run, chromium, tmp_pa
         assert overflowing(chromium) == []
         assert chromium.execute_script("return document.documentElement.scrollWidth <= innerWidth")
     assert [entry for entry in chromium.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+@browser_is_here
+def test_long_names_have_room(chromium, tmp_path):
+    """The longest name of a study, and a long one of its unknown: nothing leaves the viewer, and the colour bar stays wide."""
+    text = "\n".join(line for line in (ROOT / "studies/fisher.toml").read_text().splitlines() if not line.startswith("#"))
+    text = re.sub(r"\bu\b", "concentration_of_the_fastest_species", text).replace('"fisher"', f'"{"long-name-" * 10}"')
+    (tmp_path / "long.toml").write_text(text)
+    directory = study(tmp_path / "long", tmp_path / "out", "time.end=0.1", "time.report=[0.1]")
+    for look, width in (("wide", 1280), ("narrow", 390)):
+        opened(chromium, directory, width=width)
+        screenshot(chromium, f"long-names-{look}")
+        assert overflowing(chromium) == []
+        shares = chromium.execute_script(
+            """const box = document.getElementById('viewer').getBoundingClientRect(), bar = document.querySelector('.bar');
+            const inside = [...document.querySelectorAll('#viewer :is(select, label, button, canvas, dt, dd, .name)')];
+            return [inside.every((e) => { const r = e.getBoundingClientRect(); return !r.width || r.left >= box.left && r.right <= box.right }),
+              bar.querySelector('canvas').clientWidth / bar.clientWidth]"""
+        )
+        assert shares[0] and shares[1] > 0.5, shares
 
 
 @browser_is_here

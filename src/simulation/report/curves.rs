@@ -1,5 +1,5 @@
 use super::picture::{
-    BOTTOM, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, escape, picture,
+    BAR, BOTTOM, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, heading, picture,
 };
 use std::fmt::Write;
 
@@ -23,11 +23,9 @@ pub fn draw_curves(
         s,
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.0} {h:.0}\" width=\"{w:.0}\" height=\"{h:.0}\" \
          font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"13\" fill=\"#222\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
-         <text x=\"{:.1}\" y=\"28\" text-anchor=\"middle\" font-size=\"15\">{}</text>",
-        LEFT + 0.5 * width,
-        escape(title)
+         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
     );
+    heading(&mut s, title, width);
     let ends = curves.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (t, _)| (l.min(*t), h.max(*t)));
     for (t, y) in curves {
         let points = x.iter().zip(y).map(|(x, y)| {
@@ -43,7 +41,7 @@ pub fn draw_curves(
         );
     }
     axes(&mut s, lower, extent, [width, height]);
-    colour_bar(&mut s, parameter, ends.0, ends.1, LEFT + width + 24.0, height);
+    colour_bar(&mut s, parameter, ends.0, ends.1, LEFT + width + BAR, height);
     s.push_str("</svg>\n");
     picture(s)
 }

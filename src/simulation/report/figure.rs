@@ -64,6 +64,8 @@ const PLOT: [f64; 2] = [640.0, 410.0];
 const ROW: f64 = 22.0;
 const BESIDE: f64 = 64.0;
 const LETTER: f64 = 7.0;
+/// Letters of a title at its full size.
+const LETTERS: f64 = 80.0;
 /// Places on a line between two points that are looked at.
 const BETWEEN: usize = 16;
 /// Room around the points, as a factor.
@@ -195,9 +197,11 @@ impl Figure {
         let font = |size: u32| ("DejaVu Sans", size * FINE).into_font();
         let area = SVGBackend::with_string(svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
         area.fill(&WHITE)?;
-        // room above the title, and between it and the plot
+        // room above the title, and between it and the plot; a long one is smaller
         let inner = area.margin(8 * FINE as i32, 0, 0, 0);
-        let below = inner.titled(&self.title, font(17))?.margin(4 * FINE as i32, 0, 0, 0);
+        let share = (LETTERS / self.title.chars().count() as f64).min(1.0);
+        let heading = ("DejaVu Sans", (17.0 * FINE as f64 * share) as u32).into_font();
+        let below = inner.titled(&self.title, heading)?.margin(4 * FINE as i32, 0, 0, 0);
         let mut chart = ChartBuilder::on(&below)
             .margin(14 * FINE)
             .margin_right(24 * FINE)

@@ -1,8 +1,11 @@
+use super::directory::write_file;
+use crate::error::Result;
 use crate::simulation::State;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::{tiny_skia, usvg};
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 /// A drawing as SVG and PNG.
@@ -11,6 +14,21 @@ pub struct Picture {
     pub svg: String,
     /// The same at twice its size in pixels.
     pub png: Vec<u8>,
+}
+
+impl Picture {
+    /// Writes `name.svg` and `name.png`. Both wait for the disk, side by side.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`](crate::Error::Unwritable).
+    pub fn write(&self, directory: &Path, name: &str) -> Result<()> {
+        let [svg, png] = ["svg", "png"].map(|ending| directory.join(format!("{name}.{ending}")));
+        std::thread::scope(|scope| {
+            let svg = scope.spawn(|| write_file(&svg, self.svg.as_bytes()));
+            let png = write_file(&png, &self.png);
+            svg.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).and(png)
+        })
+    }
 }
 
 /// The font of all drawings.
@@ -22,6 +40,10 @@ pub(super) const LEFT: f64 = 76.0;
 pub(super) const TOP: f64 = 48.0;
 pub(super) const RIGHT: f64 = 116.0;
 pub(super) const BOTTOM: f64 = 64.0;
+/// From the box to the colour bar.
+pub(super) const BAR: f64 = 24.0;
+/// Width of a letter, as a share of the size of its font.
+const WIDE: f64 = 0.64;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
 const MAX_CELLS: usize = 240;
 
@@ -103,12 +125,7 @@ fn svg(sheet: &Sheet<'_>) -> String {
          font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"13\" fill=\"#222\">\n\
          <rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
     );
-    let _ = writeln!(
-        s,
-        "<text x=\"{:.1}\" y=\"28\" text-anchor=\"middle\" font-size=\"15\">{}</text>",
-        LEFT + 0.5 * width,
-        escape(title)
-    );
+    heading(&mut s, title, width);
 
     let lines = cells.map(|n| {
         let stride = n.div_ceil(MAX_CELLS);
@@ -188,9 +205,22 @@ fn svg(sheet: &Sheet<'_>) -> String {
     s.push_str("</g>\n");
 
     axes(&mut s, [lx, ly], [wx, wy], [width, height]);
-    colour_bar(&mut s, unknown, low, high, LEFT + width + 24.0, height);
+    colour_bar(&mut s, unknown, low, high, LEFT + width + BAR, height);
     s.push_str("</svg>\n");
     s
+}
+
+/// The title, over the box; over the whole drawing where it is too wide for that, and as small as it needs to be.
+pub(super) fn heading(s: &mut String, title: &str, width: f64) {
+    const SIZE: f64 = 15.0;
+    let (length, whole) = (WIDE * title.chars().count() as f64, LEFT + width + RIGHT);
+    let size = SIZE.min((whole - 20.0) / length);
+    let centre = if size * length <= width { LEFT + 0.5 * width } else { 0.5 * whole };
+    let _ = writeln!(
+        s,
+        "<text x=\"{centre:.1}\" y=\"20\" text-anchor=\"middle\" font-size=\"{size:.1}\">{}</text>",
+        escape(title)
+    );
 }
 
 pub(super) fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, height]: [f64; 2]) {
@@ -251,12 +281,17 @@ pub(super) fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: 
             y + 4.5
         );
     }
+    // over the bar, or up to the edge of the drawing where it is too wide for that
+    let name = ticks.named(unknown);
+    let right = x - BAR + RIGHT - 10.0;
+    let length = 14.0 * WIDE * name.chars().count() as f64;
+    let (place, anchor) = if x + 8.0 + 0.5 * length < right { (x + 8.0, "middle") } else { (right, "end") };
     let _ = writeln!(
         s,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\">{}</text>",
-        x + 8.0,
+        "<text x=\"{place:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\" font-size=\"{:.1}\">{}</text>",
         TOP - 12.0,
-        ticks.named(&escape(unknown))
+        14.0 * ((right - 10.0) / length).min(1.0),
+        escape(&name)
     );
 }
 
