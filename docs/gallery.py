@@ -62,7 +62,9 @@ def words(study):
 
 def article(program, name, title, out):
     study = ROOT / f"studies/{name}.toml"
-    subprocess.run([program, "run", study, "--quiet", "--out", out / name, "--set", "output.animation=true"], check=True)
+    # a line has no frames
+    animated = [] if 'kind = "equidistribution"' in study.read_text() else ["--set", "output.animation=true"]
+    subprocess.run([program, "run", study, "--quiet", "--out", out / name, *animated], check=True)
     seconds = json.loads((out / name / "summary.json").read_text())["seconds"]["wall"]
     moving = MOVING.format(name=name) if (out / name / "animation.gif").exists() else ""
     return ARTICLE.format(name=name, title=title, words=html.escape(words(study)), moving=moving, seconds=seconds)
