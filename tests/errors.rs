@@ -87,6 +87,22 @@ fn not_positive() {
     assert_says(error, &[message], Some("time.step"), true);
 }
 
+/// Diffusivities that are formulas, negative from the start on, or later.
+#[test]
+fn negative_diffusivities() {
+    for (diffusivity, when) in [("0.5 - x", "t = 0.01"), ("0.03 - t", "t = 0.0")] {
+        let text = format!(
+            "[study]\nname = \"negative\"\nkind = \"moving-mesh\"\n[grid]\ncells = [10, 10]\n\
+             [time]\nstart = 0\nend = 0.4\nstep = 0.01\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\n\
+             initial = {{ u = \"sin(3*x)\" }}\nboundary = {{ u = \"no-flux\" }}\ndiffusivity = {{ u = \"{diffusivity}\" }}\n"
+        );
+        let study = driftmesh::study::Study::from_source(&driftmesh::study::Source::new("the study", text)).unwrap();
+        let out = tempfile::tempdir().unwrap();
+        let error = study.run(out.path(), Begin::Anew, &mut []).unwrap().unwrap();
+        assert_says(error, &["the diffusivity of a formula is -", when], Some("mend the formula"), true);
+    }
+}
+
 /// Water that a step leaves dry is refused too: two nodes throw it out faster than there is any.
 #[test]
 fn run_dry() {

@@ -79,8 +79,8 @@ fn main() -> ExitCode {
         Verb::Report(report) => report.execute(),
         Verb::Schema => schema::execute(),
     };
-    match outcome {
+    terminal::ended(match outcome {
         Ok(code) => code,
         Err(error) => terminal::complain(&error, error.help(), None),
-    }
+    })
 }

@@ -1,13 +1,32 @@
 //! Words to the user. A closed pipe is not an error worth a word.
 
 use driftmesh::Error;
-use std::io::{Write, stderr, stdout};
+use std::io::{ErrorKind, Write, stderr, stdout};
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::OnceLock;
+
+/// Why something could not be printed.
+static UNSAID: OnceLock<String> = OnceLock::new();
 
 /// Prints to standard output.
 pub fn say(text: impl std::fmt::Display) {
-    let _ = writeln!(stdout(), "{text}");
+    if let Err(error) = writeln!(stdout(), "{text}")
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        let _ = UNSAID.set(error.to_string());
+    }
+}
+
+/// How the program ends if it would end so: what was not printed, on a full disk say, is an error.
+pub fn ended(code: ExitCode) -> ExitCode {
+    match UNSAID.get() {
+        None => code,
+        Some(reason) => {
+            let _ = writeln!(stderr(), "error: cannot write standard output: {reason}");
+            ExitCode::FAILURE
+        }
+    }
 }
 
 /// Prints where the files of a run are, those that there are.

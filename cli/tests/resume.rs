@@ -222,6 +222,33 @@ fn a_picture_that_cannot_be_written_fails_the_run() {
     }
 }
 
+/// What is not printed is an error: the study that `check` resolves, cut off, is another study.
+#[test]
+#[cfg(target_os = "linux")]
+fn standard_output_on_a_full_disk_is_an_error() {
+    let sandbox = Sandbox::new(STUDY);
+    for verb in ["check 'a study.toml'", "list", "schema"] {
+        let output = sandbox.command("sh", &["-c", &format!("exec '{PROGRAM}' {verb} >/dev/full")]).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{verb}");
+        assert!(words(&output).contains("error: cannot write standard output: No space left"), "{}", words(&output));
+    }
+}
+
+/// A directory in the place of the newest checkpoint: the one before it is taken.
+#[test]
+fn what_is_no_file_is_no_checkpoint() {
+    let sandbox = Sandbox::new(&STUDY.replace("step = 1e-5", "step = 1e-3"));
+    let run = format!("exec '{PROGRAM}' run 'a study.toml' --out out --set output.checkpoint.steps=7");
+    // a full disk leaves both checkpoints
+    let output = sandbox.command("sh", &["-c", &format!("ulimit -f 60; {run}")]).output().unwrap();
+    assert_eq!((output.status.code(), checkpoints(&sandbox.path("out"))), (Some(1), 2), "{}", words(&output));
+    let newest = sandbox.path("out/checkpoint.1");
+    std::fs::remove_file(&newest).unwrap();
+    std::fs::create_dir(&newest).unwrap();
+    let output = sandbox.command("sh", &["-c", &format!("{run} --resume")]).output().unwrap();
+    assert!(words(&output).contains("checkpoint.1 was left out"), "{}", words(&output));
+}
+
 /// Readers that close the pipe early do not end a run.
 #[test]
 fn a_closed_pipe_does_not_end_a_run() {

@@ -26,6 +26,8 @@ pub(super) struct FormulaLaw<const B: usize, const P: usize, const K: usize> {
 /// Quantities of an equation in the order of [`Formulas::nodal`].
 const FLUX: [usize; 2] = [0, 1];
 const DIFFUSIVITY: usize = 2;
+/// A diffusivity may be negative by this share of the largest, where it follows a solution that wiggles around zero.
+const WIGGLES: f64 = 1e-3;
 const SOURCE: usize = 3;
 
 impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
@@ -69,6 +71,30 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
     fn failure(&self, what: String, value: f64, mesh: &Mesh<2>, k: usize, u: Option<&[f64; B]>) -> Failure {
         let given = u.map_or(Vec::new(), |u| self.names.iter().cloned().zip(*u).collect());
         Failure::Formula { what, value, node: mesh.lattice().node(k), x: mesh.x()[k], given }
+    }
+
+    /// The node that stands at a place of padded arrays, or whose image or side does.
+    fn node(mesh: &Mesh<2>, place: usize) -> usize {
+        let [n, m] = mesh.lattice().nodes();
+        let along = |place: usize, n: usize, wraps: bool| {
+            if wraps { (place + n - 1) % n } else { place.clamp(1, n) - 1 }
+        };
+        let wraps = mesh.lattice().periodic();
+        mesh.lattice().index([along(place / (m + 2), n, wraps[0]), along(place % (m + 2), m, wraps[1])])
+    }
+
+    /// Refuses diffusivities that are negative by more than the solution's own wiggles may make them.
+    fn check_diffusivities(&self, mesh: &Mesh<2>, nodes: &[[f64; K]]) -> Result<(), Failure> {
+        for c in 0..B {
+            let values = || nodes.iter().map(|node| Self::value(node, DIFFUSIVITY, c));
+            let [least, largest] = values().fold([0.0_f64; 2], |[l, h], value| [l.min(value), h.max(value.abs())]);
+            if least < -WIGGLES * largest {
+                let k = Self::node(mesh, values().position(|value| value == least).unwrap_or_default());
+                let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+                return Err(Failure::NotPositive { what: "the diffusivity of a formula", value: least, node, x });
+            }
+        }
+        Ok(())
     }
 
     fn check_exact(&self, t: f64, mesh: &Mesh<2>) -> Result<(), Failure> {
@@ -117,15 +143,11 @@ impl<const B: usize, const P: usize, const K: usize> Law<B> for FormulaLaw<B, P,
     }
 
     fn check(&self, mesh: &Mesh<2>, u: &[[f64; B]], nodes: &[[f64; K]]) -> Result<(), Failure> {
-        let Some(place) = nodes.iter().position(|node| node.iter().any(|v| !v.is_finite())) else { return Ok(()) };
-        // the node that stands there, or whose image or side does
-        let [n, m] = mesh.lattice().nodes();
-        let along = |place: usize, n: usize, wraps: bool| {
-            if wraps { (place + n - 1) % n } else { place.clamp(1, n) - 1 }
+        let Some(place) = nodes.iter().position(|node| node.iter().any(|v| !v.is_finite())) else {
+            return self.check_diffusivities(mesh, nodes);
         };
-        let wraps = mesh.lattice().periodic();
-        let node = [along(place / (m + 2), n, wraps[0]), along(place % (m + 2), m, wraps[1])];
-        let (values, k) = (&u[place], mesh.lattice().index(node));
+        let k = Self::node(mesh, place);
+        let values = &u[place];
         if let Some(c) = values.iter().position(|u| !u.is_finite()) {
             return Err(self.failure(format!("the unknown {}", self.names[c]), values[c], mesh, k, None));
         }

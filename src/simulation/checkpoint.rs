@@ -132,7 +132,7 @@ impl Checkpoints {
     /// is told in words.
     ///
     /// # Errors
-    /// [`Error::Checkpoint`] where there are files, but none that will do; [`Error::Unreadable`].
+    /// [`Error::Checkpoint`] where there are files, but none that will do.
     pub(crate) fn resume<T, C: DeserializeOwned>(
         &mut self,
         mut take_up: impl FnMut(C) -> Result<T, Unfit>,
@@ -140,9 +140,9 @@ impl Checkpoints {
         let mut refused = Vec::new();
         let mut found = Vec::new();
         for (slot, path) in Self::NAMES.iter().map(|name| self.directory.join(name)).enumerate() {
-            match std::fs::read(&path) {
+            match read(&path) {
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-                Err(error) => return Err(Error::Unreadable { path, reason: error.to_string() }),
+                Err(error) => refused.push((path, Unfit::Damaged(error.to_string()))),
                 Ok(bytes) => match opened(&bytes).and_then(|bytes| meant(bytes, &self.study)) {
                     Ok((step, content)) => found.push(Found { slot, step, content }),
                     Err(unfit) => refused.push((path, unfit)),
@@ -319,5 +319,13 @@ impl Checkpoint {
         let sound = check_unfolded(&mesh).and_then(|()| physics.check(*t, &mesh, &u));
         sound.map_err(|failure| Unfit::Damaged(failure.to_string()))?;
         Ok(State { t: *t, step: *step, mesh, u, rho: rho.clone(), velocity: velocity.clone() })
+    }
+}
+
+/// The bytes of a file; what else bears its name is no checkpoint, and may not be waited for.
+fn read(path: &Path) -> std::io::Result<Vec<u8>> {
+    match std::fs::metadata(path)?.is_file() {
+        true => std::fs::read(path),
+        false => Err(std::io::Error::other("it is no file")),
     }
 }

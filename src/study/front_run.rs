@@ -282,8 +282,8 @@ impl StefanStudy {
                 (Event::Started, tables, Frames::create(path, prepared.frames.clone(), [1, 1])?, Vec::new())
             }
         };
-        directory.write("study.toml", self.to_toml().as_bytes())?;
         directory.write_summary(&summary)?;
+        directory.write("study.toml", self.to_toml().as_bytes())?;
         let clock = clock.after([summary.seconds.wall, summary.seconds.cpu]);
         let failure = {
             let mut leave =

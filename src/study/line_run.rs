@@ -317,9 +317,9 @@ impl EquidistributionStudy {
             Some(_) => directory.clear_ended()?,
             None => directory.clear()?,
         }
-        directory.write("study.toml", study.to_toml().as_bytes())?;
         let mut summary = study.summary();
         directory.write_summary(&summary)?;
+        directory.write("study.toml", study.to_toml().as_bytes())?;
         let (LineCheckpoint { mut evolution, seconds }, refused) = resumed.unwrap_or_default();
         let clock = clock.after([seconds.wall, seconds.cpu]);
         let solving = Instant::now();

@@ -582,7 +582,10 @@ impl MovingMesh {
             let (section, name) = key.split_once('.')?;
             table.get(section)?.get(name).map(|value| format!("{key} (now {value})"))
         };
-        let help = error.help()?;
+        let mut help = error.help()?;
+        if self.time.tolerance.is_some() {
+            help = help.replace("lower time.step", "lower time.tolerance or time.step");
+        }
         let words = help.split(' ').map(|word| {
             let key = word.trim_end_matches([',', ';']);
             present(key).map_or(word.to_string(), |text| text + &word[key.len()..])

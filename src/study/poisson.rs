@@ -435,7 +435,6 @@ impl PoissonStudy {
         self.check()?;
         let clock = Stopwatch::start();
         let directory = RunDirectory::claim(directory)?;
-        directory.write("study.toml", self.to_toml().as_bytes())?;
         let mut summary = PoissonSummary {
             schema: 1,
             study: self.study.name.clone(),
@@ -451,6 +450,7 @@ impl PoissonStudy {
             warnings: Vec::new(),
         };
         directory.write_summary(&summary)?;
+        directory.write("study.toml", self.to_toml().as_bytes())?;
         let failure = match self.solve() {
             Err(failure) => Some(failure),
             Ok(solved) => {

@@ -82,8 +82,8 @@ fn run_from(
         reports: Vec::new(),
         warnings: Vec::new(),
     };
-    directory.write("study.toml", study.to_toml().as_bytes())?;
     directory.write_summary(&summary)?;
+    directory.write("study.toml", study.to_toml().as_bytes())?;
     let mut record = Record::default();
     let underway = match resumed {
         Some((underway, refused)) => {
