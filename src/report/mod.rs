@@ -33,7 +33,10 @@ pub struct Built {
 /// [`Error::NotARun`](crate::Error::NotARun) for any other directory; [`Error::Unreadable`](crate::Error::Unreadable) or
 /// [`Error::Unwritable`](crate::Error::Unwritable).
 pub fn build(directory: &Path) -> Result<Built> {
-    let mut run = RunFiles::read(directory)?;
+    of(RunFiles::read(directory)?, directory)
+}
+
+fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {
     let plots = plots::of(&run);
     let pictures = || {
         let drawn = map(&plots, |(name, figure)| figure.draw().write(directory, name));
@@ -50,10 +53,12 @@ pub fn build(directory: &Path) -> Result<Built> {
     Ok(Built { path, bytes: html.len(), notes: run.notes })
 }
 
-/// As [`build`], at the end of a run whose study asks for a report or an animation.
-pub(crate) fn finish(directory: &Path, report: bool, animation: bool) -> Result<()> {
-    if report {
-        return build(directory).map(|_| ());
+/// As [`build`], at the end of a run whose study asks for a report or an animation, with the status that it is to have.
+pub(crate) fn finish(directory: &Path, report: bool, animation: bool, status: &str) -> Result<()> {
+    if !report && !animation {
+        return Ok(());
     }
-    if animation { animation::write(&mut RunFiles::read(directory)?) } else { Ok(()) }
+    let mut run = RunFiles::read(directory)?;
+    run.summary.insert("status".into(), status.into());
+    if report { of(run, directory).map(|_| ()) } else { animation::write(&mut run) }
 }

@@ -323,8 +323,8 @@ impl StefanStudy {
             [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         };
         // what went wrong first is what is reported
-        *failure = end(&directory, summary, failure.take().or(kept.err()), note, || {
-            report::finish(directory.path(), self.output.report, self.output.animation)
+        *failure = end(&directory, summary, failure.take().or(kept.err()), note, |status| {
+            report::finish(directory.path(), self.output.report, self.output.animation, status)
         });
         if !failure.as_ref().is_some_and(Error::is_resumable) {
             *failure = failure.take().or(checkpoints.remove().err());

@@ -357,8 +357,8 @@ impl EquidistributionStudy {
             summary.seconds.output += output;
             [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         };
-        let failure = end(&directory, &mut summary, failure, note, || {
-            report::finish(directory.path(), study.output.report, study.output.animation)
+        let failure = end(&directory, &mut summary, failure, note, |status| {
+            report::finish(directory.path(), study.output.report, study.output.animation, status)
         });
         let removed = if failure.as_ref().is_some_and(Error::is_resumable) { Ok(()) } else { checkpoints.remove() };
         Ok(LineFinished { summary, evolution, failure: failure.or(removed.err()) })

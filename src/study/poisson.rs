@@ -472,8 +472,8 @@ impl PoissonStudy {
             [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         };
         let computed = failure.is_none();
-        let failure = end(&directory, &mut summary, failure, note, || match computed {
-            true => report::finish(directory.path(), self.output.report, self.output.animation),
+        let failure = end(&directory, &mut summary, failure, note, |status| match computed {
+            true => report::finish(directory.path(), self.output.report, self.output.animation, status),
             false => Ok(()),
         });
         failure.map_or(Ok(summary), Err)

@@ -135,10 +135,10 @@ fn run_from(
             return Err(error);
         }
     };
-    let failure = end(&directory, &mut summary, failure, note, || {
+    let failure = end(&directory, &mut summary, failure, note, |status| {
         let (picture, report) = join(
             || draw_mesh(&study, &directory, &unknowns, &state),
-            || report::finish(directory.path(), study.output.report, study.output.animation),
+            || report::finish(directory.path(), study.output.report, study.output.animation, status),
         );
         picture.and(report)
     });

@@ -196,8 +196,11 @@ fn wrote(path: &Path) -> bool {
     if path.join(LOCK).is_file() {
         return true;
     }
-    summary(path).is_some_and(|summary| summary["schema"].is_u64() && summary["study"].is_string())
-        && path.join("study.toml").is_file()
+    // study.toml comes second: a disk may have been full then
+    summary(path).is_some_and(|summary| {
+        let started = summary["status"] == "running" || path.join("study.toml").is_file();
+        started && summary["schema"].is_u64() && summary["study"].is_string()
+    })
 }
 
 /// `summary.json`, if it can be read.
