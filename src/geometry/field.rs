@@ -74,3 +74,26 @@ impl Field {
         self.values.iter().skip(c).step_by(self.components).copied()
     }
 }
+
+/// max |value|, in vectors; a NaN is lost.
+#[inline(always)]
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    let (lanes, rest) = values.as_chunks::<8>();
+    let more = |m: f64, value: f64| if value.abs() > m { value.abs() } else { m };
+    let most = lanes.iter().fold([0.0; 8], |m, values| std::array::from_fn(|l| more(m[l], values[l])));
+    most.iter().chain(rest).fold(0.0, |m, &value| more(m, value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::largest;
+
+    #[test]
+    fn the_largest_is_found_wherever_it_stands() {
+        for (length, place) in (1..30).flat_map(|length| (0..length).map(move |place| (length, place))) {
+            let values: Vec<f64> = (0..length).map(|k| if k == place { -7.0 } else { k as f64 / 30.0 }).collect();
+            assert_eq!(largest(&values), 7.0);
+        }
+        assert_eq!(largest(&[]), 0.0);
+    }
+}

@@ -12,12 +12,13 @@ mod simple;
 
 pub use dual::{DualCells, padded};
 pub use field::Field;
+pub(crate) use field::largest;
 pub use lattice::Lattice;
 pub(crate) use lattice::strides;
 pub use locate::interpolate;
 pub use mesh::Mesh;
 pub use patch::Patch;
-pub(crate) use quality::integral;
+pub(crate) use quality::quality_and_integral;
 pub use quality::{
     Comparison, Quality, cell_areas, cell_jacobians, cell_qualities, check_unfolded, compare, node_areas, quality,
 };

@@ -10,7 +10,7 @@ mod viewer;
 
 use crate::error::Result;
 use crate::parallel::{join, map};
-use crate::simulation::write_file;
+use crate::simulation::{Picture, write_file};
 use files::RunFiles;
 use std::path::{Path, PathBuf};
 
@@ -39,15 +39,19 @@ pub fn build(directory: &Path) -> Result<Built> {
 fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {
     let plots = plots::of(&run);
     let pictures = || {
-        let drawn = map(&plots, |(name, figure)| figure.draw().write(directory, name));
-        drawn.into_iter().collect::<Result<()>>()
+        let drawn = map(&plots, |(name, figure)| {
+            let svg = figure.svg();
+            Picture::of(&svg).write(directory, name)?;
+            Ok(page::Plot { title: figure.title.clone(), svg })
+        });
+        drawn.into_iter().collect::<Result<Vec<_>>>()
     };
     let (drawn, viewer) = join(pictures, || viewer::Viewer::of(&mut run));
-    drawn?;
+    let drawn = drawn?;
     if run.asks_for("animation") {
         animation::write(&mut run)?;
     }
-    let html = page::render(&run, &plots, viewer.as_ref());
+    let html = page::render(&run, drawn, viewer.as_ref());
     let path = directory.join("report.html");
     write_file(&path, html.as_bytes())?;
     Ok(Built { path, bytes: html.len(), notes: run.notes })

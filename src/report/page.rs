@@ -1,7 +1,6 @@
 use super::files::RunFiles;
 use super::tables::{self, Part, Table};
 use super::viewer::Viewer;
-use crate::simulation::Figure;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use minijinja::Environment;
 use serde::Serialize;
@@ -42,10 +41,11 @@ struct ViewerOnPage<'a> {
     thinned: Option<&'a str>,
 }
 
+/// A plot, as it stands on the page.
 #[derive(Serialize)]
-struct Plot {
-    title: String,
-    svg: String,
+pub struct Plot {
+    pub title: String,
+    pub svg: String,
 }
 
 /// A picture of the directory.
@@ -56,7 +56,7 @@ struct Shown {
 }
 
 /// The page, everything in it.
-pub fn render(run: &RunFiles, plots: &[(&str, Figure)], viewer: Option<&Viewer>) -> String {
+pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> String {
     let (wall, parts) = tables::seconds(&run.summary);
     let failure = run.summary.values().find_map(|value| value.get("message")?.as_str());
     let warnings = run.summary.get("warnings").and_then(Value::as_array);
@@ -83,7 +83,7 @@ pub fn render(run: &RunFiles, plots: &[(&str, Figure)], viewer: Option<&Viewer>)
         tables: tables::of(&run.summary),
         wall,
         parts,
-        plots: plots.iter().map(|(_, figure)| Plot { title: figure.title.clone(), svg: figure.svg() }).collect(),
+        plots,
         pictures: pictures(run, viewer.is_some()),
         text: &run.study_text,
         style: STYLE,

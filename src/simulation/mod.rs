@@ -25,7 +25,7 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Field, Mesh, check_unfolded, integral, quality};
+use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality, quality_and_integral};
 use crate::kept::Kept;
 use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Whole};
 use crate::physics::Physics;
@@ -338,14 +338,15 @@ impl Simulation {
             return Ok(());
         }
         let output = Instant::now();
+        let (quality, error) = self.assess(state);
         let snapshot = Snapshot {
             state,
             unknowns: &self.physics.unknowns(),
             dt,
             steps: self.schedule.steps(),
             share: (state.t - self.schedule.start()) / (self.schedule.end() - self.schedule.start()),
-            quality: quality(&state.mesh, &state.rho),
-            error: self.error(state),
+            quality,
+            error,
             work: record.work,
             interface: record.interface,
             seconds: clock.seconds(),
@@ -355,34 +356,29 @@ impl Simulation {
         outcome
     }
 
-    fn error(&self, state: &State) -> Option<ErrorNorms> {
-        let exact = self.physics.exact(state.t, &state.mesh)?;
-        let known = self.physics.known();
-        let mut linf = 0.0_f64;
-        let square = |(u, exact): (&[f64], &[f64])| {
-            let errors = known.iter().zip(exact).map(|(&c, exact)| u[c] - exact);
-            errors.fold(0.0, |square, error| {
-                linf = if error.abs() > linf { error.abs() } else { linf };
-                square + error * error
-            })
+    /// Quality of the mesh, and the error where an exact solution is known.
+    fn assess(&self, state: &State) -> (Quality, Option<ErrorNorms>) {
+        let Some(exact) = self.physics.exact(state.t, &state.mesh) else {
+            return (quality(&state.mesh, &state.rho), None);
         };
-        let squares: Vec<f64> = state.u.nodes().zip(exact.nodes()).map(square).collect();
+        let known = self.physics.known();
+        let (mut linf, mut squares) = (0.0_f64, vec![0.0; state.mesh.x().len()]);
+        for (n, &c) in known.iter().enumerate() {
+            let errors: Vec<f64> = state.u.component(c).zip(exact.component(n)).map(|(u, exact)| u - exact).collect();
+            linf = linf.max(largest(&errors));
+            squares.iter_mut().zip(&errors).for_each(|(square, error)| *square += error * error);
+        }
+        let (quality, integral) = quality_and_integral(&state.mesh, &state.rho, &squares);
         let [width, height] = state.mesh.extent();
-        let mean = integral(&state.mesh, &squares) / (width * height * known.len() as f64);
-        Some(ErrorNorms { linf, l2: mean.sqrt() })
+        let mean = integral / (width * height * known.len() as f64);
+        (quality, Some(ErrorNorms { linf, l2: mean.sqrt() }))
     }
 
     fn report(&self, state: &State, mass_at_start: f64, interface: Option<Interface>) -> Report {
         let mass = self.physics.conserved(&state.mesh, &state.u);
         let drift = if mass_at_start == 0.0 { mass } else { (mass - mass_at_start) / mass_at_start.abs() };
-        Report {
-            t: state.t,
-            error: self.error(state),
-            quality: quality(&state.mesh, &state.rho),
-            conserved: Conserved { mass, drift },
-            interface,
-            comparison: None,
-        }
+        let (quality, error) = self.assess(state);
+        Report { t: state.t, error, quality, conserved: Conserved { mass, drift }, interface, comparison: None }
     }
 }
 
@@ -414,7 +410,7 @@ impl Clock {
     }
 
     fn seconds(&self) -> f64 {
-        self.steps.elapsed()[0]
+        self.steps.wall()
     }
 
     /// The record with the time up to now.

@@ -1,7 +1,7 @@
 use super::vtu::{self, Values};
 use super::{Event, Observer, Snapshot};
 use crate::error::{Error, Result, Unfit};
-use crate::geometry::{Mesh, cell_jacobians, cell_qualities};
+use crate::geometry::{cell_jacobians, cell_qualities};
 use crate::kept::{Kept, check_nodal};
 use crate::meshing::Decomposition;
 use crate::simulation::State;
@@ -64,8 +64,8 @@ pub struct Frames {
     /// Folder of the frames, and the file that puts them in time.
     names: [&'static str; 2],
     grid: Option<Arc<vtu::Grid>>,
-    /// The last mesh and the one before, with their times.
-    meshes: [Option<(f64, Mesh<2>)>; 2],
+    /// Nodes of the last mesh and of the one before, with their times.
+    nodes: [Option<(f64, Vec<[f64; 2]>)>; 2],
     /// Times and steps of the frames.
     written: Vec<(f64, usize)>,
     /// A frame that is being compressed and written while the run goes on.
@@ -107,7 +107,7 @@ impl Frames {
             subdomains,
             names,
             grid: None,
-            meshes: [None, None],
+            nodes: [None, None],
             written: Vec::new(),
             writing: None,
         })
@@ -192,10 +192,9 @@ impl Frames {
         }
         if let Some((t, x)) = before {
             check_nodal("frame before", &x, state.mesh.x().len())?;
-            let mesh = state.mesh.moved(x).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
-            frames.meshes[1] = Some((t, mesh));
+            frames.nodes[1] = Some((t, x));
         }
-        frames.meshes[0] = Some((state.t, state.mesh.clone()));
+        frames.nodes[0] = Some((state.t, state.mesh.x().to_vec()));
         frames.written = written;
         let entries = std::fs::read_dir(directory.join(frames.names[0])).into_iter().flatten().flatten();
         for later in entries.map(|entry| entry.path()).filter(|path| is_frame(path) && !names.contains(path)) {
@@ -216,10 +215,10 @@ impl Frames {
 
     /// How fast the nodes moved in the step that led to a state; they rest at the start.
     fn velocity(&self, state: &State) -> Vec<[f64; 2]> {
-        match &self.meshes {
-            [Some((t, mesh)), Some((before, old))] if *t == state.t && t > before => {
+        match &self.nodes {
+            [Some((t, x)), Some((before, old))] if *t == state.t && t > before => {
                 let per = 1.0 / (t - before);
-                mesh.x().iter().zip(old.x()).map(|(x, old)| [0, 1].map(|d| (x[d] - old[d]) * per)).collect()
+                x.iter().zip(old).map(|(x, old)| [0, 1].map(|d| (x[d] - old[d]) * per)).collect()
             }
             _ => vec![[0.0; 2]; state.rho.len()],
         }
@@ -233,8 +232,12 @@ impl Observer for Frames {
             return Ok(());
         }
         if event != Event::Finished {
-            self.meshes.swap(0, 1);
-            self.meshes[0] = Some((state.t, state.mesh.clone()));
+            self.nodes.swap(0, 1);
+            let [newest, _] = &mut self.nodes;
+            let (t, x) = newest.get_or_insert_default();
+            *t = state.t;
+            x.clear();
+            x.extend_from_slice(state.mesh.x());
         }
         match event {
             Event::Stepped if !self.at.due(state.step, state.t, snapshot.dt) => Ok(()),
@@ -245,7 +248,7 @@ impl Observer for Frames {
 
     fn keep(&mut self, kept: &mut Kept) -> Result<()> {
         self.wait()?;
-        let before = self.meshes[1].as_ref().map(|(t, mesh)| (*t, mesh.x().to_vec()));
+        let before = self.nodes[1].clone();
         kept.put("frames", &KeptFrames { written: self.written.clone(), before });
         Ok(())
     }

@@ -1,5 +1,4 @@
-use super::Picture;
-use super::picture::{FONT, picture};
+use super::picture::{FONT, Picture};
 use plotters::coord::combinators::LogCoord;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
@@ -74,7 +73,7 @@ const ROOM: f64 = 1.1;
 impl Figure {
     /// Draws it.
     pub fn draw(&self) -> Picture {
-        picture(self.svg())
+        Picture::of(&self.svg())
     }
 
     /// Draws it for a page that has the font.

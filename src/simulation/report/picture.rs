@@ -4,7 +4,8 @@ use crate::simulation::State;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::{tiny_skia, usvg};
 use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
@@ -17,6 +18,17 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// A drawing in both formats: as SVG with its font inside, and as PNG.
+    pub(crate) fn of(svg: &str) -> Self {
+        let png = encoded(svg, 2).expect("writing to memory cannot fail");
+        let font = format!(
+            "<style>@font-face{{font-family:\"DejaVu Sans\";src:url(data:font/ttf;base64,{})}}</style>\n",
+            STANDARD.encode(FONT)
+        );
+        let open = svg.find('>').map_or(0, |end| end + 1);
+        Self { svg: [&svg[..open], "\n", &font, &svg[open..]].concat(), png }
+    }
+
     /// Writes `name.svg` and `name.png`. Both wait for the disk, side by side.
     ///
     /// # Errors
@@ -44,6 +56,10 @@ pub(super) const BOTTOM: f64 = 64.0;
 pub(super) const BAR: f64 = 24.0;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
+/// Rows of pixels that are painted at a time.
+const BAND: u32 = 256;
+/// Bytes of a part of a PNG.
+const CHUNK: usize = 1 << 16;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
 const MAX_CELLS: usize = 240;
 
@@ -88,13 +104,13 @@ pub fn draw(title: &str, unknown: &str, state: &State, line: &[[f64; 2]]) -> Pic
         range: None,
         line,
     };
-    picture(svg(&sheet))
+    Picture::of(&svg(&sheet))
 }
 
 impl Sheet<'_> {
     /// Its pixels, in the size of the drawing.
     pub fn pixels(&self) -> Pixels {
-        let pixels = pixels(&svg(self), 1);
+        let pixels = pixels(&svg(self));
         let size = [pixels.width(), pixels.height()];
         Pixels { size, rgba: pixels.take() }
     }
@@ -143,7 +159,12 @@ fn svg(sheet: &Sheet<'_>) -> String {
         };
         !(outside(0, lx, wx) || outside(1, ly, wy))
     };
-    let place = |k: usize, shift: [f64; 2]| point(to([x[k][0] + shift[0], x[k][1] + shift[1]]));
+    let through = |path: &mut String, nodes: &mut dyn Iterator<Item = usize>, shift: [f64; 2]| {
+        for (n, k) in nodes.enumerate() {
+            path.push(if n == 0 { 'M' } else { 'L' });
+            add_point(path, to([x[k][0] + shift[0], x[k][1] + shift[1]]));
+        }
+    };
     if periodic.contains(&true) {
         let _ = writeln!(
             s,
@@ -153,16 +174,24 @@ fn svg(sheet: &Sheet<'_>) -> String {
     } else {
         s.push_str("<g>\n");
     }
-    // cells, without soft edges, so that no gap shines through; those of one colour together, which is drawn fast
+    // cells, without soft edges, so that no gap shines through; those of one colour together, and neighbours of one colour
+    // as one strip, which is drawn fast
     let mut fills: BTreeMap<String, String> = BTreeMap::new();
     for i in lines[0].windows(2) {
-        for j in lines[1].windows(2) {
+        let cell = |j: &[usize]| {
             let corners = [at(i[0], j[0]), at(i[1], j[0]), at(i[1], j[1]), at(i[0], j[1])];
             let mean = 0.25 * corners.iter().map(|&k| u[k]).sum::<f64>();
-            let path = fills.entry(colour((mean - low) / (high - low))).or_default();
-            for &shift in shifts.iter().filter(|&&shift| shown(&corners, shift)) {
-                let [a, b, c, d] = corners.map(|k| place(k, shift));
-                let _ = write!(path, "M{a}L{b}L{c}L{d}Z");
+            (corners, colour((mean - low) / (high - low)))
+        };
+        let row: Vec<([usize; 4], String)> = lines[1].windows(2).map(cell).collect();
+        for strip in row.chunk_by(|(_, before), (_, after)| before == after) {
+            let path = fills.entry(strip[0].1.clone()).or_default();
+            let seen = |shift: &&[f64; 2]| strip.iter().any(|(corners, _)| shown(corners, **shift));
+            for &shift in shifts.iter().filter(seen) {
+                let there = [strip[0].0[0]].into_iter().chain(strip.iter().map(|([.., d], _)| *d));
+                let back = strip.iter().rev().map(|([_, _, c, _], _)| *c).chain([strip[0].0[1]]);
+                through(path, &mut there.chain(back), shift);
+                path.push('Z');
             }
         }
     }
@@ -174,17 +203,22 @@ fn svg(sheet: &Sheet<'_>) -> String {
 
     // mesh lines, light on dark colours and dark on light ones; one pixel of the PNG wide, which is drawn fast
     let mut paths = [String::new(), String::new()];
-    let mut segment = |a: usize, b: usize| {
-        let light = 0.5 * (u[a] + u[b]) - low < 0.6 * (high - low);
-        for &shift in shifts.iter().filter(|&&shift| shown(&[a, b], shift)) {
-            let _ = write!(paths[usize::from(light)], "M{}L{}", place(a, shift), place(b, shift));
+    let light = |a: usize, b: usize| 0.5 * (u[a] + u[b]) - low < 0.6 * (high - low);
+    let mut mesh_line = |nodes: &[usize]| {
+        let edges: Vec<(&[usize], bool)> = nodes.windows(2).map(|e| (e, light(e[0], e[1]))).collect();
+        for part in edges.chunk_by(|(_, before), (_, after)| before == after) {
+            let seen = |shift: &&[f64; 2]| part.iter().any(|(edge, _)| shown(edge, **shift));
+            for &shift in shifts.iter().filter(seen) {
+                let nodes = [part[0].0[0]].into_iter().chain(part.iter().map(|(edge, _)| edge[1]));
+                through(&mut paths[usize::from(part[0].1)], &mut { nodes }, shift);
+            }
         }
     };
     for &i in &lines[0] {
-        lines[1].windows(2).for_each(|j| segment(at(i, j[0]), at(i, j[1])));
+        mesh_line(&lines[1].iter().map(|&j| at(i, j)).collect::<Vec<_>>());
     }
     for &j in &lines[1] {
-        lines[0].windows(2).for_each(|i| segment(at(i[0], j), at(i[1], j)));
+        mesh_line(&lines[0].iter().map(|&i| at(i, j)).collect::<Vec<_>>());
     }
     for (path, colour) in paths.iter().zip(["black", "white"]) {
         let _ = writeln!(
@@ -356,46 +390,68 @@ pub(super) fn colour(fraction: f64) -> String {
     format!("#{c:x}")
 }
 
-fn point([x, y]: [f64; 2]) -> String {
-    format!("{x:.2},{y:.2}")
+fn point(p: [f64; 2]) -> String {
+    let mut text = String::new();
+    add_point(&mut text, p);
+    text
+}
+
+/// A point of the drawing to a hundredth, by whole numbers: `format` of floating point takes longer than the rest of a picture.
+fn add_point(text: &mut String, point: [f64; 2]) {
+    for (value, end) in point.into_iter().zip([",", ""]) {
+        let hundredths = (100.0 * value).round() as i64;
+        let sign = if hundredths < 0 { "-" } else { "" };
+        let [whole, rest] = [hundredths.unsigned_abs() / 100, hundredths.unsigned_abs() % 100];
+        let _ = match rest {
+            0 => write!(text, "{sign}{whole}{end}"),
+            _ => write!(text, "{sign}{whole}.{rest:02}{end}"),
+        };
+    }
 }
 
 pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// A drawing in both formats: SVG with its font inside, and PNG.
-pub(super) fn picture(svg: String) -> Picture {
-    let png = encoded(pixels(&svg, 2)).expect("writing to memory cannot fail");
-    let font = format!(
-        "<style>@font-face{{font-family:\"DejaVu Sans\";src:url(data:font/ttf;base64,{})}}</style>\n",
-        STANDARD.encode(FONT)
-    );
-    let open = svg.find('>').map_or(0, |end| end + 1);
-    Picture { svg: [&svg[..open], "\n", &font, &svg[open..]].concat(), png }
-}
-
-/// Pixels without their opacity, which is full, compressed fast: writing must not take longer than computing.
-fn encoded(pixels: tiny_skia::Pixmap) -> Result<Vec<u8>, png::EncodingError> {
-    let (width, height) = (pixels.width(), pixels.height());
-    // in place: fresh memory for large images takes longer than all the copying
-    let mut rgb = pixels.take();
-    let count = rgb.len() / 4;
-    (0..count).for_each(|k| rgb.copy_within(4 * k..4 * k + 3, 3 * k));
-    rgb.truncate(3 * count);
+/// A drawing as PNG, so many times its size
+///
+/// Band by band, each painted over the one before: the memory of a whole image takes longer to get than it takes to paint.
+/// Compressed fast, since writing must not take longer than computing.
+fn encoded(svg: &str, times: u32) -> Result<Vec<u8>, png::EncodingError> {
+    let (tree, [width, height]) = parsed(svg, times);
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Paeth);
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&rgb)?;
+    let mut stream = writer.stream_writer_with_size(CHUNK)?;
+    let mut band = pixmap(width, BAND.min(height));
+    let mut rgb = vec![0; 3 * width as usize];
+    for top in (0..height).step_by(BAND as usize) {
+        paint(&tree, times, top, &mut band);
+        let rows = band.data().chunks_exact(4 * width as usize).take((height - top) as usize);
+        for row in rows {
+            let opaque = row.as_chunks::<4>().0.iter().zip(rgb.as_chunks_mut::<3>().0);
+            opaque.for_each(|(&[r, g, b, _], to)| *to = [r, g, b]);
+            stream.write_all(&rgb)?;
+        }
+    }
+    stream.finish()?;
     writer.finish()?;
     Ok(bytes)
 }
 
-/// A drawing as pixels, so many times its size.
-fn pixels(svg: &str, times: u32) -> tiny_skia::Pixmap {
+/// A drawing as pixels, in its own size.
+fn pixels(svg: &str) -> tiny_skia::Pixmap {
+    let (tree, [width, height]) = parsed(svg, 1);
+    let mut pixels = pixmap(width, height);
+    paint(&tree, 1, 0, &mut pixels);
+    pixels
+}
+
+/// A drawing, and how many columns and rows of pixels it has at so many times its size.
+fn parsed(svg: &str, times: u32) -> (usvg::Tree, [u32; 2]) {
     static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
         let mut fonts = usvg::fontdb::Database::new();
         fonts.load_font_data(FONT.to_vec());
@@ -404,15 +460,30 @@ fn pixels(svg: &str, times: u32) -> tiny_skia::Pixmap {
     let options = usvg::Options { fontdb: FONTS.clone(), font_family: "DejaVu Sans".into(), ..Default::default() };
     let tree = usvg::Tree::from_str(svg, &options).expect("the drawing is well-formed");
     let size = tree.size().to_int_size();
-    let mut pixels =
-        tiny_skia::Pixmap::new(times * size.width(), times * size.height()).expect("the drawing has a size");
-    resvg::render(&tree, tiny_skia::Transform::from_scale(times as f32, times as f32), &mut pixels.as_mut());
-    pixels
+    (tree, [size.width(), size.height()].map(|length| times * length))
+}
+
+fn pixmap(width: u32, height: u32) -> tiny_skia::Pixmap {
+    tiny_skia::Pixmap::new(width, height).expect("the drawing has a size")
+}
+
+/// Paints a drawing from a row of pixels on.
+fn paint(tree: &usvg::Tree, times: u32, top: u32, onto: &mut tiny_skia::Pixmap) {
+    let times = times as f32;
+    let place = tiny_skia::Transform::from_row(times, 0.0, 0.0, times, 0.0, -(top as f32));
+    resvg::render(tree, place, &mut onto.as_mut());
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_stand_to_a_hundredth() {
+        for (p, text) in [([1.0, -2.0], "1,-2"), ([0.054, -0.006], "0.05,-0.01"), ([-0.001, 715.996], "0,716")] {
+            assert_eq!(point(p), text);
+        }
+    }
 
     #[test]
     fn labels_are_short_and_differ() {
