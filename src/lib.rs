@@ -41,6 +41,7 @@
 //! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`equidistribution`], [`laplacian`], [`meshing`] and
 //! [`physics`], then [`stefan`], then [`simulation`], then [`report`], then [`study`].
 
+mod elementary;
 pub mod error;
 pub mod formula;
 pub mod kept;

@@ -3,6 +3,8 @@
 //! A draw is keyed by (seed, step, node, path, block). Whoever computes it, in whatever order and on however many
 //! threads, gets the same bits; nothing is stored between draws.
 
+use crate::elementary::{ln, sin_cos};
+
 /// The generator Philox4x32-10: four words of 32 random bits from a counter of four words and a key of two
 ///
 /// # Source
@@ -74,10 +76,7 @@ pub(crate) fn uniform(word: u32) -> f64 {
     f64::from_bits(0x3FF0_0000_0000_0000 | u64::from(word) << 20) - (1.0 - 0.5 * TINY)
 }
 
-/// Two independent standard normal numbers from two words, L at a time: the method of Box and Muller
-///
-/// Logarithm, sine and cosine are polynomials of our own: branch-free, so that the compiler can take several at once,
-/// and the same bits on every machine.
+/// Two independent standard normal numbers from two words, L at a time: the method of Box and Muller.
 #[inline(always)]
 pub(crate) fn normals<const L: usize>(a: [u32; L], b: [u32; L]) -> [[f64; L]; 2] {
     let mut out = [[0.0; L]; 2];
@@ -91,54 +90,6 @@ pub(crate) fn normals<const L: usize>(a: [u32; L], b: [u32; L]) -> [[f64; L]; 2]
         out[1][l] = radius * sin;
     }
     out
-}
-
-/// Natural logarithm of a positive normal number, to 1e-12.
-#[inline(always)]
-pub(crate) fn ln(x: f64) -> f64 {
-    const ROOT_HALF: u64 = 0x3FE6_A09E_667F_3BCD;
-    const ONE: u64 = 0x3FF0_0000_0000_0000;
-    const TWO_52: u64 = 0x4330_0000_0000_0000;
-    // x = 2^e m with m between √½ and √2; e + 1023 stands in the last bits of 2⁵² + e + 1023
-    let bits = x.to_bits() + (ONE - ROOT_HALF);
-    let exponent = f64::from_bits(TWO_52 | bits >> 52) - (f64::from_bits(TWO_52) + 1023.0);
-    let m = f64::from_bits((bits & 0x000F_FFFF_FFFF_FFFF) + ROOT_HALF);
-    // 2 artanh s; the first term left out is below 1e-12
-    let s = (m - 1.0) / (m + 1.0);
-    let z = s * s;
-    let tail = polynomial(z, [1.0 / 3.0, 1.0 / 5.0, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0]);
-    exponent * std::f64::consts::LN_2 + 2.0 * (s + s * z * tail)
-}
-
-/// Sine and cosine of an angle between −π/2 and π/2, by Taylor's series: the first terms left out are below 1e-12.
-#[inline(always)]
-fn sin_cos(x: f64) -> (f64, f64) {
-    const SIN: [f64; 9] = taylor(1);
-    const COS: [f64; 9] = taylor(0);
-    let z = x * x;
-    (x * polynomial(z, SIN), polynomial(z, COS))
-}
-
-/// 1/k!, −1/(k+2)!, 1/(k+4)!, … for k = 0 or 1.
-const fn taylor<const N: usize>(mut k: usize) -> [f64; N] {
-    let mut terms = [1.0; N];
-    let mut n = 1;
-    while n < N {
-        terms[n] = -terms[n - 1] / ((k + 1) * (k + 2)) as f64;
-        k += 2;
-        n += 1;
-    }
-    terms
-}
-
-/// c₀ + c₁ z + c₂ z² + …
-#[inline(always)]
-fn polynomial<const N: usize>(z: f64, c: [f64; N]) -> f64 {
-    let mut sum = c[N - 1];
-    for k in (0..N - 1).rev() {
-        sum = sum * z + c[k];
-    }
-    sum
 }
 
 #[cfg(test)]

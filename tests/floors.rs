@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// Lowest floor first; modules on one floor are siblings that do not know each other.
 const FLOORS: [&[&str]; 10] = [
-    &["error"],
+    &["elementary", "error"],
     &["formula", "kept", "kind", "parallel", "random", "setting", "stopwatch", "work"],
     &["geometry"],
     &["numerics"],

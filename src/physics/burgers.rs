@@ -1,6 +1,7 @@
 use super::finite_volumes::{Crossing, FiniteVolumes, Law};
 use super::prescribed::evaluate;
 use super::{Motion, Physics, check_finite, curvilinear::Stencils, formula, nodal};
+use crate::elementary::exp;
 use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
 use crate::geometry::{DualCells, Field, Mesh, Patch, node_areas};
@@ -146,8 +147,9 @@ impl Burgers {
     }
 
     /// The exact solution.
+    #[inline(always)]
     pub fn front(&self, t: f64, x: [f64; 2]) -> f64 {
-        1.0 / (1.0 + ((x[0] + x[1] - t) / (2.0 * self.viscosity)).exp())
+        1.0 / (1.0 + exp((x[0] + x[1] - t) / (2.0 * self.viscosity)))
     }
 
     /// u on a bounded side, where it is known.
@@ -160,10 +162,8 @@ impl Burgers {
     }
 
     fn on_mesh(&self, t: f64, mesh: &Mesh<2>) -> Field {
-        // front() of all nodes, pass by pass, since all but the exponential is fast then
-        let mut u: Vec<f64> = mesh.x().iter().map(|x| (x[0] + x[1] - t) / (2.0 * self.viscosity)).collect();
-        u.iter_mut().for_each(|u| *u = u.exp());
-        u.iter_mut().for_each(|u| *u = 1.0 / (1.0 + *u));
+        let mut u = vec![0.0; mesh.x().len()];
+        pulp::Arch::new().dispatch(FrontAt { burgers: self, t, x: mesh.x(), u: &mut u });
         Field::scalar(u)
     }
 
@@ -174,6 +174,23 @@ impl Burgers {
             *l += v[0] * g[0] + v[1] * g[1];
         }
         Row { linear, flux: gradient.map(|g| g[0] + g[1]), convection: self.convection }
+    }
+}
+
+/// The front at many places, as a task for [`pulp`], which compiles it for wider vectors too.
+struct FrontAt<'a> {
+    burgers: &'a Burgers,
+    t: f64,
+    x: &'a [[f64; 2]],
+    u: &'a mut [f64],
+}
+
+impl pulp::WithSimd for FrontAt<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.u.iter_mut().zip(self.x).for_each(|(u, &x)| *u = self.burgers.front(self.t, x));
     }
 }
 

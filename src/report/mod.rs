@@ -9,8 +9,8 @@ mod tables;
 mod viewer;
 
 use crate::error::Result;
-use crate::parallel::{join, map};
-use crate::simulation::{Picture, write_file};
+use crate::parallel::join;
+use crate::simulation::{Canvas, Picture, write_file};
 use files::RunFiles;
 use std::path::{Path, PathBuf};
 
@@ -39,12 +39,13 @@ pub fn build(directory: &Path) -> Result<Built> {
 fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {
     let plots = plots::of(&run);
     let pictures = || {
-        let drawn = map(&plots, |(name, figure)| {
+        let mut canvas = Canvas::default();
+        let drawn = plots.iter().map(|(name, figure)| {
             let svg = figure.svg();
-            Picture::of(&svg).write(directory, name)?;
+            Picture::of(&svg, &mut canvas).write(directory, name)?;
             Ok(page::Plot { title: figure.title.clone(), svg })
         });
-        drawn.into_iter().collect::<Result<Vec<_>>>()
+        drawn.collect::<Result<Vec<_>>>()
     };
     let (drawn, viewer) = join(pictures, || viewer::Viewer::of(&mut run));
     let drawn = drawn?;

@@ -1,5 +1,6 @@
 use super::files::RunFiles;
 use super::frame::Frame;
+use crate::parallel::map;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
 use serde_json::{Value, json};
@@ -159,22 +160,22 @@ impl PackedSeries {
         let lines = first.cells.map(|n| (0..n).step_by(stride).chain([n]).collect::<Vec<usize>>());
         let row = first.cells[1] + 1;
         let nodes: Vec<usize> = lines[0].iter().flat_map(|i| lines[1].iter().map(move |j| i * row + j)).collect();
-        let mut bytes = Vec::new();
-        let mut arrays = Vec::new();
         let names = ["x", "y"].into_iter().chain(first.fields.iter().map(|(name, _)| name.as_str()));
-        for (a, name) in names.enumerate() {
+        let packed = map(&names.enumerate().collect::<Vec<_>>(), |&(a, name)| {
             let at = |frame: &Frame, k: usize| if a < 2 { frame.x[k][a] } else { frame.fields[a - 2].1[k] };
             let all = || frames.iter().flat_map(|frame| nodes.iter().map(move |&k| at(frame, k)));
             let [low, high] = all().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
             // a density that nothing asked for is the same everywhere
-            if low == high && a >= 2 && first.fields.len() > 1 && ["rho", "mesh density"].contains(&name) {
-                continue;
-            }
-            arrays.push(json!({ "name": name, "low": low, "high": high }));
-            pack(all().map(|v| quantised(v, low, high)), nodes.len(), &mut bytes);
-        }
-        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(6));
-        let data = encoder.write_all(&bytes).and_then(|()| encoder.finish()).expect("writing to memory cannot fail");
+            let needless = low == high && a >= 2 && first.fields.len() > 1 && ["rho", "mesh density"].contains(&name);
+            (!needless).then(|| {
+                let bytes = pack(all().map(|v| quantised(v, low, high)), nodes.len());
+                (json!({ "name": name, "low": low, "high": high }), bytes)
+            })
+        });
+        let (arrays, bytes): (Vec<Value>, Vec<Vec<u8>>) = packed.into_iter().flatten().unzip();
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(4));
+        let data =
+            encoder.write_all(&bytes.concat()).and_then(|()| encoder.finish()).expect("writing to memory cannot fail");
         let json = json!({
             "times": frames.iter().map(|frame| frame.t).collect::<Vec<_>>(),
             "lines": lines.map(|lines| lines.len()),
@@ -195,15 +196,13 @@ fn quantised(v: f64, low: f64, high: f64) -> u32 {
 
 /// Levels of an array, frame after frame, as differences from the frame before and then from the node before: first the
 /// low bytes of all of them, then the middle and the high ones.
-fn pack(levels: impl Iterator<Item = u32>, nodes: usize, bytes: &mut Vec<u8>) {
+fn pack(levels: impl Iterator<Item = u32>, nodes: usize) -> Vec<u8> {
     let levels: Vec<u32> = levels.collect();
     let since = |k: usize| levels[k].wrapping_sub(if k >= nodes { levels[k - nodes] } else { 0 });
     let differences: Vec<u32> = (0..levels.len())
         .map(|k| if k % nodes == 0 { since(k) } else { since(k).wrapping_sub(since(k - 1)) })
         .collect();
-    for byte in 0..3 {
-        bytes.extend(differences.iter().map(|d| (d >> (8 * byte)) as u8));
-    }
+    (0..3).flat_map(|byte| differences.iter().map(move |d| (d >> (8 * byte)) as u8)).collect()
 }
 
 /// Places of a share of the frames, evenly spread, the first and the last among them.
@@ -229,8 +228,7 @@ mod tests {
     #[test]
     fn packed_levels_come_back() {
         let levels = [5_u32, 16_777_215, 0, 70_000, 3, 9];
-        let mut bytes = Vec::new();
-        pack(levels.into_iter(), 3, &mut bytes);
+        let bytes = pack(levels.into_iter(), 3);
         let mut back: Vec<u32> = (0..6)
             .map(|k| u32::from(bytes[k]) | u32::from(bytes[6 + k]) << 8 | u32::from(bytes[12 + k]) << 16)
             .collect();

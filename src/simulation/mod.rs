@@ -15,11 +15,11 @@ pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
 pub(crate) use observer::{reopened, synced};
+pub(crate) use report::{Canvas, status, write_file};
 pub use report::{
     Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Standing, Summary, WorkTotal,
 };
 pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
-pub(crate) use report::{status, write_file};
 pub use safety::{Retries, Safety};
 pub use schedule::Schedule;
 

@@ -108,7 +108,7 @@ fn run_from(
             failure => failure,
         };
         let output = Instant::now();
-        let kept = history.flush().and_then(|()| keep(&directory, &unknowns, &state, &mut frames));
+        let kept = history.flush().and_then(|()| frames.write(&unknowns, &state));
         let spent = output.elapsed().as_secs_f64();
         record.seconds.output += spent;
         record.seconds.wall += spent;
@@ -137,7 +137,10 @@ fn run_from(
     };
     let failure = end(&directory, &mut summary, failure, note, |status| {
         let (picture, report) = join(
-            || draw_mesh(&study, &directory, &unknowns, &state),
+            || {
+                let arrays = directory.write("final.npz", &final_arrays(&unknowns, &state));
+                arrays.and(draw_mesh(&study, &directory, &unknowns, &state))
+            },
             || report::finish(directory.path(), study.output.report, study.output.animation, status),
         );
         picture.and(report)
@@ -308,12 +311,6 @@ fn compare_with_reference(
         report.comparison = at(meshes).zip(at(&theirs)).map(|(ours, theirs)| compare(&ours, &theirs));
     }
     Ok(())
-}
-
-/// Writes the last good state, as a frame and as arrays.
-fn keep(directory: &RunDirectory, unknowns: &[String], state: &State, frames: &mut Frames) -> Result<()> {
-    frames.write(unknowns, state)?;
-    directory.write("final.npz", &final_arrays(unknowns, state))
 }
 
 /// Draws the last good state.

@@ -1,9 +1,10 @@
 use super::super::sides::jump;
 use super::surface::{Bilinear, Grid, Surface};
 use super::{MonteCarlo, Problem};
+use crate::elementary::ln;
 use crate::meshing::Form;
 use crate::numerics::difference::{Gradient, derivative};
-use crate::random::{ln, uniform};
+use crate::random::uniform;
 
 /// Paths that are computed side by side.
 pub(super) const LANES: usize = 8;

@@ -1,5 +1,5 @@
 use super::picture::{
-    BAR, BOTTOM, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, heading,
+    BAR, BOTTOM, Canvas, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, axes, colour, colour_bar, heading,
 };
 use std::fmt::Write;
 
@@ -43,5 +43,5 @@ pub fn draw_curves(
     axes(&mut s, lower, extent, [width, height]);
     colour_bar(&mut s, parameter, ends.0, ends.1, LEFT + width + BAR, height);
     s.push_str("</svg>\n");
-    Picture::of(&s)
+    Picture::of(&s, &mut Canvas::default())
 }

@@ -1,4 +1,4 @@
-use super::picture::{FONT, Picture};
+use super::picture::{Canvas, FONT, Picture};
 use plotters::coord::combinators::LogCoord;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
@@ -73,7 +73,7 @@ const ROOM: f64 = 1.1;
 impl Figure {
     /// Draws it.
     pub fn draw(&self) -> Picture {
-        Picture::of(&self.svg())
+        Picture::of(&self.svg(), &mut Canvas::default())
     }
 
     /// Draws it for a page that has the font.

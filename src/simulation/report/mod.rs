@@ -12,6 +12,7 @@ pub use curves::draw_curves;
 pub use directory::{RunDirectory, Standing};
 pub(crate) use directory::{is_frame, remove, sync_directory, write_file};
 pub use figure::{Curve, Figure, Scale};
+pub(crate) use picture::Canvas;
 pub use picture::{Picture, Pixels, Sheet, draw};
 pub(crate) use summary::status;
 pub use summary::{Conserved, ErrorNorms, Failed, Parallel, Report, Seconds, Summary, WorkTotal};

@@ -19,8 +19,8 @@ pub struct Picture {
 
 impl Picture {
     /// A drawing in both formats: as SVG with its font inside, and as PNG.
-    pub(crate) fn of(svg: &str) -> Self {
-        let png = encoded(svg, 2).expect("writing to memory cannot fail");
+    pub(crate) fn of(svg: &str, canvas: &mut Canvas) -> Self {
+        let png = encoded(canvas.paint(svg, 2)).expect("writing to memory cannot fail");
         let font = format!(
             "<style>@font-face{{font-family:\"DejaVu Sans\";src:url(data:font/ttf;base64,{})}}</style>\n",
             STANDARD.encode(FONT)
@@ -56,8 +56,6 @@ pub(super) const BOTTOM: f64 = 64.0;
 pub(super) const BAR: f64 = 24.0;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
-/// Rows of pixels that are painted at a time.
-const BAND: u32 = 256;
 /// Bytes of a part of a PNG.
 const CHUNK: usize = 1 << 16;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
@@ -104,15 +102,15 @@ pub fn draw(title: &str, unknown: &str, state: &State, line: &[[f64; 2]]) -> Pic
         range: None,
         line,
     };
-    Picture::of(&svg(&sheet))
+    Picture::of(&svg(&sheet), &mut Canvas::default())
 }
 
 impl Sheet<'_> {
     /// Its pixels, in the size of the drawing.
     pub fn pixels(&self) -> Pixels {
-        let pixels = pixels(&svg(self));
-        let size = [pixels.width(), pixels.height()];
-        Pixels { size, rgba: pixels.take() }
+        let mut canvas = Canvas::default();
+        let pixels = canvas.paint(&svg(self), 1);
+        Pixels { size: [pixels.width(), pixels.height()], rgba: pixels.data().to_vec() }
     }
 }
 
@@ -413,70 +411,72 @@ pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// A drawing as PNG, so many times its size
-///
-/// Band by band, each painted over the one before: the memory of a whole image takes longer to get than it takes to paint.
-/// Compressed fast, since writing must not take longer than computing.
-fn encoded(svg: &str, times: u32) -> Result<Vec<u8>, png::EncodingError> {
-    let (tree, [width, height]) = parsed(svg, times);
+/// What drawings are painted on, one after the other: to get the memory of an image takes longer than to paint it.
+#[derive(Default)]
+pub(crate) struct Canvas(Option<tiny_skia::Pixmap>);
+
+impl Canvas {
+    /// A drawing as pixels, so many times its size.
+    fn paint(&mut self, svg: &str, times: u32) -> &tiny_skia::Pixmap {
+        static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
+            let mut fonts = usvg::fontdb::Database::new();
+            fonts.load_font_data(FONT.to_vec());
+            Arc::new(fonts)
+        });
+        let options = usvg::Options { fontdb: FONTS.clone(), font_family: "DejaVu Sans".into(), ..Default::default() };
+        let tree = usvg::Tree::from_str(svg, &options).expect("the drawing is well-formed");
+        let size = tree.size().to_int_size();
+        let [width, height] = [size.width(), size.height()].map(|length| times * length);
+        let blank = match self.0.take() {
+            Some(mut painted) if [painted.width(), painted.height()] == [width, height] => {
+                painted.fill(tiny_skia::Color::TRANSPARENT);
+                painted
+            }
+            _ => tiny_skia::Pixmap::new(width, height).expect("the drawing has a size"),
+        };
+        let pixels = self.0.insert(blank);
+        resvg::render(&tree, tiny_skia::Transform::from_scale(times as f32, times as f32), &mut pixels.as_mut());
+        pixels
+    }
+}
+
+/// Pixels as PNG, without their opacity, which is full; compressed fast, since writing must not take longer than computing.
+fn encoded(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Paeth);
     let mut writer = encoder.write_header()?;
     let mut stream = writer.stream_writer_with_size(CHUNK)?;
-    let mut band = pixmap(width, BAND.min(height));
-    let mut rgb = vec![0; 3 * width as usize];
-    for top in (0..height).step_by(BAND as usize) {
-        paint(&tree, times, top, &mut band);
-        let rows = band.data().chunks_exact(4 * width as usize).take((height - top) as usize);
-        for row in rows {
-            let opaque = row.as_chunks::<4>().0.iter().zip(rgb.as_chunks_mut::<3>().0);
-            opaque.for_each(|(&[r, g, b, _], to)| *to = [r, g, b]);
-            stream.write_all(&rgb)?;
-        }
+    let mut rgb = vec![0; 3 * pixels.width() as usize];
+    for row in pixels.data().chunks_exact(4 * pixels.width() as usize) {
+        let opaque = row.as_chunks::<4>().0.iter().zip(rgb.as_chunks_mut::<3>().0);
+        opaque.for_each(|(&[r, g, b, _], to)| *to = [r, g, b]);
+        stream.write_all(&rgb)?;
     }
     stream.finish()?;
     writer.finish()?;
     Ok(bytes)
 }
 
-/// A drawing as pixels, in its own size.
-fn pixels(svg: &str) -> tiny_skia::Pixmap {
-    let (tree, [width, height]) = parsed(svg, 1);
-    let mut pixels = pixmap(width, height);
-    paint(&tree, 1, 0, &mut pixels);
-    pixels
-}
-
-/// A drawing, and how many columns and rows of pixels it has at so many times its size.
-fn parsed(svg: &str, times: u32) -> (usvg::Tree, [u32; 2]) {
-    static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
-        let mut fonts = usvg::fontdb::Database::new();
-        fonts.load_font_data(FONT.to_vec());
-        Arc::new(fonts)
-    });
-    let options = usvg::Options { fontdb: FONTS.clone(), font_family: "DejaVu Sans".into(), ..Default::default() };
-    let tree = usvg::Tree::from_str(svg, &options).expect("the drawing is well-formed");
-    let size = tree.size().to_int_size();
-    (tree, [size.width(), size.height()].map(|length| times * length))
-}
-
-fn pixmap(width: u32, height: u32) -> tiny_skia::Pixmap {
-    tiny_skia::Pixmap::new(width, height).expect("the drawing has a size")
-}
-
-/// Paints a drawing from a row of pixels on.
-fn paint(tree: &usvg::Tree, times: u32, top: u32, onto: &mut tiny_skia::Pixmap) {
-    let times = times as f32;
-    let place = tiny_skia::Transform::from_row(times, 0.0, 0.0, times, 0.0, -(top as f32));
-    resvg::render(tree, place, &mut onto.as_mut());
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What was painted before does not shine through.
+    #[test]
+    fn a_canvas_is_blank_for_each_drawing() {
+        let drawing = |inside: &str| {
+            format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"30\" height=\"20\">{inside}</svg>")
+        };
+        let [dark, clear] =
+            ["<rect width=\"30\" height=\"9\"/>", "<rect width=\"9\" height=\"20\" fill=\"red\"/>"].map(drawing);
+        let mut canvas = Canvas::default();
+        canvas.paint(&dark, 2);
+        assert_eq!(canvas.paint(&clear, 2).data(), Canvas::default().paint(&clear, 2).data());
+        assert_eq!(canvas.paint(&clear, 1).data(), Canvas::default().paint(&clear, 1).data());
+    }
 
     #[test]
     fn points_stand_to_a_hundredth() {
