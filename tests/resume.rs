@@ -231,6 +231,27 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
     assert!(whole == cut);
 }
 
+/// Checkpoints alone are enough to go on from, as far as they do not need the files beside them.
+#[test]
+fn a_lost_summary_is_no_lost_run() {
+    let out = tempfile::tempdir().unwrap();
+    let cut = out.path().join("cut");
+    let study = study("burgers-b-conservative", &SHORT);
+    study.run(&cut, Begin::Anew, &mut [&mut After::steps(5)]).unwrap();
+    for name in ["summary.json", "study.toml"] {
+        std::fs::remove_file(cut.join(name)).unwrap();
+    }
+    let mut after = After::steps(0);
+    study.run(&cut, Begin::Resumed, &mut [&mut after]).unwrap();
+    assert_eq!(after.begun, Some(Event::Resumed));
+    // a file that only bears the name is somebody else's
+    let theirs = out.path().join("theirs");
+    std::fs::create_dir(&theirs).unwrap();
+    std::fs::write(theirs.join("checkpoint.0"), "weights of a network").unwrap();
+    let refused = study.run(&theirs, Begin::Resumed, &mut []);
+    assert!(matches!(refused, Err(Error::ForeignDirectory { .. })), "{refused:?}");
+}
+
 /// What is no checkpoint of this study is refused, each by name, and nothing is touched.
 #[test]
 fn foreign_checkpoints_are_refused() {

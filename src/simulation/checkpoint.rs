@@ -10,6 +10,8 @@ use crate::physics::Physics;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_bytes::ByteBuf;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -97,6 +99,16 @@ impl Checkpoints {
         let study = numbers(study)
             .map_err(|reason| Error::Unreadable { path: directory.join("study.toml"), reason: reason.to_string() })?;
         Ok(Self { directory: directory.into(), at, study, next: 0, newest: (None, Instant::now()), at_the_end: false })
+    }
+
+    /// Whether a directory holds one, by how it begins.
+    pub(crate) fn are_in(directory: &Path) -> bool {
+        let begins = |path: PathBuf| {
+            let mut head = [0; MAGIC.len()];
+            // what is no file may wait for somebody to write
+            path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok() && head == MAGIC
+        };
+        Self::NAMES.into_iter().any(|name| begins(directory.join(name)))
     }
 
     /// Removes them: the run is over.

@@ -13,8 +13,8 @@ mod schedule;
 pub use checkpoint::CheckpointsAt;
 pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
+pub(crate) use observer::Rows;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
-pub(crate) use observer::{reopened, synced};
 pub(crate) use report::{Canvas, status, write_file};
 pub use report::{
     Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Standing, Summary, WorkTotal,

@@ -9,14 +9,13 @@ use crate::geometry::{Field, quality};
 use crate::kept::{Kept, check_nodal};
 use crate::report;
 use crate::simulation::{
-    Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, RunDirectory, Schedule, Snapshot, State,
-    WorkTotal, draw, draw_curves, final_arrays, reopened, status, synced,
+    Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, Rows, RunDirectory, Schedule, Snapshot, State,
+    WorkTotal, draw, draw_curves, final_arrays, status,
 };
 use crate::stefan::{Energy, Front, FrontState, LOWER, Problem, Stepping, UPPER};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 /// `summary.json` of a study of kind `stefan`.
@@ -182,50 +181,39 @@ impl FrontCheckpoint {
 
 /// `history.csv` and `front.csv`.
 struct Tables {
-    path: PathBuf,
-    history: csv::Writer<File>,
-    fronts: csv::Writer<File>,
+    history: Rows,
+    fronts: Rows,
 }
 
 impl Tables {
+    const NAMES: [&str; 2] = ["history.csv", "front.csv"];
+
     fn create(directory: &Path, x: &[f64]) -> Result<Self> {
-        let open = |name: &str| {
-            let path = directory.join(name);
-            csv::Writer::from_path(&path).map_err(|error| Error::Unwritable { path, reason: error.to_string() })
-        };
-        let mut tables = Self { path: directory.into(), history: open("history.csv")?, fronts: open("front.csv")? };
+        let [history, fronts] = Self::NAMES.map(|name| Rows::create(&directory.join(name)));
+        let mut tables = Self { history: history?, fronts: fronts? };
         let heads = ["t".to_string()].into_iter().chain(x.iter().map(|x| format!("x={x}")));
-        tables.fronts.write_record(heads).map_err(|error| tables.unwritable(&error.to_string()))?;
+        tables.fronts.add(heads.collect::<Vec<_>>())?;
         Ok(tables)
     }
 
     /// Goes on behind the rows that a checkpoint knows of.
     fn resume(directory: &Path, kept: &Kept) -> Result<Self, Unfit> {
-        let open = |name: &str| {
-            let rows = reopened(&directory.join(name), kept.get(name)?)?;
-            Ok(csv::WriterBuilder::new().has_headers(false).from_writer(rows))
-        };
-        Ok(Self { path: directory.into(), history: open("history.csv")?, fronts: open("front.csv")? })
+        let [history, fronts] = Self::NAMES.map(|name| Rows::reopen(&directory.join(name), kept.get(name)?));
+        Ok(Self { history: history?, fronts: fronts? })
     }
 
-    fn keep(&self, kept: &mut Kept) -> Result<()> {
-        for (name, table) in [("history.csv", &self.history), ("front.csv", &self.fronts)] {
-            kept.put(name, &synced(table.get_ref()).map_err(|error| self.unwritable(&error.to_string()))?);
+    fn keep(&mut self, kept: &mut Kept) -> Result<()> {
+        for (name, table) in Self::NAMES.into_iter().zip([&mut self.history, &mut self.fronts]) {
+            kept.put(name, &table.sync()?);
         }
         Ok(())
     }
 
-    fn unwritable(&self, reason: &str) -> Error {
-        Error::Unwritable { path: self.path.clone(), reason: reason.into() }
-    }
-
-    /// Row by row, so that a run that is killed leaves whole rows.
     fn write(&mut self, row: Row, front: &[f64]) -> Result<()> {
         let heights = [row.t].into_iter().chain(front.iter().copied()).map(|value| value.to_string());
-        let fronts = self.fronts.write_record(heights).map_err(|error| error.to_string());
-        let written = self.history.serialize(row).map_err(|error| error.to_string()).and(fronts);
-        let flushed = self.history.flush().and_then(|()| self.fronts.flush()).map_err(|error| error.to_string());
-        written.and(flushed).map_err(|reason| self.unwritable(&reason))
+        self.fronts.add(heights.collect::<Vec<_>>())?;
+        self.history.add(row)?;
+        self.history.flush().and(self.fronts.flush())
     }
 }
 

@@ -2,11 +2,12 @@
 
 mod frames;
 mod history;
+mod rows;
 mod vtu;
 
 pub use frames::{Frames, FramesAt};
 pub use history::History;
-pub(crate) use history::{reopened, synced};
+pub(crate) use rows::Rows;
 
 use super::{ErrorNorms, State, WorkTotal};
 use crate::error::Result;

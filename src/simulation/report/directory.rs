@@ -191,9 +191,9 @@ pub enum Standing {
     Complete,
 }
 
-/// True if a run of ours wrote this directory: its summary says so, or the lock of a run that was killed before.
+/// True if a run of ours wrote this directory: its summary says so, a checkpoint, or the lock of a run that was killed before.
 fn wrote(path: &Path) -> bool {
-    if path.join(LOCK).is_file() {
+    if path.join(LOCK).is_file() || Checkpoints::are_in(path) {
         return true;
     }
     // study.toml comes second: a disk may have been full then

@@ -1,0 +1,138 @@
+use crate::error::{Error, Result, Unfit};
+use serde::Serialize;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// A table that grows while a run goes on, as CSV
+///
+/// Its file holds whole rows, also where the run is killed, or the disk full.
+#[derive(Debug)]
+pub(crate) struct Rows {
+    path: PathBuf,
+    file: File,
+    /// Length of the file.
+    length: u64,
+    /// Rows that wait for the next flush, and those that a flush could not write.
+    waiting: csv::Writer<Vec<u8>>,
+    unwritten: Vec<u8>,
+}
+
+impl Rows {
+    /// Starts the file.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn create(path: &Path) -> Result<Self> {
+        match File::create(path) {
+            Ok(file) => Ok(Self::of(path, file, 0)),
+            Err(error) => Err(Error::Unwritable { path: path.into(), reason: error.to_string() }),
+        }
+    }
+
+    fn of(path: &Path, file: File, length: u64) -> Self {
+        Self { path: path.into(), file, length, waiting: table(length == 0), unwritten: Vec::new() }
+    }
+
+    /// Goes on behind the rows that a checkpoint knows of; later ones are dropped.
+    ///
+    /// # Errors
+    /// [`Unfit`] where they are not there.
+    pub fn reopen(path: &Path, length: u64) -> Result<Self, Unfit> {
+        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let beside = |reason: String| Unfit::Beside { file: file.clone(), reason };
+        let open = || -> std::io::Result<Result<File, Unfit>> {
+            let mut rows = File::options().read(true).write(true).open(path)?;
+            let there = rows.metadata()?.len();
+            if there < length {
+                return Ok(Err(beside(format!("it has {there} bytes of the {length} that it had"))));
+            }
+            let mut end = [0];
+            rows.seek(SeekFrom::Start(length.saturating_sub(1)))?;
+            rows.read_exact(&mut end)?;
+            if end != *b"\n" {
+                return Ok(Err(beside(format!("no row ends at byte {length}, where one did"))));
+            }
+            rows.set_len(length)?;
+            rows.seek(SeekFrom::Start(length))?;
+            Ok(Ok(rows))
+        };
+        let file = open().unwrap_or_else(|error| Err(beside(error.to_string())))?;
+        Ok(Self::of(path, file, length))
+    }
+
+    /// Adds a row; the first one of a struct has the names of its fields above it.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`] for what is no row.
+    pub fn add(&mut self, row: impl Serialize) -> Result<()> {
+        self.waiting.serialize(row).map_err(|error| self.unwritable(error.to_string()))
+    }
+
+    /// Writes the rows that wait. They go on waiting where that fails.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn flush(&mut self) -> Result<()> {
+        let rows = std::mem::replace(&mut self.waiting, table(false)).into_inner();
+        self.unwritten.extend(rows.map_err(|error| self.unwritable(error.to_string()))?);
+        if let Err(error) = self.file.write_all(&self.unwritten) {
+            // nothing that is half written stays
+            let back = SeekFrom::Start(self.length);
+            let _ = self.file.set_len(self.length).and_then(|()| self.file.seek(back));
+            return Err(self.unwritable(error.to_string()));
+        }
+        self.length += self.unwritten.len() as u64;
+        self.unwritten.clear();
+        Ok(())
+    }
+
+    /// Makes sure that all rows are on the disk. Returns how long the file is then.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn sync(&mut self) -> Result<u64> {
+        self.flush()?;
+        self.file.sync_data().map_err(|error| self.unwritable(error.to_string()))?;
+        Ok(self.length)
+    }
+
+    fn unwritable(&self, reason: String) -> Error {
+        Error::Unwritable { path: self.path.clone(), reason }
+    }
+}
+
+impl Drop for Rows {
+    /// What a run that ends early has not written yet.
+    fn drop(&mut self) {
+        let _ = self.flush();
+    }
+}
+
+fn table(heads: bool) -> csv::Writer<Vec<u8>> {
+    csv::WriterBuilder::new().has_headers(heads).from_writer(Vec::new())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disk without space, where the system has one.
+    #[test]
+    fn rows_that_could_not_be_written_go_on_waiting() {
+        let Ok(full) = File::options().write(true).open("/dev/full") else { return };
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("rows.csv");
+        let mut rows = Rows::create(&path).unwrap();
+        rows.add([1, 2]).unwrap();
+        rows.flush().unwrap();
+        rows.add([3, 4]).unwrap();
+        let space = std::mem::replace(&mut rows.file, full);
+        let error = rows.flush().unwrap_err();
+        assert!(error.to_string().contains("rows.csv"), "{error}");
+        rows.file = space;
+        rows.add([5, 6]).unwrap();
+        drop(rows);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "1,2\n3,4\n5,6\n");
+    }
+}
