@@ -69,22 +69,30 @@ impl Rows {
         self.waiting.serialize(row).map_err(|error| self.unwritable(error.to_string()))
     }
 
-    /// Writes the rows that wait. They go on waiting where that fails.
+    /// Writes the rows that wait. Those for which there is no space go on waiting.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn flush(&mut self) -> Result<()> {
         let rows = std::mem::replace(&mut self.waiting, table(false)).into_inner();
         self.unwritten.extend(rows.map_err(|error| self.unwritable(error.to_string()))?);
-        if let Err(error) = self.file.write_all(&self.unwritten) {
-            // nothing that is half written stays
-            let back = SeekFrom::Start(self.length);
-            let _ = self.file.set_len(self.length).and_then(|()| self.file.seek(back));
-            return Err(self.unwritable(error.to_string()));
-        }
-        self.length += self.unwritten.len() as u64;
-        self.unwritten.clear();
-        Ok(())
+        let written = self.file.write_all(&self.unwritten);
+        let whole = match &written {
+            Ok(()) => self.unwritten.len(),
+            Err(_) => {
+                // as much as there was space for, but no half of a row
+                let bytes = self.file.stream_position().map_or(0, |end| end.saturating_sub(self.length) as usize);
+                let there = &self.unwritten[..bytes.min(self.unwritten.len())];
+                there.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
+            }
+        };
+        self.length += whole as u64;
+        self.unwritten.drain(..whole);
+        written.map_err(|error| {
+            let end = SeekFrom::Start(self.length);
+            let _ = self.file.set_len(self.length).and_then(|()| self.file.seek(end));
+            self.unwritable(error.to_string())
+        })
     }
 
     /// Makes sure that all rows are on the disk. Returns how long the file is then.
