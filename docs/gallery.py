@@ -49,7 +49,7 @@ a {{ color: light-dark(#0063a3, #63b3ed); }}
 ARTICLE = """<article>
 <a href="{name}/report.html" aria-label="Report of {name}"><picture>{moving}<img src="{name}/mesh.png" alt="{title}: the mesh over the solution" loading="lazy"></picture></a>
 <h2>{title}</h2>
-<p>{words} <a href="{name}/report.html">Report</a>, {seconds:.2g} s.</p>
+<p>{words} <a href="{name}/report.html">Report</a>; the run took {seconds:.2g} s.</p>
 </article>"""
 MOVING = """<source srcset="{name}/animation.gif" media="(prefers-reduced-motion: no-preference)">"""
 

@@ -95,23 +95,38 @@ function along(out, count, across, step, other, x0, y0, x1, y1, shade, strength)
 
 const SYMBOLS = { rho: "ρ", "mesh density": "mesh density ρ" };
 /** What is positive and may span much. */
-const SKEWED = ["rho", "mesh density", "Q", "Jacobian"];
+const SKEWED = ["rho", "mesh density", "Q", "Jacobian", "Q of cells", "Jacobian of cells"];
+/** Of the range of Q and the Jacobian, which come from rounded positions, what may be rounding alone. */
+const ROUNDING = 1e-4;
 const symbol = (name) => SYMBOLS[name] ?? name;
 
 /** Six digits, as a power of ten where that is shorter. */
-function number(v) {
+function number(v, digits = 6) {
   const size = Math.abs(v);
-  return (v === 0 ? "0" : size >= 1e-3 && size < 1e6 ? String(+v.toPrecision(6)) : v.toExponential(4)).replace(/-/g, "−");
+  const text = v === 0 ? "0" : size >= 1e-3 && size < 1e6 ? String(+v.toPrecision(digits)) : v.toExponential(Math.min(4, digits - 1));
+  return text.replace(/\.?0+e/, "e").replace("e+", "e").replace(/-/g, "−");
 }
 
-/** Round values between two ends with their labels. */
+/** A time: of those far from 0, all digits that tell frames apart. */
+const moment = (t) => (Math.abs(t) < 1e12 ? String(+t.toPrecision(12)).replace(/-/g, "−") : number(t));
+
+/** A value without the digits that are lost between so many levels of a range. */
+function rounded(v, { low, high }) {
+  const grain = Math.max(high - low, 1e-15 * Math.max(Math.abs(low), Math.abs(high))) * 1e-7;
+  if (!(grain > 0)) return v;
+  const unit = 10 ** Math.ceil(Math.log10(grain));
+  return Math.round(v / unit) * unit;
+}
+
+/** Round values between two ends with their labels, and, as `less`, what the labels leave out where they would all begin alike. */
 function ticks(low, high, most) {
-  const span = high - low;
-  if (!(span > 1e-12 * Math.max(Math.abs(low), Math.abs(high)))) return [[low, number(low)]];
+  const span = high - low, size = Math.max(Math.abs(low), Math.abs(high));
+  if (!(span > 1e-12 * size)) return Object.assign([[low, number(low)]], { less: "" });
   const power = 10 ** Math.floor(Math.log10(span / most)), step = [1, 2, 5, 10].map((m) => m * power).find((s) => span / s <= most);
-  const found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push([k * step, number(+(k * step).toPrecision(10))]);
-  return found;
+  const ten = 10 ** Math.ceil(Math.log10(span)), start = span < 2e-3 * size ? Math.floor(low / ten + 1e-9) : 0;
+  const less = start ? `${start > 0 ? " − " : " + "}${moment(+Math.abs(start * ten).toPrecision(14))}` : "", found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push([k * step, number(+(k * step - start * ten).toPrecision(8))]);
+  return Object.assign(found, { less });
 }
 
 // ---- the viewer -------------------------------------------------------------------------------------------------------
@@ -131,9 +146,12 @@ class Viewer {
     }));
     this.maps.forEach(({ name }) => this.controls.map.add(new Option(name, name)));
     this.fields = data.meshes[0].arrays.map((array) => array.name).filter((name) => name !== "x" && name !== "y");
-    for (const name of [...this.fields, "Q", "Jacobian", "nothing"]) this.controls.field.add(new Option(symbol(name), name));
+    // an unknown may have the name of a figure of the cells
+    const ofCells = ["Q", "Jacobian"].map((name) => (this.fields.includes(name) ? `${name} of cells` : name));
+    for (const name of [...this.fields, ...ofCells, "nothing"]) this.controls.field.add(new Option(symbol(name), name));
     this.stages = data.meshes.map((mesh, m) => this.stage(mesh, m));
     document.querySelector(".stages").classList.toggle("pair", this.stages.length > 1);
+    byId("cuts-label").querySelector("span").textContent = data.between;
     byId("cuts-label").hidden = !data.meshes.some((mesh) => mesh.cuts.flat().length);
 
     const draw = () => this.draw();
@@ -165,7 +183,8 @@ class Viewer {
   stage(mesh, m) {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption"), canvas = document.createElement("canvas");
     canvas.tabIndex = 0;
-    canvas.setAttribute("role", "img");
+    canvas.setAttribute("role", "application");
+    canvas.setAttribute("aria-roledescription", "mesh");
     figure.append(caption, canvas);
     document.querySelector(".stages").append(figure);
     const stage = { mesh, m, caption, canvas, context: canvas.getContext("2d"), values: null };
@@ -223,7 +242,9 @@ class Viewer {
     if (!play || on === this.playing) return;
     this.playing = on;
     play.textContent = on ? "Pause" : "Play";
-    play.setAttribute("aria-pressed", String(on));
+    // nobody can listen as fast as it plays
+    this.controls.now.setAttribute("aria-live", on ? "off" : "polite");
+    document.querySelector(".readout").setAttribute("aria-live", on ? "off" : "polite");
     if (!on) return this.show(Math.round(this.at));
     if (this.at >= this.last) this.at = 0;
     const speed = this.last / Math.min(20, Math.max(4, this.last / 5)); // frames a second
@@ -299,7 +320,7 @@ class Viewer {
     this.drawBar(range);
     const [t] = this.placeOf(this.data.meshes[0]);
     if (now) {
-      now.textContent = `t = ${number(t)}`;
+      now.textContent = `t = ${moment(this.playing ? +t.toPrecision(5) : t)}`;
       time.value = this.at;
       time.setAttribute("aria-valuetext", now.textContent);
     }
@@ -319,6 +340,8 @@ class Viewer {
         if (this.fields.includes(field)) this.arrays[stage.m][field][f].forEach(take);
         else this.cellValues(stage, field, f).forEach(take);
       }));
+      const size = Math.max(Math.abs(low), Math.abs(high));
+      if (high - low <= (this.fields.includes(field) ? 1e-12 : ROUNDING) * size) low = high = +(0.5 * (low + high)).toPrecision(4);
       return { low, high, log: SKEWED.includes(field) && low > 0 && high > 30 * low };
     })();
   }
@@ -327,7 +350,7 @@ class Viewer {
     const [n, m] = stage.mesh.lines, x = this.values(stage, "x", place), y = this.values(stage, "y", place);
     const uniform = this.uniform(stage), out = new Float64Array((n - 1) * (m - 1));
     for (let i = 0, c = 0; i < n - 1; i++) {
-      for (let j = 0; j < m - 1; j++, c++) out[c] = shape(x, y, i * m + j, m, uniform)[field === "Q" ? 0 : 1];
+      for (let j = 0; j < m - 1; j++, c++) out[c] = shape(x, y, i * m + j, m, uniform)[field.startsWith("Q") ? 0 : 1];
     }
     return out;
   }
@@ -351,8 +374,8 @@ class Viewer {
     const [t, place] = this.placeOf(mesh);
     stage.place = place;
     const theirs = Number.isInteger(place) ? mesh.times[place] : t;
-    const pair = this.stages.length > 1, role = stage.m ? "compared with: " : "generator: ";
-    stage.caption.textContent = (mesh.name && role + mesh.name) + (pair ? `, t\u00a0=\u00a0${number(theirs)}` : "");
+    const pair = this.stages.length > 1 || !this.controls.now, role = stage.m ? "compared with: " : "generator: ";
+    stage.caption.textContent = [mesh.name && role + mesh.name, pair && `t\u00a0=\u00a0${moment(theirs)}`].filter(Boolean).join(", ");
     stage.caption.hidden = !stage.caption.textContent;
 
     const field = this.controls.field.value, [n, m] = mesh.lines, nodes = n * m;
@@ -441,7 +464,8 @@ class Viewer {
     const [from, to] = [this.physical(stage, [left, top + h]), this.physical(stage, [left + w, top])];
     context.textAlign = "center";
     context.textBaseline = "top";
-    for (const [v, text] of ticks(from[0], to[0], Math.max(2, w / ratio / 90))) {
+    const along = ticks(from[0], to[0], Math.max(2, w / ratio / 90)), up = ticks(from[1], to[1], Math.max(2, h / ratio / 60));
+    for (const [v, text] of along) {
       const p = left + w / 2 + (v - this.centre[0]) * scale;
       context.fillRect(p - ratio / 2, top + h, ratio, 4 * ratio);
       // a label that would be cut stays inside
@@ -450,31 +474,34 @@ class Viewer {
     }
     context.textAlign = "right";
     context.textBaseline = "middle";
-    for (const [v, text] of ticks(from[1], to[1], Math.max(2, h / ratio / 60))) {
+    for (const [v, text] of up) {
       const p = top + h / 2 - (v - this.centre[1]) * scale;
       context.fillRect(left - 4 * ratio, p - ratio / 2, 4 * ratio, ratio);
       context.fillText(text, left - 7 * ratio, Math.max(7 * ratio, p), left - 22 * ratio);
     }
     context.textAlign = "center";
-    context.fillText("x", left + w / 2, height - 8 * ratio);
-    context.fillText("y", 7 * ratio, top + h / 2);
+    context.fillText(`x${along.less}`, left + w / 2, height - 8 * ratio);
+    context.save();
+    context.translate(8 * ratio, top + h / 2);
+    if (up.less) context.rotate(-Math.PI / 2);
+    context.fillText(`y${up.less}`, 0, 0);
+    context.restore();
     const what = field === "nothing" ? "the mesh" : `the mesh over ${symbol(field)}`;
     const lattice = `${(n - 1) * stride} by ${(m - 1) * stride} cells`;
-    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, at t = ${number(theirs)}, from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
+    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, at t = ${moment(theirs)}, from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
   }
 
   drawBar({ low, high, log }) {
     const bar = document.querySelector(".bar"), canvas = bar.querySelector("canvas"), field = this.controls.field.value;
-    bar.hidden = field === "nothing";
-    bar.style.display = bar.hidden ? "none" : "";
-    bar.querySelector(".name").textContent = symbol(field) + (log ? " (log)" : "");
+    bar.style.visibility = field === "nothing" ? "hidden" : "";
     canvas.width = 256;
     const context = canvas.getContext("2d"), image = context.createImageData(256, 14), out = new Int32Array(image.data.buffer);
     const { colours } = this.maps.find((map) => map.name === this.controls.map.value) ?? this.maps[0];
     for (let k = 0; k < out.length; k++) out[k] = colours[k % 256];
     context.putImageData(image, 0, 0);
     const place = (v) => (log ? Math.log(v / low) / Math.log(high / low) : high > low ? (v - low) / (high - low) : 0.5);
-    let labels = ticks(low, high, 6);
+    let labels = ticks(low, high, Math.max(2, Math.min(6, canvas.clientWidth / 70)));
+    bar.querySelector(".name").textContent = symbol(field) + (log ? " (log)" : labels.less);
     if (log) {
       const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9), every = Math.ceil((to - from + 1) / 6);
       labels = [];
@@ -528,6 +555,15 @@ class Viewer {
     this.draw();
   }
 
+  /** Digits that figures of the chosen cell have, whose corners stand on levels: few where it is thin. */
+  digits({ x, y, mesh, ...stage }, levels, jacobian) {
+    const m = mesh.lines[1], a = this.cell[0] * m + this.cell[1], [b, c, d] = [a + m, a + m + 1, a + 1];
+    const grain = Math.max(...["x", "y"].map((name) => levels[name].high - levels[name].low)) / 0xffffff;
+    const longest = Math.max(...[[a, b], [b, c], [c, d], [d, a]].map(([p, q]) => Math.hypot(x[p] - x[q], y[p] - y[q])));
+    const width = Math.abs(jacobian) * this.uniform({ mesh, ...stage }) / longest;
+    return Math.min(6, Math.max(2, Math.floor(-Math.log10(4 * grain / width)))) || 2;
+  }
+
   /** Writes what is known at the chosen node, a line a mesh. */
   read() {
     document.querySelector(".readout").replaceChildren(...this.stages.map((stage) => {
@@ -540,13 +576,15 @@ class Viewer {
         line.append(pair);
       };
       if (this.stages.length > 1) entry("mesh", stage.mesh.name.split(",")[0]);
-      const k = this.node && this.node[0] * m + this.node[1], known = (value) => (this.node ? number(value()) : "–");
+      const k = this.node && this.node[0] * m + this.node[1], known = (value, digits) => (this.node ? number(value(), digits) : "–");
+      const levels = Object.fromEntries(stage.mesh.arrays.map((array) => [array.name, array]));
       entry("node", this.node ? `(${this.node.map((index, d) => Math.min(index * stride, cells[d])).join(", ")})` : "–");
-      for (const name of ["x", "y"]) entry(name, known(() => stage[name][k]));
-      for (const name of this.fields) entry(symbol(name), known(() => this.values(stage, name, stage.place)[k]));
+      for (const name of ["x", "y"]) entry(name, known(() => rounded(stage[name][k], levels[name])));
+      for (const name of this.fields) entry(symbol(name), known(() => rounded(this.values(stage, name, stage.place)[k], levels[name])));
       const figures = this.node && shape(stage.x, stage.y, this.cell[0] * m + this.cell[1], m, this.uniform(stage));
-      entry("Q of the cell", known(() => figures[0]));
-      entry("its Jacobian", known(() => figures[1]));
+      const digits = this.node && this.digits(stage, levels, figures[1]);
+      entry("Q of the cell", known(() => figures[0], digits));
+      entry("its Jacobian", known(() => figures[1], digits));
       return line;
     }));
   }

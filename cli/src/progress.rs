@@ -17,7 +17,7 @@ impl Progress {
     pub fn new() -> Self {
         let bar = stderr().is_terminal().then(|| {
             let style =
-                ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}").expect("the template is valid");
+                ProgressStyle::with_template("{percent:>3} %  {msg}  {wide_bar}").expect("the template is valid");
             ProgressBar::new(0).with_style(style)
         });
         Self { bar, told: 0 }
@@ -33,7 +33,9 @@ impl Progress {
 
 impl Observer for Progress {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let words = || words(snapshot);
+        // a narrow terminal cuts the end
+        let of_the_bar = || words(snapshot).map(|words| words + "  ").into_iter().rev().collect::<String>();
+        let line = || words(snapshot).join("  ");
         let pieces = if self.bar.is_some() { OF_THE_BAR } else { LINES };
         // a share that is a whole number of pieces up to round-off is one
         let done = (snapshot.share * pieces as f64 + 1e-9) as usize;
@@ -41,15 +43,15 @@ impl Observer for Progress {
         match &self.bar {
             Some(bar) if matches!(event, Event::Started | Event::Resumed) => {
                 bar.set_length(pieces as u64);
-                bar.set_message(words());
+                bar.set_message(of_the_bar().trim_start().to_string());
             }
             Some(bar) if news => {
                 bar.set_position(done as u64);
-                bar.set_message(words());
+                bar.set_message(of_the_bar().trim_start().to_string());
             }
             Some(bar) if event == Event::Finished => bar.set_message("comparing, drawing and writing the report"),
             None if event == Event::Resumed || event == Event::Stepped && news => {
-                let _ = writeln!(stderr(), "{}", words());
+                let _ = writeln!(stderr(), "{}", line().trim_end());
             }
             _ => {}
         }
@@ -57,8 +59,8 @@ impl Observer for Progress {
     }
 }
 
-/// Where a run is, how fast, and for how long still, as far as the time simulated so far tells.
-fn words(snapshot: &Snapshot<'_>) -> String {
+/// Where a run is and how fast, and for how long still, as far as the time simulated so far tells.
+fn words(snapshot: &Snapshot<'_>) -> [String; 2] {
     let (state, jacobian) = (snapshot.state, snapshot.quality.min_scaled_jacobian);
     let mut text = format!("t = {:.4}  step {}", state.t, state.step);
     if let Some(steps) = snapshot.steps {
@@ -68,10 +70,9 @@ fn words(snapshot: &Snapshot<'_>) -> String {
         text += &format!("  {} steps/s", rate(state.step as f64 / snapshot.seconds));
     }
     text += &format!("  min J {jacobian:.3}");
-    if snapshot.share > 0.0 && snapshot.share < 1.0 {
-        text += &format!("  {} left", duration(snapshot.seconds * (1.0 - snapshot.share) / snapshot.share));
-    }
-    text
+    let remains = (snapshot.share > 0.0 && snapshot.share < 1.0)
+        .then(|| format!("{} left", duration(snapshot.seconds * (1.0 - snapshot.share) / snapshot.share)));
+    [text, remains.unwrap_or_default()]
 }
 
 /// Two digits of a number of steps a second.

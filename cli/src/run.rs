@@ -120,8 +120,11 @@ fn uniform(study: &MovingMesh, summary: &Summary) -> driftmesh::Result<Option<St
 /// Time, error, mesh quality, work and seconds in a few lines.
 fn table(summary: &Summary) -> String {
     let compared = summary.reports.iter().any(|report| report.comparison.is_some());
-    let mut text = String::from("       t     l_inf        l2   Q max  Q mean   min J  equidist");
-    text += if compared { "   R max  R mean  mesh rms\n" } else { "\n" };
+    let mut text = String::new();
+    if !summary.reports.is_empty() {
+        text += "       t     l_inf        l2   Q max  Q mean   min J  equidist";
+        text += if compared { "   R max  R mean  mesh rms\n" } else { "\n" };
+    }
     for report in &summary.reports {
         let [linf, l2] = report.error.map_or(["-".into(), "-".into()], |e| [e.linf, e.l2].map(|e| format!("{e:.3e}")));
         let q = report.quality;

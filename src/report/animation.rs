@@ -15,7 +15,9 @@ const LAST: u16 = 150;
 const PURE: usize = 96;
 const BLENDED: usize = 33;
 const STRENGTHS: [f64; 2] = [0.25, 0.5];
-const GREYS: usize = 28;
+const GREYS: usize = 26;
+/// Of a front, and of its soft edge on white.
+const FRONT: [[u8; 3]; 2] = [[213, 94, 0], [234, 174, 128]];
 
 /// Writes `animation.gif`: the mesh over the first unknown, in colours that mean the same in all frames.
 pub fn write(run: &mut RunFiles) -> Result<()> {
@@ -48,9 +50,13 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
     let each = (WHOLE / frames.len()).clamp(ONE[0], ONE[1]) as u16;
 
     let unwritable = |error: gif::EncodingError| Error::Unwritable { path: path.clone(), reason: error.to_string() };
+    let front = run.front();
     let mut palette = Palette::new();
     let mut encoder: Option<Encoder<Vec<u8>>> = None;
     for (k, frame) in frames.iter().enumerate() {
+        let along =
+            |j: usize| (0..=frame.cells[0]).filter_map(move |i| frame.x.get(i * (frame.cells[1] + 1) + j).copied());
+        let line: Vec<[f64; 2]> = front.filter(|j| *j <= frame.cells[1]).map_or(Vec::new(), |j| along(j).collect());
         let sheet = Sheet {
             title: &format!("{}, t = {:.4}", run.word("study"), frame.t),
             unknown,
@@ -61,7 +67,7 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
             x: &frame.x,
             u: &frame.fields[0].1,
             range: Some(range),
-            line: &[],
+            line: &line,
         };
         let pixels = sheet.pixels();
         let [width, height] = pixels.size.map(|n| n.min(u32::from(u16::MAX)) as u16);
@@ -100,6 +106,7 @@ impl Palette {
             colours.extend((0..BLENDED).map(|k| map(k, BLENDED).map(mix)));
         }
         colours.extend((0..GREYS).map(|k| [(k * 255 / (GREYS - 1)) as u8; 3]));
+        colours.extend(FRONT);
         Self { colours, found: HashMap::new() }
     }
 
@@ -117,7 +124,7 @@ impl Palette {
 mod tests {
     use super::*;
 
-    /// Every colour of the map, bare or under a mesh line, is met within a few levels; black and white exactly.
+    /// Every colour of the map, bare or under a mesh line, is met within a few levels; black, white and a front exactly.
     #[test]
     fn the_palette_meets_the_colours_of_the_drawings() {
         let mut palette = Palette::new();
@@ -132,9 +139,9 @@ mod tests {
                 assert!(off <= 6, "{colour:?} is shown as {met:?}");
             }
         }
-        for grey in [[0; 3], [255; 3]] {
-            let place = palette.nearest(grey);
-            assert_eq!(palette.colours[usize::from(place)], grey);
+        for exact in [[0; 3], [255; 3], FRONT[0]] {
+            let place = palette.nearest(exact);
+            assert_eq!(palette.colours[usize::from(place)], exact);
         }
     }
 }

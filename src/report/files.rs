@@ -75,6 +75,12 @@ impl RunFiles {
         rest.iter().try_fold(self.study.get(*first)?, |table, key| table.get(key))
     }
 
+    /// The mesh line that is the front, of a Stefan problem.
+    pub fn front(&self) -> Option<usize> {
+        let lower = || self.setting(&["grid", "cells"])?.get(1)?.as_integer();
+        (self.word("kind") == "stefan").then(lower).flatten().and_then(|rows| usize::try_from(rows).ok())
+    }
+
     /// Whether `[output]` of the study asks for something.
     pub fn asks_for(&self, what: &str) -> bool {
         self.setting(&["output", what]).and_then(toml::Value::as_bool).unwrap_or(false)

@@ -21,6 +21,8 @@ struct Page<'a> {
     said: String,
     /// What failed.
     failure: Option<&'a str>,
+    /// What may cure it.
+    help: Option<&'a str>,
     warnings: Vec<&'a str>,
     notes: &'a [String],
     viewer: Option<ViewerOnPage<'a>>,
@@ -58,7 +60,8 @@ struct Shown {
 /// The page, everything in it.
 pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> String {
     let (wall, parts) = tables::seconds(&run.summary);
-    let failure = run.summary.values().find_map(|value| value.get("message")?.as_str());
+    let failed = run.summary.values().find(|value| value.get("message").is_some());
+    let told = |key: &str| failed.and_then(|failed| failed.get(key)?.as_str());
     let warnings = run.summary.get("warnings").and_then(Value::as_array);
     let status = run.word("status");
     let page = Page {
@@ -76,7 +79,8 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
             }
             other => format!("Status: {other}."),
         },
-        failure,
+        failure: told("message"),
+        help: told("help"),
         warnings: warnings.into_iter().flatten().filter_map(Value::as_str).collect(),
         notes: &run.notes,
         viewer: viewer.map(|v| ViewerOnPage { data: &v.data, moves: v.moves, thinned: v.thinned.as_deref() }),
@@ -97,8 +101,12 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
 
 /// Pictures that the run drew itself; the mesh only where no viewer shows it.
 fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
-    let candidates =
-        [("mesh", "The mesh", !viewed), ("convergence", "Convergence", true), ("front", "The front over time", true)];
+    let candidates = [
+        ("mesh", "The mesh", !viewed),
+        ("density", "The density and the nodes", true),
+        ("convergence", "Convergence", true),
+        ("front", "The front over time", true),
+    ];
     let formats = [("svg", "image/svg+xml"), ("png", "image/png")];
     let picture = |(name, title, wanted): (&str, &'static str, bool)| {
         formats.iter().filter(|_| wanted).find_map(|(format, mime)| {

@@ -57,7 +57,7 @@ const GROUPS: [Group; 9] = [
     },
     Group {
         name: "error",
-        title: "Left of the distance to the single-domain mesh",
+        title: "Distance to the single-domain mesh",
         label: "distance (units of x)",
         scale: Scale::Logarithmic,
         line: true,
@@ -73,8 +73,8 @@ const GROUPS: [Group; 9] = [
     },
     Group {
         name: "energy",
-        title: "Missing in the balance of heat",
-        label: "share (dimensionless)",
+        title: "Imbalance of heat over time",
+        label: "share of the heat that passed (dimensionless)",
         scale: Scale::Logarithmic,
         line: false,
         columns: &[
@@ -91,8 +91,6 @@ const GROUPS: [Group; 9] = [
         columns: &[("dt", "step"), ("step_limit", "longest stable step")],
     },
 ];
-/// Points of a curve.
-const POINTS: usize = 600;
 
 /// Plots of a history over time, as far as it has something to show.
 pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
@@ -121,38 +119,12 @@ pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
     GROUPS.iter().filter_map(drawn).collect()
 }
 
-/// A curve as few points, of every stretch its lowest and its highest.
+/// A column over time.
 fn curve(name: &str, t: &Column, column: &Column, scale: Scale) -> Curve {
     let placed = |v: f64| scale == Scale::Linear || v > 0.0;
     let points: Vec<[f64; 2]> = (t.values.iter().zip(&column.values))
         .filter_map(|(t, v)| Some([(*t)?, (*v)?]))
         .filter(|p| placed(p[1]))
         .collect();
-    let points = if points.len() <= POINTS {
-        points
-    } else {
-        let ends = |part: &[[f64; 2]]| {
-            let by = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
-            let ends = [part.iter().min_by(by), part.iter().max_by(by)].map(|end| *end.expect("a part is not empty"));
-            if ends[0][0] <= ends[1][0] { ends } else { [ends[1], ends[0]] }
-        };
-        points.chunks(points.len().div_ceil(POINTS / 2)).flat_map(ends).collect()
-    };
-    Curve { name: name.into(), points, plain: true, ..Curve::default() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A single spike among ten thousand values is drawn.
-    #[test]
-    fn a_thinned_curve_keeps_its_spikes() {
-        let values = |f: fn(usize) -> f64| (0..10_000).map(|k| Some(f(k))).collect();
-        let t = Column { name: "t".into(), values: values(|k| k as f64) };
-        let v = Column { name: "q_max".into(), values: values(|k| if k == 4321 { 50.0 } else { 1.0 }) };
-        let curve = curve("Q", &t, &v, Scale::Logarithmic);
-        assert!(curve.points.len() <= POINTS + 2 && curve.points.contains(&[4321.0, 50.0]));
-        assert!(curve.points.is_sorted_by(|a, b| a[0] <= b[0]));
-    }
+    Curve { name: name.into(), points, plain: true, ..Curve::default() }.outlined()
 }

@@ -26,7 +26,7 @@ const ELSEWHERE: [&str; 8] = ["schema", "study", "kind", "version", "status", "s
 const MANY: usize = 8;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 36] = [
+const NAMES: [(&str, &str, &str); 42] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -39,7 +39,7 @@ const NAMES: [(&str, &str, &str); 36] = [
         "smallest corner Jacobian",
         "over that of equal cells; positive as long as no cell is folded",
     ),
-    ("quality.equidistribution", "equidistribution", "largest over mean density × area of a cell; 1 is perfect"),
+    ("quality.equidistribution", "equidistribution", "largest over mean density × size of a cell; 1 is perfect"),
     ("quality.shortest_cell", "shortest cell", "over the mean one"),
     ("quality.error_linf", "largest distance from the exact mesh", ""),
     ("conserved.mass", "integral of the first unknown", ""),
@@ -51,22 +51,32 @@ const NAMES: [(&str, &str, &str); 36] = [
     ("contraction.iterations", "Schwarz iterations", "in the last step"),
     ("contraction.predicted", "contraction, predicted", "bound on the factor by which an iteration shrinks the error"),
     ("contraction.observed", "contraction, observed", ""),
-    ("comparison.r_max", "largest Q, reference over this mesh", ""),
+    (
+        "comparison.r_max",
+        "largest Q, reference over this mesh",
+        "the reference is the run of [compare]; 1 where both are as good",
+    ),
     ("comparison.r_mean", "mean Q, reference over this mesh", ""),
     ("comparison.cell_max", "… largest in one cell", ""),
     ("comparison.mesh_rms", "distance of the meshes", "root mean square over the nodes"),
-    ("rate.stride", "iterations that these are for", ""),
+    ("rate.stride", "… in so many iterations", ""),
     ("rate.bound", "predicted bound", ""),
     ("front.mean", "mean height of the front", ""),
     ("front.range", "its lowest and highest point", ""),
     ("front.error_linf", "largest error of the front", "against the exact solution"),
-    ("energy_imbalance", "missing in the balance of heat", "as a share, with fluxes by weighted residual"),
+    ("energy_imbalance", "imbalance of heat", "as a share of what passed, with fluxes by weighted residual"),
     ("energy_imbalance_by_differences", "… with fluxes by differences", ""),
     ("step_limit", "longest stable step", "of the explicit front, as estimated"),
     ("error_linf", "largest error", "against the discrete solution on one domain"),
     ("points_per_second", "stencils a second", ""),
     ("nonnegative_fraction", "share without negative weights", ""),
     ("exact_degree", "exact to degree", "of polynomials"),
+    ("safety.substeps", "steps tried again with mesh sub-steps", ""),
+    ("safety.smoothed", "steps tried again with more smoothing", ""),
+    ("safety.shortened", "steps tried again shorter", ""),
+    ("linear_iterations", "iterations of linear solvers", ""),
+    ("newton_iterations", "iterations of Newton's method", ""),
+    ("path_steps", "steps of random paths", ""),
 ];
 
 /// Everything of a summary that makes a table.
@@ -79,7 +89,9 @@ pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
             Value::Object(object) if object.contains_key("message") => {}
             Value::Array(records) if records.iter().any(Value::is_object) => tables.push(of_records(key, records)),
             Value::Array(records) if records.is_empty() => {}
-            Value::Object(_) if ["work", "parallel"].contains(&key.as_str()) => {
+            // of a contraction that nobody knows
+            Value::Object(rate) if key == "rate" && rate.iter().all(|(key, v)| key == "stride" || v.is_null()) => {}
+            Value::Object(_) if ["work", "parallel", "safety"].contains(&key.as_str()) => {
                 // what stayed at nought was not needed
                 loose.extend(flat(value, key).into_iter().filter(|(_, v)| v.as_f64() != Some(0.0)));
             }
@@ -110,7 +122,8 @@ fn of_records(key: &str, records: &[Value]) -> Table {
         }
     }
     // what no record knows is no row
-    paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && !value.is_null()));
+    let said = |path: &str, value: &Value| !value.is_null() && !(path == "interface.sweeps" && value == &0);
+    paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && said(path, value)));
     let at = |record: &[(String, Value)], path: &String| {
         record.iter().find(|(other, _)| other == path).map_or("–".into(), |(_, value)| shown(value))
     };
@@ -230,7 +243,8 @@ mod tests {
     fn a_name_is_found_by_the_longest_end_of_its_path() {
         assert_eq!(name("front.error_linf"), "largest error of the front");
         assert_eq!(name("interface.contraction.observed"), "contraction, observed");
-        assert_eq!(name("work.newton_iterations"), "newton iterations");
+        assert_eq!(name("work.newton_iterations"), "iterations of Newton's method");
+        assert_eq!(name("work.rejected_steps"), "rejected steps");
     }
 
     /// Three reports stand side by side, a hundred iterations below each other; a record may lack a value.

@@ -137,7 +137,10 @@ impl Packed {
             json["name"] = name.into();
             // only around a periodic axis something changes at its beginning
             let cuts = [0, 1].map(|d| mesh.cuts[d].iter().filter(|&&cut| cut > 0 || wraps(d)).collect::<Vec<_>>());
-            json["cuts"] = json!(cuts);
+            json["cuts"] = match run.front() {
+                Some(front) if front <= self.first.cells[1] => json!([[], [(front + self.stride / 2) / self.stride]]),
+                _ => json!(cuts),
+            };
             json["data"] = mesh.data.as_str().into();
             json
         });
@@ -149,6 +152,7 @@ impl Packed {
             "cells": self.first.cells, "stride": self.stride,
             "lower": lower, "extent": [upper[0] - lower[0], upper[1] - lower[1]],
             "periodic": [wraps(0), wraps(1)],
+            "between": if run.front().is_some() { "front" } else { "subdomains" },
             "maps": maps, "meshes": meshes.collect::<Vec<_>>(),
         })
     }

@@ -376,7 +376,11 @@ impl Simulation {
 
     fn report(&self, state: &State, mass_at_start: f64, interface: Option<Interface>) -> Report {
         let mass = self.physics.conserved(&state.mesh, &state.u);
-        let drift = if mass_at_start == 0.0 { mass } else { (mass - mass_at_start) / mass_at_start.abs() };
+        // an integral that began with nothing but rounding is no measure
+        let [width, height] = state.mesh.extent();
+        let rounding = 1e-12 * width * height * largest(state.u.values());
+        let size = if mass_at_start.abs() > rounding { mass_at_start.abs() } else { 1.0 };
+        let drift = (mass - mass_at_start) / size;
         let (quality, error) = self.assess(state);
         Report { t: state.t, error, quality, conserved: Conserved { mass, drift }, interface, comparison: None }
     }

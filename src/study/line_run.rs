@@ -194,6 +194,8 @@ const PLACES: usize = 20_000;
 const NOTICEABLE: f64 = 0.2;
 /// Points of a curve.
 const DRAWN: usize = 400;
+/// Places between two nodes at which M is drawn.
+const BETWEEN: usize = 8;
 /// Paths of nodes drawn in time.
 const PATHS: usize = 40;
 
@@ -512,6 +514,7 @@ fn keep(study: &EquidistributionStudy, line: &Line, directory: &RunDirectory, ev
         if study.time.is_some() { paths(study, line, evolution) } else { mapping(study, line, evolution) },
     )];
     pictures.extend(evolution.last.as_ref().map(|history| ("convergence", convergence(&study.study.name, history))));
+    pictures.push(("density", density(study, line, evolution)?));
     for (name, figure) in pictures {
         figure.draw().write(directory.path(), name)?;
     }
@@ -588,10 +591,36 @@ fn paths(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> F
     }
 }
 
+/// M over x, and where the nodes stand on it.
+fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Result<Figure> {
+    let (mesh, t) = (evolution.mesh(), *evolution.times.last().unwrap_or(&0.0));
+    // between nodes too: a layer may lie there
+    let between =
+        |w: &[f64]| (0..BETWEEN).map(|k| w[0] + (w[1] - w[0]) * k as f64 / BETWEEN as f64).collect::<Vec<_>>();
+    let mut x: Vec<f64> = mesh.windows(2).flat_map(between).chain(mesh.last().copied()).collect();
+    // an iterate that is none may leave the line, where M need not be known
+    x.retain(|x| (line.ends[0]..=line.ends[1]).contains(x));
+    x.sort_by(f64::total_cmp);
+    let m = line.density.at_each(t, &x).map_err(|failure| Error::Failed { failure, moment: None })?;
+    let all: Vec<[f64; 2]> = x.iter().zip(&m).map(|(x, m)| [*x, m[0]]).collect();
+    let nodes: Vec<[f64; 2]> = all.iter().filter(|p| mesh.contains(&p[0])).copied().collect();
+    let [low, high] = all.iter().fold([f64::INFINITY, 0.0], |[l, h]: [f64; 2], p| [l.min(p[1]), h.max(p[1])]);
+    let when = study.time.as_ref().map_or(String::new(), |_| format!(", t = {t}"));
+    let mut curves = vec![Curve { name: "M".into(), points: all, plain: true, ..Curve::default() }.outlined()];
+    if nodes.len() <= DRAWN {
+        curves.push(Curve { name: "nodes".into(), points: nodes, scattered: true, ..Curve::default() });
+    }
+    Ok(Figure {
+        title: format!("{}, the density and the nodes{when}", study.study.name),
+        labels: ["x".into(), "M".into()],
+        scales: [Scale::Linear, if high > 30.0 * low { Scale::Logarithmic } else { Scale::Linear }],
+        curves,
+    })
+}
+
 /// Errors over iterations, beside what theory says.
 fn convergence(title: &str, history: &History) -> Figure {
     let errors: Vec<[f64; 2]> = history.iterates.iter().enumerate().map(|(n, it)| [n as f64, it.error]).collect();
-    let points = thinned(errors.len(), DRAWN).map(|n| errors[n]).collect();
     let last = errors.len() - 1;
     let floor = errors.iter().map(|e| e[1]).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
     let line = |name: &str, rate: Option<f64>, [n, error]: [f64; 2]| {
@@ -600,10 +629,14 @@ fn convergence(title: &str, history: &History) -> Figure {
         let points = points.filter(|p| (0.1 * floor..10.0 * errors[0][1].max(floor)).contains(&p[1])).collect();
         Some(Curve { name: format!("{name}, {rate:.4} in two"), points, plain: true, ..Curve::default() })
     };
-    let mut curves = vec![Curve { name: "error".into(), points, ..Curve::default() }];
-    // what is predicted holds in the end, a bound from the start, for even iterates and odd ones apart
-    curves.extend(line("predicted", history.prediction.predicted, errors[last]));
-    curves.extend(line("bound", history.prediction.bound, [0.0, errors[0][1].max(errors[1.min(last)][1])]));
+    let mut curves = vec![Curve { name: "error".into(), points: errors.clone(), ..Curve::default() }.outlined()];
+    // slopes: what is predicted holds in the end, a bound from the start, for even iterates and odd ones apart
+    curves.extend(line("slope predicted", history.prediction.predicted, errors[last]));
+    curves.extend(line(
+        "slope of the bound",
+        history.prediction.bound,
+        [0.0, errors[0][1].max(errors[1.min(last)][1])],
+    ));
     Figure {
         title: format!("{title}, convergence"),
         labels: ["iterations".into(), "distance to the single-domain mesh".into()],

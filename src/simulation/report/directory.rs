@@ -20,7 +20,7 @@ pub struct RunDirectory {
 const LOCK: &str = "run.lock";
 
 /// Everything that a run may write, beside its frames.
-const OURS: [&str; 29] = [
+const OURS: [&str; 31] = [
     "summary.json",
     "study.toml",
     "history.csv",
@@ -33,6 +33,8 @@ const OURS: [&str; 29] = [
     "mesh.svg",
     "convergence.png",
     "convergence.svg",
+    "density.png",
+    "density.svg",
     "front.csv",
     "front.png",
     "front.svg",

@@ -1,4 +1,4 @@
-use super::picture::{Canvas, FONT, Picture};
+use super::picture::{Canvas, FONT, Picture, Ticks};
 use plotters::coord::combinators::LogCoord;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
@@ -42,6 +42,8 @@ pub struct Curve {
     pub plain: bool,
     /// Thin and grey: what is there beside what is meant.
     pub faint: bool,
+    /// Marks without a line.
+    pub scattered: bool,
 }
 
 /// Colours that are told apart by everybody: Okabe and Ito (2008).
@@ -56,6 +58,8 @@ const COLOURS: [RGBColor; 6] = [
 const SIZE: (u32, u32) = (760, 520);
 /// Parts of a pixel: the drawing library places by whole numbers.
 const FINE: u32 = 8;
+/// Narrow stretches along the bottom of a plot.
+const STRETCHES: f64 = 200.0;
 /// More marks than this are small.
 const MANY: usize = 40;
 /// Size of the plot itself, of a row of the legend, and of what is beside its words, in pixels; a letter is so wide at most.
@@ -69,6 +73,29 @@ const LETTERS: f64 = 80.0;
 const BETWEEN: usize = 16;
 /// Room around the points, as a factor.
 const ROOM: f64 = 1.1;
+
+impl Curve {
+    /// As few points as show the same, with their order along the bottom: of each narrow stretch its first and last, its
+    /// lowest and its highest.
+    pub(crate) fn outlined(mut self) -> Self {
+        let ends = [self.points.first(), self.points.last()].map(|end| end.map_or(0.0, |p| p[0]));
+        let stretch = |p: &[f64; 2]| ((p[0] - ends[0]) / (ends[1] - ends[0]) * STRETCHES).floor();
+        if self.points.len() as f64 <= 2.0 * STRETCHES {
+            return self;
+        }
+        let outline = |part: &[[f64; 2]]| {
+            let places = || (0..part.len()).map(|k| (k, part[k][1]));
+            let low = places().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k);
+            let high = places().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k);
+            let mut kept = vec![0, low, high, part.len() - 1];
+            kept.sort_unstable();
+            kept.dedup();
+            kept.into_iter().map(|k| part[k]).collect::<Vec<_>>()
+        };
+        self.points = self.points.chunk_by(|a, b| stretch(a) == stretch(b)).flat_map(outline).collect();
+        self
+    }
+}
 
 impl Figure {
     /// Draws it.
@@ -133,6 +160,12 @@ impl Figure {
             Scale::Linear if low == high => [low - 0.5, high + 0.5],
             Scale::Linear => [low, high],
         }
+    }
+
+    /// Lines between the numbers of an axis: on those that show powers.
+    fn between(&self, d: usize) -> usize {
+        let [low, high] = self.ends(d);
+        if self.scales[d] == Scale::Logarithmic && high > 20.0 * low { 10 } else { 1 }
     }
 
     /// What a curve goes through, as it is drawn.
@@ -207,26 +240,30 @@ impl Figure {
             .x_label_area_size(46 * FINE)
             .y_label_area_size(74 * FINE)
             .build_cartesian_2d(x, y)?;
-        let [along, up] = self.scales;
+        let plain =
+            [0, 1].map(|d| (self.scales[d] == Scale::Linear).then(|| Ticks::between(self.ends(d)[0], self.ends(d)[1])));
+        let names =
+            [0, 1].map(|d| plain[d].as_ref().map_or(self.labels[d].clone(), |ticks| ticks.named(&self.labels[d])));
+        let label = |value: f64, d: usize| plain[d].as_ref().map_or_else(|| power(value), |ticks| ticks.label(value));
         chart
             .configure_mesh()
-            .x_desc(&self.labels[0])
-            .y_desc(&self.labels[1])
+            .x_desc(&names[0])
+            .y_desc(&names[1])
             .label_style(font(14))
             .axis_desc_style(font(15))
             .axis_style(BLACK.stroke_width(FINE))
             .set_all_tick_mark_size(5 * FINE)
             .bold_line_style(BLACK.mix(0.15).stroke_width(FINE))
             .light_line_style(BLACK.mix(0.04).stroke_width(FINE))
-            .x_max_light_lines(between(along))
-            .y_max_light_lines(between(up))
-            .x_label_formatter(&|x| label(*x, along))
-            .y_label_formatter(&|y| label(*y, up))
+            .x_max_light_lines(self.between(0))
+            .y_max_light_lines(self.between(1))
+            .x_label_formatter(&|x| label(*x, 0))
+            .y_label_formatter(&|y| label(*y, 1))
             .draw()?;
         for (curve, colour) in self.curves.iter().zip(COLOURS.iter().cycle()) {
             let measured = || curve.points.iter().filter(|p| self.shown(p)).map(|p| (p[0], p[1]));
             let open = || curve.extrapolated.iter().filter(|p| self.shown(p)).map(|p| (p[0], p[1]));
-            let line = self.line(curve).into_iter().map(|[x, y]| (x, y));
+            let line = self.line(curve).into_iter().filter(|_| !curve.scattered).map(|[x, y]| (x, y));
             let style = if curve.faint { BLACK.mix(0.25).stroke_width(FINE) } else { colour.stroke_width(2 * FINE) };
             let drawn = chart.draw_series(LineSeries::new(line, style))?;
             if !curve.name.is_empty() {
@@ -276,17 +313,8 @@ fn whole(x: f64, round: fn(f64) -> f64) -> f64 {
     10_f64.powf(round(x.log10()))
 }
 
-/// Lines between the numbers of an axis.
-fn between(scale: Scale) -> usize {
-    if scale == Scale::Linear { 1 } else { 10 }
-}
-
-/// A number on an axis, as 0.01 or as 1e-5; nothing for those that would stand too close together.
-fn label(x: f64, scale: Scale) -> String {
-    if scale == Scale::Linear {
-        // a sum of steps has rounding in it
-        return format!("{}", (x * 1e9).round() / 1e9);
-    }
+/// A number on a logarithmic axis, as 0.01 or as 1e-5; nothing for those that would stand too close together.
+fn power(x: f64) -> String {
     let text = format!("{x:.3e}").replacen(".000e", "e", 1);
     match text.split('e').next() {
         Some("1" | "2" | "5") if (0.0099..1.1e4).contains(&x) => format!("{}", (x * 1e6).round() / 1e6),
@@ -298,6 +326,22 @@ fn label(x: f64, scale: Scale) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A single spike among ten thousand values is drawn, and a jump stands where it is, also where most values stand before
+    /// it.
+    #[test]
+    fn an_outline_keeps_spikes_and_jumps() {
+        let values = (0..10_000).map(|k| [k as f64, if k == 4321 { 50.0 } else { 1.0 }]);
+        let curve = Curve { points: values.collect(), ..Curve::default() }.outlined();
+        assert!(curve.points.len() <= 4 * 201 && curve.points.contains(&[4321.0, 50.0]));
+        assert!(curve.points.is_sorted_by(|a, b| a[0] <= b[0]));
+        // few values up to 0.9, and thousands from there on
+        let jump = (0..90).map(|k| [k as f64 / 100.0, 1.0]).chain((0..5000).map(|k| [0.9 + k as f64 * 2e-5, 7.0]));
+        let curve = Curve { points: jump.collect(), ..Curve::default() }.outlined();
+        for p in (0..90).map(|k| [k as f64 / 100.0, 1.0]).chain([[0.9, 7.0]]) {
+            assert!(curve.points.contains(&p), "{p:?} is lost");
+        }
+    }
 
     /// Curves through all four corners: the axis goes further up, and the legend stands above them.
     #[test]

@@ -56,6 +56,9 @@ pub(super) const BOTTOM: f64 = 64.0;
 pub(super) const BAR: f64 = 24.0;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
+/// Opacities of mesh lines, and what a cell beside them has of it for each unit that it is wide.
+const STRENGTHS: [f64; 4] = [0.1, 0.25, 0.4, 0.6];
+const FADES: f64 = 0.08;
 /// Bytes of a part of a PNG.
 const CHUNK: usize = 1 << 16;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
@@ -199,30 +202,47 @@ fn svg(sheet: &Sheet<'_>) -> String {
     }
     s.push_str("</g>\n");
 
-    // mesh lines, light on dark colours and dark on light ones; one pixel of the PNG wide, which is drawn fast
-    let mut paths = [String::new(), String::new()];
+    // mesh lines, light on dark colours and dark on light ones, fainter where cells are few pixels wide, so that the colours
+    // stay what they are; one pixel of the PNG wide, which is drawn fast
+    let mut paths = [false, true].map(|_| STRENGTHS.map(|_| String::new()));
     let light = |a: usize, b: usize| 0.5 * (u[a] + u[b]) - low < 0.6 * (high - low);
-    let mut mesh_line = |nodes: &[usize]| {
-        let edges: Vec<(&[usize], bool)> = nodes.windows(2).map(|e| (e, light(e[0], e[1]))).collect();
+    let strength = |a: usize, b: usize, beside: usize| {
+        let [a, b, c] = [a, b, beside].map(|k| to(x[k]));
+        let [e, f] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
+        let wide = (e[0] * f[1] - e[1] * f[0]).abs() / e[0].hypot(e[1]);
+        STRENGTHS.iter().rposition(|strength| FADES * wide >= *strength)
+    };
+    let mut mesh_line = |nodes: &[usize], beside: &[usize]| {
+        let look = |(e, c): (&'_ [usize], &usize)| Some((light(e[0], e[1]), strength(e[0], e[1], *c)?));
+        let edges: Vec<(&[usize], Option<(bool, usize)>)> =
+            nodes.windows(2).zip(beside).map(|(e, c)| (e, look((e, c)))).collect();
         for part in edges.chunk_by(|(_, before), (_, after)| before == after) {
+            let Some((light, strength)) = part[0].1 else { continue };
             let seen = |shift: &&[f64; 2]| part.iter().any(|(edge, _)| shown(edge, **shift));
             for &shift in shifts.iter().filter(seen) {
                 let nodes = [part[0].0[0]].into_iter().chain(part.iter().map(|(edge, _)| edge[1]));
-                through(&mut paths[usize::from(part[0].1)], &mut { nodes }, shift);
+                through(&mut paths[usize::from(light)][strength], &mut { nodes }, shift);
             }
         }
     };
-    for &i in &lines[0] {
-        mesh_line(&lines[1].iter().map(|&j| at(i, j)).collect::<Vec<_>>());
+    let neighbours = |lines: &[usize]| -> Vec<[usize; 2]> {
+        (0..lines.len()).map(|k| [lines[k], lines[if k + 1 < lines.len() { k + 1 } else { k - 1 }]]).collect()
+    };
+    for [i, beside] in neighbours(&lines[0]) {
+        let along = |i: usize| lines[1].iter().map(|&j| at(i, j)).collect::<Vec<_>>();
+        mesh_line(&along(i), &along(beside));
     }
-    for &j in &lines[1] {
-        mesh_line(&lines[0].iter().map(|&i| at(i, j)).collect::<Vec<_>>());
+    for [j, beside] in neighbours(&lines[1]) {
+        let along = |j: usize| lines[0].iter().map(|&i| at(i, j)).collect::<Vec<_>>();
+        mesh_line(&along(j), &along(beside));
     }
-    for (path, colour) in paths.iter().zip(["black", "white"]) {
-        let _ = writeln!(
-            s,
-            "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"0.6\" stroke-width=\"0.5\"/>"
-        );
+    for (paths, colour) in paths.iter().zip(["black", "white"]) {
+        for (path, strength) in paths.iter().zip(STRENGTHS).filter(|(path, _)| !path.is_empty()) {
+            let _ = writeln!(
+                s,
+                "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"{strength}\" stroke-width=\"0.5\"/>"
+            );
+        }
     }
     if !line.is_empty() {
         let points: Vec<String> = line.iter().map(|p| point(to(*p))).collect();
@@ -329,21 +349,24 @@ pub(super) fn colour_bar(s: &mut String, unknown: &str, low: f64, high: f64, x: 
 
 /// Round values 1, 2 or 5 times a power of ten apart, four to nine of them, with short labels.
 #[derive(Debug)]
-struct Ticks {
+pub(super) struct Ticks {
     marks: Vec<(f64, String)>,
     /// What the labels are less, and the unit they are in, where they would be long.
     less: Option<String>,
     unit: Option<String>,
+    /// The same as numbers.
+    start: f64,
+    size: f64,
 }
 
 impl Ticks {
-    fn between(low: f64, high: f64) -> Self {
+    pub(super) fn between(low: f64, high: f64) -> Self {
         let span = high - low;
         let scale = low.abs().max(high.abs());
         if !(span > 1e-12 * scale && span.is_finite()) {
             let plain = low == 0.0 || (1e-3..1e5).contains(&low.abs());
             let label = if plain { format!("{low:.4}") } else { format!("{low:.3e}") };
-            return Self { marks: vec![(low, label)], less: None, unit: None };
+            return Self { marks: vec![(low, label)], less: None, unit: None, start: 0.0, size: 1.0 };
         }
         let power = 10_f64.powf((span / 4.0).log10().floor());
         let step = power * [5.0, 2.0, 1.0].into_iter().find(|m| m * power <= span / 4.0).unwrap_or(1.0);
@@ -369,11 +392,20 @@ impl Ticks {
             let value = k as f64 * step;
             (value, format!("{:.decimals$}", (value - start * ten) / unit))
         });
-        Self { marks: marks.collect(), less, unit: (exponent != 0).then(|| format!("1e{exponent}")) }
+        let named = (exponent != 0).then(|| format!("1e{exponent}"));
+        Self { marks: marks.collect(), less, unit: named, start: start * ten, size: unit }
+    }
+
+    /// The label of any place on the axis.
+    pub(super) fn label(&self, value: f64) -> String {
+        // a sum of steps has rounding in it
+        let text = format!("{:.6}", (value - self.start) / self.size);
+        let text = text.trim_end_matches('0').trim_end_matches('.');
+        if text == "-0" { "0".into() } else { text.into() }
     }
 
     /// The name of an axis with these labels.
-    fn named(&self, name: &str) -> String {
+    pub(super) fn named(&self, name: &str) -> String {
         let less = self.less.as_ref().map(|less| match less.strip_prefix('-') {
             Some(more) => format!(" + {more}"),
             None => format!(" − {less}"),

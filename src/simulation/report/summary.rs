@@ -43,6 +43,9 @@ pub struct Failed {
     pub kind: String,
     /// As shown to the user.
     pub message: String,
+    /// What may cure it, where that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub help: Option<String>,
     /// Time of the step that failed.
     pub t: Option<f64>,
     /// The step that failed.
@@ -56,7 +59,13 @@ impl From<&Error> for Failed {
             Error::Interrupted(moment) => ("interrupted", Some(*moment)),
             _ => ("unwritable", None),
         };
-        Self { kind: kind.into(), message: error.to_string(), t: moment.map(|m| m.t), step: moment.map(|m| m.step) }
+        Self {
+            kind: kind.into(),
+            message: error.to_string(),
+            help: error.help(),
+            t: moment.map(|m| m.t),
+            step: moment.map(|m| m.step),
+        }
     }
 }
 
