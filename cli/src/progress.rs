@@ -33,9 +33,8 @@ impl Progress {
 
 impl Observer for Progress {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        // a narrow terminal cuts the end
-        let of_the_bar = || words(snapshot).map(|words| words + "  ").into_iter().rev().collect::<String>();
-        let line = || words(snapshot).join("  ");
+        // beside the percentage and the smallest bar
+        let room = || usize::from(console::Term::stderr().size().1).saturating_sub(16);
         let pieces = if self.bar.is_some() { OF_THE_BAR } else { LINES };
         // a share that is a whole number of pieces up to round-off is one
         let done = (snapshot.share * pieces as f64 + 1e-9) as usize;
@@ -43,15 +42,15 @@ impl Observer for Progress {
         match &self.bar {
             Some(bar) if matches!(event, Event::Started | Event::Resumed) => {
                 bar.set_length(pieces as u64);
-                bar.set_message(of_the_bar().trim_start().to_string());
+                bar.set_message(fitting(&words(snapshot), room()));
             }
             Some(bar) if news => {
                 bar.set_position(done as u64);
-                bar.set_message(of_the_bar().trim_start().to_string());
+                bar.set_message(fitting(&words(snapshot), room()));
             }
             Some(bar) if event == Event::Finished => bar.set_message("comparing, drawing and writing the report"),
             None if event == Event::Resumed || event == Event::Stepped && news => {
-                let _ = writeln!(stderr(), "{}", line().trim_end());
+                let _ = writeln!(stderr(), "{}", words(snapshot).join("  "));
             }
             _ => {}
         }
@@ -59,20 +58,31 @@ impl Observer for Progress {
     }
 }
 
-/// Where a run is and how fast, and for how long still, as far as the time simulated so far tells.
-fn words(snapshot: &Snapshot<'_>) -> [String; 2] {
+/// Where a run is, how fast, and for how long still, as far as the time simulated so far tells; what matters most comes first.
+fn words(snapshot: &Snapshot<'_>) -> Vec<String> {
     let (state, jacobian) = (snapshot.state, snapshot.quality.min_scaled_jacobian);
-    let mut text = format!("t = {:.4}  step {}", state.t, state.step);
-    if let Some(steps) = snapshot.steps {
-        text += &format!(" of {steps}");
+    let of = snapshot.steps.map_or(String::new(), |steps| format!(" of {steps}"));
+    let mut words =
+        vec![format!("t = {:.4}", state.t), format!("step {}{of}", state.step), format!("min J {jacobian:.3}")];
+    if snapshot.share > 0.0 && snapshot.share < 1.0 {
+        words.push(format!("{} left", duration(snapshot.seconds * (1.0 - snapshot.share) / snapshot.share)));
     }
     if state.step > 0 && snapshot.seconds > 0.0 {
-        text += &format!("  {} steps/s", rate(state.step as f64 / snapshot.seconds));
+        words.push(format!("{} steps/s", rate(state.step as f64 / snapshot.seconds)));
     }
-    text += &format!("  min J {jacobian:.3}");
-    let remains = (snapshot.share > 0.0 && snapshot.share < 1.0)
-        .then(|| format!("{} left", duration(snapshot.seconds * (1.0 - snapshot.share) / snapshot.share)));
-    [text, remains.unwrap_or_default()]
+    words
+}
+
+/// As many words as there is room for: none is cut.
+fn fitting(words: &[String], room: usize) -> String {
+    let mut text = String::new();
+    for word in words {
+        if text.chars().count() + word.chars().count() > room {
+            break;
+        }
+        text += &format!("{word}  ");
+    }
+    text.trim_end().to_string()
 }
 
 /// Two digits of a number of steps a second.
@@ -94,6 +104,14 @@ fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_narrow_terminal_leaves_words_out_and_cuts_none() {
+        let words = ["t = 1", "step 5 of 9", "3 s left"].map(String::from);
+        for (room, text) in [(80, "t = 1  step 5 of 9  3 s left"), (27, "t = 1  step 5 of 9"), (5, "t = 1"), (3, "")] {
+            assert_eq!(fitting(&words, room), text);
+        }
+    }
 
     #[test]
     fn what_remains_is_told_in_the_unit_that_fits() {

@@ -39,13 +39,21 @@ pub fn build(directory: &Path) -> Result<Built> {
 fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {
     let plots = plots::of(&run);
     let pictures = || {
-        let mut canvas = Canvas::default();
-        let drawn = plots.iter().map(|(name, figure)| {
-            let svg = figure.svg();
-            Picture::of(&svg, &mut canvas).write(directory, name)?;
-            Ok(page::Plot { title: figure.title.clone(), svg })
-        });
-        drawn.collect::<Result<Vec<_>>>()
+        // one is drawn while the disk takes the one before
+        std::thread::scope(|scope| {
+            let mut canvas = Canvas::default();
+            let drawn = plots.iter().map(|(name, figure)| {
+                let svg = figure.svg();
+                let picture = Picture::of(&svg, &mut canvas);
+                let written = scope.spawn(move || picture.write(directory, name));
+                (page::Plot { title: figure.title.clone(), svg }, written)
+            });
+            let drawn: Vec<_> = drawn.collect();
+            let finished = drawn.into_iter().map(|(plot, written)| {
+                written.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map(|()| plot)
+            });
+            finished.collect::<Result<Vec<_>>>()
+        })
     };
     let (drawn, viewer) = join(pictures, || viewer::Viewer::of(&mut run));
     let drawn = drawn?;
