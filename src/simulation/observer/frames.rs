@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 /// When frames are written; the first and the last state are always among them.
@@ -68,8 +69,45 @@ pub struct Frames {
     nodes: [Option<(f64, Vec<[f64; 2]>)>; 2],
     /// Times and steps of the frames.
     written: Vec<(f64, usize)>,
-    /// A frame that is being compressed and written while the run goes on.
-    writing: Option<JoinHandle<Result<()>>>,
+    /// Compresses and writes frames while the run goes on.
+    writer: Option<Writer>,
+}
+
+/// A thread beside the run that writes one frame at a time; starting one a frame would cost more than to prepare the frame.
+#[derive(Debug)]
+struct Writer {
+    jobs: Sender<Job>,
+    outcomes: Receiver<Result<()>>,
+    thread: JoinHandle<()>,
+    busy: bool,
+}
+
+type Job = Box<dyn FnOnce() -> Result<()> + Send>;
+
+impl Writer {
+    fn start() -> Self {
+        let (jobs, waiting) = channel::<Job>();
+        let (done, outcomes) = channel();
+        let thread = std::thread::spawn(move || {
+            let _ = waiting.into_iter().try_for_each(|job| done.send(job()));
+        });
+        Self { jobs, outcomes, thread, busy: false }
+    }
+
+    /// Hands over a frame, when the one before is written.
+    fn write(&mut self, job: Job) {
+        self.busy = true;
+        // a thread that is no more is noticed where it is waited for
+        let _ = self.jobs.send(job);
+    }
+
+    /// Ends the thread, with its panic where it had one.
+    fn end(self) {
+        drop(self.jobs);
+        if let Err(panic) = self.thread.join() {
+            std::panic::resume_unwind(panic);
+        }
+    }
 }
 
 /// What frames to come depend on, beside the state.
@@ -109,7 +147,7 @@ impl Frames {
             grid: None,
             nodes: [None, None],
             written: Vec::new(),
-            writing: None,
+            writer: None,
         })
     }
 
@@ -148,7 +186,7 @@ impl Frames {
         let series = self.series();
         let grid = self.grid.get_or_insert_with(|| Arc::new(vtu::Grid::new(lattice.cells()))).clone();
         let [frame, index] = [self.name(state.step).as_str(), self.names[1]].map(|name| self.directory.join(name));
-        self.writing = Some(std::thread::spawn(move || {
+        self.writer.get_or_insert_with(Writer::start).write(Box::new(move || {
             write_file(&frame, grid.document(&points, &nodes, &cells).as_bytes())?;
             write_file(&index, series.as_bytes())
         }));
@@ -206,10 +244,17 @@ impl Frames {
     }
 
     fn wait(&mut self) -> Result<()> {
-        match self.writing.take().map(JoinHandle::join) {
+        let wanted = self.writer.as_mut().filter(|writer| writer.busy).map(|writer| {
+            writer.busy = false;
+            writer.outcomes.recv()
+        });
+        match wanted {
             None => Ok(()),
             Some(Ok(written)) => written,
-            Some(Err(panic)) => std::panic::resume_unwind(panic),
+            Some(Err(_)) => {
+                self.writer.take().into_iter().for_each(Writer::end);
+                Ok(())
+            }
         }
     }
 
@@ -258,5 +303,6 @@ impl Drop for Frames {
     /// A run that ends early leaves no thread behind.
     fn drop(&mut self) {
         let _ = self.wait();
+        self.writer.take().into_iter().for_each(Writer::end);
     }
 }
