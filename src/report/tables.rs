@@ -122,7 +122,7 @@ fn of_records(key: &str, records: &[Value]) -> Table {
         }
     }
     // what no record knows is no row
-    let said = |path: &str, value: &Value| !value.is_null() && !(path == "interface.sweeps" && value == &0);
+    let said = |path: &str, value: &Value| !(value.is_null() || path == "interface.sweeps" && *value == 0);
     paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && said(path, value)));
     let at = |record: &[(String, Value)], path: &String| {
         record.iter().find(|(other, _)| other == path).map_or("–".into(), |(_, value)| shown(value))

@@ -213,9 +213,8 @@ fn svg(sheet: &Sheet<'_>) -> String {
         STRENGTHS.iter().rposition(|strength| FADES * wide >= *strength)
     };
     let mut mesh_line = |nodes: &[usize], beside: &[usize]| {
-        let look = |(e, c): (&'_ [usize], &usize)| Some((light(e[0], e[1]), strength(e[0], e[1], *c)?));
-        let edges: Vec<(&[usize], Option<(bool, usize)>)> =
-            nodes.windows(2).zip(beside).map(|(e, c)| (e, look((e, c)))).collect();
+        let look = |e: &[usize], c: usize| Some((light(e[0], e[1]), strength(e[0], e[1], c)?));
+        let edges: Vec<_> = nodes.windows(2).zip(beside).map(|(e, &c)| (e, look(e, c))).collect();
         for part in edges.chunk_by(|(_, before), (_, after)| before == after) {
             let Some((light, strength)) = part[0].1 else { continue };
             let seen = |shift: &&[f64; 2]| part.iter().any(|(edge, _)| shown(edge, **shift));
