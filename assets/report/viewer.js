@@ -108,7 +108,7 @@ function number(v, digits = 6) {
 }
 
 /** A time: of those far from 0, all digits that tell frames apart. */
-const moment = (t) => (Math.abs(t) < 1e12 ? String(+t.toPrecision(12)).replace(/-/g, "−") : number(t));
+const moment = (t) => (Math.abs(t) < 1e12 ? String(+t.toPrecision(10)).replace(/-/g, "−") : number(t));
 
 /** A value without the digits that are lost between so many levels of a range. */
 function rounded(v, { low, high }) {
@@ -374,7 +374,7 @@ class Viewer {
     const [t, place] = this.placeOf(mesh);
     stage.place = place;
     const theirs = Number.isInteger(place) ? mesh.times[place] : t;
-    const pair = this.stages.length > 1 || !this.controls.now, role = stage.m ? "compared with: " : "generator: ";
+    const pair = this.data.timed && (this.stages.length > 1 || !this.controls.now), role = stage.m ? "compared with: " : "generator: ";
     stage.caption.textContent = [mesh.name && role + mesh.name, pair && `t\u00a0=\u00a0${moment(theirs)}`].filter(Boolean).join(", ");
     stage.caption.hidden = !stage.caption.textContent;
 
@@ -437,7 +437,9 @@ class Viewer {
     context.rect(left, top, w, h);
     context.clip();
     context.lineJoin = "round";
-    for (const [colour, thick] of [["rgba(0,0,0,.8)", 3.6], ["#fff", 1.6]]) {
+    // told from mesh lines, also where there is no colour below
+    const core = this.data.between === "front" ? "#f28e2b" : levels ? "#fff" : "#2a8fd0";
+    for (const [colour, thick] of [["rgba(0,0,0,.8)", 3.6], [core, 2]]) {
       Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
       for (const cut of cuts) {
         context.beginPath();
@@ -488,7 +490,7 @@ class Viewer {
     context.restore();
     const what = field === "nothing" ? "the mesh" : `the mesh over ${symbol(field)}`;
     const lattice = `${(n - 1) * stride} by ${(m - 1) * stride} cells`;
-    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, at t = ${moment(theirs)}, from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
+    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, ${this.data.timed ? `at t = ${moment(theirs)}, ` : ""}from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
   }
 
   drawBar({ low, high, log }) {

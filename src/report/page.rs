@@ -103,7 +103,7 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
 fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
     let candidates = [
         ("mesh", "The mesh", !viewed),
-        ("density", "The density and the nodes", true),
+        ("density", "The density", true),
         ("convergence", "Convergence", true),
         ("front", "The front over time", true),
     ];

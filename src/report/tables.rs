@@ -26,7 +26,7 @@ const ELSEWHERE: [&str; 8] = ["schema", "study", "kind", "version", "status", "s
 const MANY: usize = 8;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 42] = [
+const NAMES: [(&str, &str, &str); 45] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -40,7 +40,7 @@ const NAMES: [(&str, &str, &str); 42] = [
         "over that of equal cells; positive as long as no cell is folded",
     ),
     ("quality.equidistribution", "equidistribution", "largest over mean density × size of a cell; 1 is perfect"),
-    ("quality.shortest_cell", "shortest cell", "over the mean one"),
+    ("quality.shortest_cell", "shortest cell", "over the mean one; negative where nodes have changed their order"),
     ("quality.error_linf", "largest distance from the exact mesh", ""),
     ("conserved.mass", "integral of the first unknown", ""),
     ("conserved.drift", "change of the integral", "since the start, over its size there"),
@@ -59,7 +59,7 @@ const NAMES: [(&str, &str, &str); 42] = [
     ("comparison.r_mean", "mean Q, reference over this mesh", ""),
     ("comparison.cell_max", "… largest in one cell", ""),
     ("comparison.mesh_rms", "distance of the meshes", "root mean square over the nodes"),
-    ("rate.stride", "… in so many iterations", ""),
+    ("rate.stride", "iterations that these factors are for", ""),
     ("rate.bound", "predicted bound", ""),
     ("front.mean", "mean height of the front", ""),
     ("front.range", "its lowest and highest point", ""),
@@ -68,6 +68,9 @@ const NAMES: [(&str, &str, &str); 42] = [
     ("energy_imbalance_by_differences", "… with fluxes by differences", ""),
     ("step_limit", "longest stable step", "of the explicit front, as estimated"),
     ("error_linf", "largest error", "against the discrete solution on one domain"),
+    ("increment", "increment", "largest way of a node since the iteration before"),
+    ("interpolation_error", "interpolation error", "largest error of linear interpolation on the glued mesh"),
+    ("largest_jump", "largest jump", "twice the largest change of u over a cell"),
     ("points_per_second", "stencils a second", ""),
     ("nonnegative_fraction", "share without negative weights", ""),
     ("exact_degree", "exact to degree", "of polynomials"),

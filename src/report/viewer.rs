@@ -153,6 +153,7 @@ impl Packed {
             "lower": lower, "extent": [upper[0] - lower[0], upper[1] - lower[1]],
             "periodic": [wraps(0), wraps(1)],
             "between": if run.front().is_some() { "front" } else { "subdomains" },
+            "timed": run.word("kind") != "poisson",
             "maps": maps, "meshes": meshes.collect::<Vec<_>>(),
         })
     }

@@ -513,7 +513,7 @@ fn keep(study: &EquidistributionStudy, line: &Line, directory: &RunDirectory, ev
         "mesh",
         if study.time.is_some() { paths(study, line, evolution) } else { mapping(study, line, evolution) },
     )];
-    pictures.extend(evolution.last.as_ref().map(|history| ("convergence", convergence(&study.study.name, history))));
+    pictures.extend(evolution.last.as_ref().map(|history| ("convergence", convergence(study, history))));
     pictures.push(("density", density(study, line, evolution)?));
     for (name, figure) in pictures {
         figure.draw().write(directory.path(), name)?;
@@ -606,12 +606,13 @@ fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) ->
     let nodes: Vec<[f64; 2]> = all.iter().filter(|p| mesh.contains(&p[0])).copied().collect();
     let [low, high] = all.iter().fold([f64::INFINITY, 0.0], |[l, h]: [f64; 2], p| [l.min(p[1]), h.max(p[1])]);
     let when = study.time.as_ref().map_or(String::new(), |_| format!(", t = {t}"));
+    let what = if nodes.len() <= DRAWN { "the density and the nodes" } else { "the density" };
     let mut curves = vec![Curve { name: "M".into(), points: all, plain: true, ..Curve::default() }.outlined()];
     if nodes.len() <= DRAWN {
         curves.push(Curve { name: "nodes".into(), points: nodes, scattered: true, ..Curve::default() });
     }
     Ok(Figure {
-        title: format!("{}, the density and the nodes{when}", study.study.name),
+        title: format!("{}, {what}{when}", study.study.name),
         labels: ["x".into(), "M".into()],
         scales: [Scale::Linear, if high > 30.0 * low { Scale::Logarithmic } else { Scale::Linear }],
         curves,
@@ -619,7 +620,7 @@ fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) ->
 }
 
 /// Errors over iterations, beside what theory says.
-fn convergence(title: &str, history: &History) -> Figure {
+fn convergence(study: &EquidistributionStudy, history: &History) -> Figure {
     let errors: Vec<[f64; 2]> = history.iterates.iter().enumerate().map(|(n, it)| [n as f64, it.error]).collect();
     let last = errors.len() - 1;
     let floor = errors.iter().map(|e| e[1]).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
@@ -638,7 +639,7 @@ fn convergence(title: &str, history: &History) -> Figure {
         [0.0, errors[0][1].max(errors[1.min(last)][1])],
     ));
     Figure {
-        title: format!("{title}, convergence"),
+        title: format!("{}, convergence{}", study.study.name, study.time.as_ref().map_or("", |_| " in the last step")),
         labels: ["iterations".into(), "distance to the single-domain mesh".into()],
         scales: [Scale::Linear, Scale::Logarithmic],
         curves,

@@ -71,6 +71,8 @@ const LETTER: f64 = 7.0;
 const LETTERS: f64 = 80.0;
 /// Places on a line between two points that are looked at.
 const BETWEEN: usize = 16;
+/// Room above and below a curve, as a share.
+const EDGE: f64 = 0.02;
 /// Room around the points, as a factor.
 const ROOM: f64 = 1.1;
 
@@ -158,6 +160,8 @@ impl Figure {
                 [whole(low / ROOM, f64::floor) * (1.0 - 1e-9), whole(high * ROOM, f64::ceil) * (1.0 + 1e-9)]
             }
             Scale::Linear if low == high => [low - 0.5, high + 0.5],
+            // a curve does not lie on the frame
+            Scale::Linear if d == 1 => [low - EDGE * (high - low), high + EDGE * (high - low)],
             Scale::Linear => [low, high],
         }
     }
