@@ -514,7 +514,7 @@ fn keep(study: &EquidistributionStudy, line: &Line, directory: &RunDirectory, ev
         if study.time.is_some() { paths(study, line, evolution) } else { mapping(study, line, evolution) },
     )];
     pictures.extend(evolution.last.as_ref().map(|history| ("convergence", convergence(study, history))));
-    pictures.push(("density", density(study, line, evolution)?));
+    pictures.push(("density", density(study, line, evolution)));
     for (name, figure) in pictures {
         figure.draw().write(directory.path(), name)?;
     }
@@ -591,32 +591,36 @@ fn paths(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> F
     }
 }
 
-/// M over x, and where the nodes stand on it.
-fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Result<Figure> {
+/// M over x, and where the nodes stand on it; nothing where M has no value.
+fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Figure {
     let (mesh, t) = (evolution.mesh(), *evolution.times.last().unwrap_or(&0.0));
+    // an iterate that is none may leave the line, where M need not be known
+    let place = |x: f64| {
+        let [m, _] = line.density.at(t, x).ok()?;
+        (line.ends[0]..=line.ends[1]).contains(&x).then_some([x, m])
+    };
     // between nodes too: a layer may lie there
+    let kept: Vec<f64> = thinned(mesh.len(), DRAWN).map(|i| mesh[i]).collect();
     let between =
         |w: &[f64]| (0..BETWEEN).map(|k| w[0] + (w[1] - w[0]) * k as f64 / BETWEEN as f64).collect::<Vec<_>>();
-    let mut x: Vec<f64> = mesh.windows(2).flat_map(between).chain(mesh.last().copied()).collect();
-    // an iterate that is none may leave the line, where M need not be known
-    x.retain(|x| (line.ends[0]..=line.ends[1]).contains(x));
-    x.sort_by(f64::total_cmp);
-    let m = line.density.at_each(t, &x).map_err(|failure| Error::Failed { failure, moment: None })?;
-    let all: Vec<[f64; 2]> = x.iter().zip(&m).map(|(x, m)| [*x, m[0]]).collect();
-    let nodes: Vec<[f64; 2]> = all.iter().filter(|p| mesh.contains(&p[0])).copied().collect();
+    let x = kept.windows(2).flat_map(between).chain(kept.last().copied());
+    let mut all: Vec<[f64; 2]> = x.filter_map(place).collect();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let few = mesh.len() <= DRAWN;
+    let nodes: Vec<[f64; 2]> = mesh.iter().filter(|_| few).filter_map(|x| place(*x)).collect();
     let [low, high] = all.iter().fold([f64::INFINITY, 0.0], |[l, h]: [f64; 2], p| [l.min(p[1]), h.max(p[1])]);
     let when = study.time.as_ref().map_or(String::new(), |_| format!(", t = {t}"));
-    let what = if nodes.len() <= DRAWN { "the density and the nodes" } else { "the density" };
+    let what = if few { "the density and the nodes" } else { "the density" };
     let mut curves = vec![Curve { name: "M".into(), points: all, plain: true, ..Curve::default() }.outlined()];
-    if nodes.len() <= DRAWN {
+    if few {
         curves.push(Curve { name: "nodes".into(), points: nodes, scattered: true, ..Curve::default() });
     }
-    Ok(Figure {
+    Figure {
         title: format!("{}, {what}{when}", study.study.name),
         labels: ["x".into(), "M".into()],
         scales: [Scale::Linear, if high > 30.0 * low { Scale::Logarithmic } else { Scale::Linear }],
         curves,
-    })
+    }
 }
 
 /// Errors over iterations, beside what theory says.
