@@ -262,7 +262,6 @@ fn bad_settings_are_refused() {
         (m("1 + t*x"), &["density.value", "must not depend on t without [time]"]),
         (m("exp(-50*x)"), &["density.value", "above 0 by more than 1e-14 of its largest"]),
         ("[density]\nkind = \"arclength\"\nof = \"if(x < 0.3, 0, 1)\"\n".into(), &["density.of", "u jumps there"]),
-        (format!("{M}[output]\nanimation = true\n"), &["output.animation", "no frames"]),
         (schwarz("subdomains = 200\noverlap_cells = 1"), &["schwarz.subdomains", "number of cells, 100"]),
         (schwarz("subdomains = 3\noverlap_cells = 2"), &["must be whole", "98 and 101"]),
         (schwarz("subdomains = 50\noverlap_cells = 100"), &["no wider than its overlap"]),

@@ -107,6 +107,9 @@ function number(v, digits = 6) {
   return text.replace(/\.?0+e/, "e").replace("e+", "e").replace(/-/g, "−");
 }
 
+/** Boxes that are more elongated than this are drawn as if they were so. */
+const ELONGATED = 4;
+
 /** A time: of those far from 0, all digits that tell frames apart. */
 const moment = (t) => (Math.abs(t) < 1e12 ? String(+t.toPrecision(10)).replace(/-/g, "−") : number(t));
 
@@ -129,6 +132,13 @@ function ticks(low, high, most) {
   return Object.assign(found, { less });
 }
 
+/** Powers of ten between two ends, six at most, with their labels. */
+function powers(low, high) {
+  const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9), every = Math.ceil((to - from + 1) / 6), found = [];
+  for (let k = from; k <= to; k += every) found.push([10 ** k, number(+(10 ** k).toPrecision(3))]);
+  return found;
+}
+
 // ---- the viewer -------------------------------------------------------------------------------------------------------
 
 class Viewer {
@@ -146,9 +156,9 @@ class Viewer {
     }));
     this.maps.forEach(({ name }) => this.controls.map.add(new Option(name, name)));
     this.fields = data.meshes[0].arrays.map((array) => array.name).filter((name) => name !== "x" && name !== "y");
-    // an unknown may have the name of a figure of the cells
-    const ofCells = ["Q", "Jacobian"].map((name) => (this.fields.includes(name) ? `${name} of cells` : name));
-    for (const name of [...this.fields, ...ofCells, "nothing"]) this.controls.field.add(new Option(symbol(name), name));
+    const longest = Math.max(...data.extent);
+    this.stretch = data.extent.map((length) => Math.max(1, longest / ELONGATED / length) || 1);
+    for (const name of [...this.fields, ...this.figures(), "nothing"]) this.controls.field.add(new Option(symbol(name), name));
     this.stages = data.meshes.map((mesh, m) => this.stage(mesh, m));
     document.querySelector(".stages").classList.toggle("pair", this.stages.length > 1);
     byId("cuts-label").querySelector("span").textContent = data.between;
@@ -175,6 +185,15 @@ class Viewer {
     new ResizeObserver(draw).observe(document.querySelector(".stages"));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
     this.show(this.at);
+  }
+
+  /** Names of what is known of the cells: an unknown may have the same. */
+  figures() { return ["Q", "Jacobian"].map((name) => (this.fields.includes(name) ? `${name} of cells` : name)); }
+
+  /** A moment in words, and nothing where there is none. */
+  when(t, digits) {
+    if (this.data.clock === "iteration") return `iteration\u00a0${Math.round(t)}`;
+    return this.data.clock && `t\u00a0=\u00a0${moment(digits ? +t.toPrecision(digits) : t)}`;
   }
 
   get last() { return this.data.meshes[0].times.length - 1; }
@@ -262,6 +281,8 @@ class Viewer {
   /** Time of the place shown, and the place of that time among the frames of another mesh: while nothing plays, a frame. */
   placeOf(mesh) {
     const ours = this.data.meshes[0].times, from = Math.floor(this.at), to = Math.min(this.last, from + 1);
+    // nothing is between two iterates
+    if (this.data.clock === "iteration") return [ours[from], from];
     const t = ours[from] + (ours[to] - ours[from]) * (this.at - from);
     if (mesh === this.data.meshes[0]) return [t, this.at];
     const times = mesh.times, after = times.findIndex((other) => other >= t), next = after < 0 ? times.length - 1 : after;
@@ -296,13 +317,13 @@ class Viewer {
   }
 
   pan(stage, dx, dy) {
-    this.centre = [this.centre[0] - dx / stage.scale, this.centre[1] + dy / stage.scale];
+    this.centre = [this.centre[0] - dx / stage.scale[0], this.centre[1] + dy / stage.scale[1]];
     this.draw();
   }
 
   physical(stage, [px, py]) {
     const { scale, w, h, left, top } = stage;
-    return [this.centre[0] + (px - left - w / 2) / scale, this.centre[1] - (py - top - h / 2) / scale];
+    return [this.centre[0] + (px - left - w / 2) / scale[0], this.centre[1] - (py - top - h / 2) / scale[1]];
   }
 
   /** Copies of a periodic mesh that may be seen. */
@@ -320,7 +341,7 @@ class Viewer {
     this.drawBar(range);
     const [t] = this.placeOf(this.data.meshes[0]);
     if (now) {
-      now.textContent = `t = ${moment(this.playing ? +t.toPrecision(5) : t)}`;
+      now.textContent = this.when(t, this.playing ? 5 : 0);
       time.value = this.at;
       time.setAttribute("aria-valuetext", now.textContent);
     }
@@ -361,23 +382,28 @@ class Viewer {
     return extent[0] * extent[1] / ((n - 1) * (m - 1));
   }
 
-  drawStage(stage, { low, high, log }) {
-    const { canvas, context, mesh } = stage, { extent, lower, stride } = this.data, ratio = Math.min(2, window.devicePixelRatio || 1);
+  /** Makes a canvas as large as it is shown, finds the scales, and writes what is above it. */
+  prepare(stage, height) {
+    const { canvas, mesh } = stage, { extent } = this.data, ratio = Math.min(2, window.devicePixelRatio || 1);
     const style = getComputedStyle(document.body), ink = style.color, paper = style.backgroundColor;
     const [left, right, top, bottom] = [62, 14, 8, 44].map((p) => Math.round(p * ratio));
-    const width = Math.max(160, Math.round(canvas.clientWidth * ratio)), w = width - left - right;
-    const h = Math.round(w * Math.min(1.25, Math.max(0.3, extent[1] / extent[0]))), height = top + h + bottom;
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    canvas.style.height = `${height / ratio}px`;
-    const scale = this.zoom * Math.min(w / extent[0], h / extent[1]);
-    Object.assign(stage, { w, h, left, top, scale });
+    const width = Math.max(160, Math.round(canvas.clientWidth * ratio)), w = width - left - right, h = Math.round(w * height);
+    if (canvas.width !== width || canvas.height !== top + h + bottom) Object.assign(canvas, { width, height: top + h + bottom });
+    canvas.style.height = `${canvas.height / ratio}px`;
+    const [ex, ey] = extent.map((length, d) => length * this.stretch[d]), fit = this.zoom * Math.min(w / ex, h / ey || Infinity);
+    Object.assign(stage, { w, h, left, top, ratio, ink, paper, scale: this.stretch.map((factor) => fit * factor) });
     const [t, place] = this.placeOf(mesh);
     stage.place = place;
-    const theirs = Number.isInteger(place) ? mesh.times[place] : t;
-    const pair = this.data.timed && (this.stages.length > 1 || !this.controls.now), role = stage.m ? "compared with: " : "generator: ";
-    stage.caption.textContent = [mesh.name && role + mesh.name, pair && `t\u00a0=\u00a0${moment(theirs)}`].filter(Boolean).join(", ");
+    stage.t = Number.isInteger(place) ? mesh.times[place] : t;
+    const pair = (this.stages.length > 1 || !this.controls.now) && this.when(stage.t), role = stage.m ? "compared with: " : "generator: ";
+    stage.caption.textContent = [mesh.name && role + mesh.name, pair].filter(Boolean).join(", ");
     stage.caption.hidden = !stage.caption.textContent;
+  }
 
+  drawStage(stage, { low, high, log }) {
+    const { canvas, context, mesh } = stage, { extent, lower, stride } = this.data;
+    this.prepare(stage, Math.min(1.25, Math.max(1 / ELONGATED, (extent[1] * this.stretch[1]) / (extent[0] * this.stretch[0]))));
+    const { w, h, left, top, ratio, ink, paper, scale, place } = stage;
     const field = this.controls.field.value, [n, m] = mesh.lines, nodes = n * m;
     const x = this.values(stage, "x", place), y = this.values(stage, "y", place);
     const level = log ? (v) => 255.99 * Math.log(v / low) / Math.log(high / low) : (v) => high > low ? 255.99 * (v - low) / (high - low) : 128;
@@ -394,8 +420,8 @@ class Viewer {
     const cuts = [];
     for (const shift of this.shifts()) {
       for (let k = 0; k < nodes; k++) {
-        px[k] = w / 2 + (x[k] + shift[0] - this.centre[0]) * scale;
-        py[k] = h / 2 - (y[k] + shift[1] - this.centre[1]) * scale;
+        px[k] = w / 2 + (x[k] + shift[0] - this.centre[0]) * scale[0];
+        py[k] = h / 2 - (y[k] + shift[1] - this.centre[1]) * scale[1];
       }
       if (levels) {
         for (let i = 0, cellAt = 0; i < n - 1; i++) {
@@ -429,7 +455,7 @@ class Viewer {
       }
     }
     context.fillStyle = paper;
-    context.clearRect(0, 0, width, height);
+    context.clearRect(0, 0, canvas.width, canvas.height);
     context.putImageData(image, left, top);
 
     context.save();
@@ -453,44 +479,49 @@ class Viewer {
         Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
         for (const [sx, sy] of this.shifts()) {
           context.beginPath();
-          context.arc(left + w / 2 + (x[k] + sx - this.centre[0]) * scale, top + h / 2 - (y[k] + sy - this.centre[1]) * scale, 6 * ratio, 0, 7);
+          context.arc(left + w / 2 + (x[k] + sx - this.centre[0]) * scale[0], top + h / 2 - (y[k] + sy - this.centre[1]) * scale[1], 6 * ratio, 0, 7);
           context.stroke();
         }
       }
     }
     context.restore();
 
-    // the frame with its ticks
+    const [from, to] = [this.physical(stage, [left, top + h]), this.physical(stage, [left + w, top])];
+    const along = ticks(from[0], to[0], Math.max(2, w / ratio / 90)), up = ticks(from[1], to[1], Math.max(2, h / ratio / 60));
+    const names = ["x", "y"].map((name, d) => name + [along, up][d].less + (this.stretch[d] > 1 ? `, stretched ${number(this.stretch[d], 3)} times` : ""));
+    this.frame(stage, along, up, (v) => top + h / 2 - (v - this.centre[1]) * scale[1], names);
+    const what = field === "nothing" ? "the mesh" : `the mesh over ${symbol(field)}`;
+    const lattice = `${(n - 1) * stride} by ${(m - 1) * stride} cells`;
+    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, ${this.data.clock ? `at ${this.when(stage.t)}, ` : ""}from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
+  }
+
+  /** The frame of a canvas, with ticks along x and up, and what the axes are named. */
+  frame({ canvas, context, w, h, left, top, ratio, ink, scale }, along, up, height, names) {
     Object.assign(context, { strokeStyle: ink, fillStyle: ink, lineWidth: ratio, font: `${12 * ratio}px system-ui, sans-serif` });
     context.strokeRect(left + 0.5, top + 0.5, w - 1, h - 1);
-    const [from, to] = [this.physical(stage, [left, top + h]), this.physical(stage, [left + w, top])];
     context.textAlign = "center";
     context.textBaseline = "top";
-    const along = ticks(from[0], to[0], Math.max(2, w / ratio / 90)), up = ticks(from[1], to[1], Math.max(2, h / ratio / 60));
     for (const [v, text] of along) {
-      const p = left + w / 2 + (v - this.centre[0]) * scale;
+      const p = left + w / 2 + (v - this.centre[0]) * scale[0];
       context.fillRect(p - ratio / 2, top + h, ratio, 4 * ratio);
       // a label that would be cut stays inside
       const half = context.measureText(text).width / 2;
-      context.fillText(text, Math.min(width - half - 1, Math.max(half + 1, p)), top + h + 7 * ratio);
+      context.fillText(text, Math.min(canvas.width - half - 1, Math.max(half + 1, p)), top + h + 7 * ratio);
     }
     context.textAlign = "right";
     context.textBaseline = "middle";
     for (const [v, text] of up) {
-      const p = top + h / 2 - (v - this.centre[1]) * scale;
+      const p = height(v);
       context.fillRect(left - 4 * ratio, p - ratio / 2, 4 * ratio, ratio);
       context.fillText(text, left - 7 * ratio, Math.max(7 * ratio, p), left - 22 * ratio);
     }
     context.textAlign = "center";
-    context.fillText(`x${along.less}`, left + w / 2, height - 8 * ratio);
+    context.fillText(names[0], left + w / 2, canvas.height - 8 * ratio);
     context.save();
     context.translate(8 * ratio, top + h / 2);
-    if (up.less) context.rotate(-Math.PI / 2);
-    context.fillText(`y${up.less}`, 0, 0);
+    if (names[1].length > 1) context.rotate(-Math.PI / 2);
+    context.fillText(names[1], 0, 0, h);
     context.restore();
-    const what = field === "nothing" ? "the mesh" : `the mesh over ${symbol(field)}`;
-    const lattice = `${(n - 1) * stride} by ${(m - 1) * stride} cells`;
-    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, ${this.data.timed ? `at t = ${moment(theirs)}, ` : ""}from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
   }
 
   drawBar({ low, high, log }) {
@@ -502,13 +533,8 @@ class Viewer {
     for (let k = 0; k < out.length; k++) out[k] = colours[k % 256];
     context.putImageData(image, 0, 0);
     const place = (v) => (log ? Math.log(v / low) / Math.log(high / low) : high > low ? (v - low) / (high - low) : 0.5);
-    let labels = ticks(low, high, Math.max(2, Math.min(6, canvas.clientWidth / 70)));
+    const labels = log ? powers(low, high) : ticks(low, high, Math.max(2, Math.min(6, canvas.clientWidth / 70)));
     bar.querySelector(".name").textContent = symbol(field) + (log ? " (log)" : labels.less);
-    if (log) {
-      const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9), every = Math.ceil((to - from + 1) / 6);
-      labels = [];
-      for (let k = from; k <= to; k += every) labels.push([10 ** k, number(+(10 ** k).toPrecision(3))]);
-    }
     bar.querySelector(".ticks").replaceChildren(...labels.map(([v, text]) => {
       const label = document.createElement("span");
       label.textContent = text;
@@ -569,35 +595,174 @@ class Viewer {
   /** Writes what is known at the chosen node, a line a mesh. */
   read() {
     document.querySelector(".readout").replaceChildren(...this.stages.map((stage) => {
-      const line = document.createElement("dl"), m = stage.mesh.lines[1], { stride, cells } = this.data;
-      const entry = (name, text) => {
-        const [pair, dt, dd] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
-        dt.textContent = name;
-        dd.textContent = text;
-        pair.append(dt, dd);
-        line.append(pair);
-      };
-      if (this.stages.length > 1) entry("mesh", stage.mesh.name.split(",")[0]);
-      const k = this.node && this.node[0] * m + this.node[1], known = (value, digits) => (this.node ? number(value(), digits) : "–");
-      const levels = Object.fromEntries(stage.mesh.arrays.map((array) => [array.name, array]));
-      entry("node", this.node ? `(${this.node.map((index, d) => Math.min(index * stride, cells[d])).join(", ")})` : "–");
-      for (const name of ["x", "y"]) entry(name, known(() => rounded(stage[name][k], levels[name])));
-      for (const name of this.fields) entry(symbol(name), known(() => rounded(this.values(stage, name, stage.place)[k], levels[name])));
-      const figures = this.node && shape(stage.x, stage.y, this.cell[0] * m + this.cell[1], m, this.uniform(stage));
-      const digits = this.node && this.digits(stage, levels, figures[1]);
-      entry("Q of the cell", known(() => figures[0], digits));
-      entry("its Jacobian", known(() => figures[1], digits));
+      const line = document.createElement("dl");
+      if (this.stages.length > 1) line.append(this.entry("mesh", stage.mesh.name.split(",")[0]));
+      line.append(...this.known(stage).map(([name, text]) => this.entry(name, this.node ? text() : "–")));
       return line;
     }));
+  }
+
+  entry(name, text) {
+    const [pair, dt, dd] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
+    dt.textContent = name;
+    dd.textContent = text;
+    pair.append(dt, dd);
+    return pair;
+  }
+
+  /** Names and texts of what is known at the chosen node. */
+  known(stage) {
+    const m = stage.mesh.lines[1], { stride, cells } = this.data, k = this.node && this.node[0] * m + this.node[1];
+    const levels = Object.fromEntries(stage.mesh.arrays.map((array) => [array.name, array]));
+    const figures = this.node && shape(stage.x, stage.y, this.cell[0] * m + this.cell[1], m, this.uniform(stage));
+    const digits = this.node && this.digits(stage, levels, figures[1]);
+    return [
+      ["node", () => `(${this.node.map((index, d) => Math.min(index * stride, cells[d])).join(", ")})`],
+      ...["x", "y"].map((name) => [name, () => number(rounded(stage[name][k], levels[name]))]),
+      ...this.fields.map((name) => [symbol(name), () => number(rounded(this.values(stage, name, stage.place)[k], levels[name]))]),
+      ["Q of the cell", () => number(figures[0], digits)],
+      ["its Jacobian", () => number(figures[1], digits)],
+    ];
+  }
+}
+
+/** Of a line: a curve over x through all nodes, which stand under it. */
+class LineViewer extends Viewer {
+  figures() { return ["cell length", ...(this.fields.includes("M") ? ["M × cell length"] : []), "ξ"]; }
+
+  /** Values in the cells over their mean, of what is no field of the nodes. */
+  cellValues(stage, field, place) {
+    const x = this.values(stage, "x", place), n = x.length, mean = this.data.extent[0] / (n - 1);
+    if (field === "ξ") return Float64Array.from(x, (_, i) => i / (n - 1));
+    const lengths = Float64Array.from({ length: n - 1 }, (_, i) => x[i + 1] - x[i]);
+    if (field === "cell length") return lengths.map((length) => length / mean);
+    const m = this.values(stage, "M", place), shares = lengths.map((length, i) => 0.5 * (m[i] + m[i + 1]) * length);
+    const whole = shares.reduce((sum, share) => sum + share, 0);
+    return shares.map((share) => share / whole * (n - 1));
+  }
+
+  drawBar() { document.querySelector(".bar").hidden = true; }
+
+  drawStage(stage, { low, high, log }) {
+    const { canvas, context, mesh } = stage, { lower, extent, stride } = this.data, field = this.controls.field.value;
+    this.prepare(stage, 0.5);
+    const { w, h, left, top, ratio, ink, paper, scale, place } = stage, n = mesh.lines[0], x = stage.x = this.values(stage, "x", place);
+    const nothing = field === "nothing", nodal = this.fields.includes(field);
+    const values = nothing ? null : nodal ? this.values(stage, field, place) : this.cellValues(stage, field, place);
+    // the curve has room above and below
+    const on = log ? Math.log : (v) => v, room = 0.06 * (on(high) - on(low)) || 0.5, [from, to] = [on(low) - room, on(high) + room];
+    const height = (v) => top + h * (1 - (on(v) - from) / (to - from));
+    const px = Float64Array.from(x, (v) => left + w / 2 + (v - this.centre[0]) * scale[0]);
+    const stepped = !nothing && values.length < n, floor = top + h;
+    const py = (i) => nothing ? top : height(stepped ? Math.max(values[Math.max(0, i - 1)], values[Math.min(n - 2, i)]) : values[i]);
+
+    context.fillStyle = paper;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.save();
+    context.beginPath();
+    context.rect(left, top, w, h);
+    context.clip();
+    context.lineJoin = "round";
+    const accent = getComputedStyle(this.controls.field).accentColor;
+    // from the first to the last cell in sight, with room for marks
+    const edge = 5 * ratio, seen = (i) => Math.max(px[i], px[i + 1]) > left - edge && Math.min(px[i], px[i + 1]) < left + w + edge;
+    let first = 0, last = n - 2;
+    while (first < last && !seen(first)) first++;
+    while (last > first && !seen(last)) last--;
+    const visible = Array.from({ length: last + 2 - first }, (_, k) => first + k);
+    if (this.controls.lines.checked || nothing) {
+      // lines of a crowd of nodes fade, and those within a pixel are drawn once
+      Object.assign(context, { strokeStyle: ink, lineWidth: ratio });
+      let drawn = -Infinity;
+      for (const i of visible) {
+        if (Math.abs(px[i] - drawn) < 0.5) continue;
+        drawn = px[i];
+        const gap = Math.min(Math.abs(px[i] - (px[i - 1] ?? Infinity)), Math.abs((px[i + 1] ?? Infinity) - px[i])) / ratio;
+        context.globalAlpha = Math.min(0.45, Math.max(0.08, 0.1 * gap));
+        context.beginPath();
+        context.moveTo(px[i], floor);
+        context.lineTo(px[i], py(i));
+        context.stroke();
+      }
+      context.globalAlpha = 1;
+    }
+    if (this.controls.cuts.checked) {
+      for (const [colour, thick] of [[paper, 4], ["#d55e00", 2]]) {
+        Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
+        context.beginPath();
+        for (const i of mesh.cuts[0]) {
+          context.moveTo(px[i], floor);
+          context.lineTo(px[i], top);
+        }
+        context.stroke();
+      }
+    }
+    if (!nothing) {
+      Object.assign(context, { strokeStyle: accent, fillStyle: accent, lineWidth: 2 * ratio });
+      context.beginPath();
+      visible.forEach((i, k) => {
+        if (!stepped) return k ? context.lineTo(px[i], height(values[i])) : context.moveTo(px[i], height(values[i]));
+        if (i + 1 >= n) return;
+        if (k) context.lineTo(px[i], height(values[i])); else context.moveTo(px[i], height(values[i]));
+        context.lineTo(px[i + 1], height(values[i]));
+      });
+      context.stroke();
+      if (!stepped && visible.length * 5 * ratio < w) {
+        for (const i of visible) {
+          context.beginPath();
+          context.arc(px[i], height(values[i]), 3 * ratio, 0, 7);
+          context.fill();
+        }
+      }
+    }
+    if (this.node) {
+      const [i] = this.node;
+      for (const [colour, thick] of [[paper, 4.5], [ink, 2]]) {
+        Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
+        context.beginPath();
+        context.arc(px[i], nothing ? floor - 8 * ratio : py(i), 6 * ratio, 0, 7);
+        context.stroke();
+      }
+    }
+    context.restore();
+
+    const [ends, most] = [[left, left + w].map((p) => this.physical(stage, [p, 0])[0]), Math.max(2, h / ratio / 60)];
+    const along = ticks(...ends, Math.max(2, w / ratio / 90)), up = nothing ? [] : log ? powers(low, high) : ticks(low, high, most);
+    const what = nothing ? "" : field + (up.less ?? "") + (stepped ? ", over the mean" : "");
+    this.frame(stage, along, up, height, [`x${along.less}`, what]);
+    const when = this.data.clock ? `at ${this.when(stage.t)}, ` : "";
+    canvas.setAttribute("aria-label", `${nothing ? "the nodes" : `${what} over x`}, ${(n - 1) * stride} cells, ${when}from x = ${number(lower[0])} to ${number(lower[0] + extent[0])}`);
+  }
+
+  pan(stage, dx) { super.pan(stage, dx, 0); }
+
+  point(stage, [px]) {
+    const wanted = this.physical(stage, [px, 0])[0], { x } = stage;
+    let best = 0;
+    for (let i = 1; i < x.length; i++) if (Math.abs(x[i] - wanted) < Math.abs(x[best] - wanted)) best = i;
+    this.choose(best, 0);
+  }
+
+  known(stage) {
+    const [i] = this.node ?? [0], n = stage.x.length, levels = Object.fromEntries(stage.mesh.arrays.map((array) => [array.name, array]));
+    const node = Math.min(i * this.data.stride, this.data.cells[0]), figures = this.figures().filter((name) => name !== "ξ");
+    return [
+      ["node", () => String(node)],
+      ["x", () => number(rounded(stage.x[i], levels.x))],
+      ["ξ", () => number(node / this.data.cells[0])],
+      ...this.fields.map((name) => [name, () => number(rounded(this.values(stage, name, stage.place)[i], levels[name]))]),
+      ...figures.map((name) => [`${name}, over the mean`, () => number(this.cellValues(stage, name, stage.place)[Math.min(i, n - 2)], 4)]),
+    ];
   }
 }
 
 (async () => {
   const source = document.getElementById("viewer-data");
   if (!source) return;
+  document.getElementById("viewer").classList.add("live");
   const data = JSON.parse(source.textContent);
   const arrays = await Promise.all(data.meshes.map(async (mesh) => unpack(mesh, await inflate(mesh.data))));
-  window.viewer = new Viewer(data, arrays);
+  window.viewer = new (data.line ? LineViewer : Viewer)(data, arrays);
 })().catch((error) => {
   document.querySelector(".stages").textContent = `The viewer does not work in this browser: ${error.message}`;
 });

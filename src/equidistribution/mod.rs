@@ -101,6 +101,10 @@ pub struct History {
     pub iterates: Vec<Iterate>,
     /// The glued mesh of the last.
     pub mesh: Vec<f64>,
+    /// Glued meshes of the start and of iterates, with their numbers: of all, or of every second, fourth … as far as
+    /// there is room.
+    #[serde(skip)]
+    pub path: Vec<(usize, Vec<f64>)>,
     /// The discrete single-domain mesh.
     pub reference: Vec<f64>,
     /// Contraction in two iterations: the geometric mean of the last ten above rounding, or of the last half of fewer.
@@ -202,6 +206,9 @@ const FEW_PARTS: usize = 4;
 const PARTS: usize = 64;
 const CELLS_AT_ONCE: usize = 4096;
 const MOST: usize = 1000;
+/// Meshes of iterates that are kept, and values in them, at most.
+const MOST_MESHES: usize = 100;
+const MOST_KEPT: usize = 1 << 20;
 
 impl Line {
     /// M on \[0, 1\], averaged by trapezoids.
@@ -309,7 +316,14 @@ impl Line {
         let iteration = Iteration { chain: self.chain(t), ranges, method, old: before, cells: self.cells };
         let exact = iteration.cut(&reference);
         let mut pieces = iteration.cut(start);
-        let mut iterates = vec![self.measured(t, &iteration, &pieces, &exact, 0.0, 0)];
+        let mut path = Path::default();
+        let mut tell = |pieces: &Pieces, increment: f64, solves: usize| {
+            let glued = iteration.glue(pieces);
+            let iterate = self.measured(t, pieces, &exact, &glued, increment, solves);
+            path.take(glued);
+            iterate
+        };
+        let mut iterates = vec![tell(&pieces, 0.0, 0)];
         let length = self.ends[1] - self.ends[0];
         let met = |iterate: &Iterate, n: usize| {
             let known = n > 0 || stop.measure == Measure::Error;
@@ -322,14 +336,15 @@ impl Line {
             solves += cost;
             let increment = distance(&next, &pieces);
             pieces = next;
-            let iterate = self.measured(t, &iteration, &pieces, &exact, increment, solves);
+            let iterate = tell(&pieces, increment, solves);
             iterates.push(iterate);
             converged = met(&iterate, iterates.len() - 1);
         }
         let observed = observed(&iterates, ROUNDING * length);
         let prediction = Prediction::of(self, t, ranges, method, &reference, before.map(|b| b.1))?;
         let converged = converged || stop.tolerance.is_none();
-        Ok(History { mesh: iteration.glue(&pieces), iterates, reference, observed, prediction, converged })
+        let (path, mesh) = (path.meshes, iteration.glue(&pieces));
+        Ok(History { iterates, mesh, path, reference, observed, prediction, converged })
     }
 
     /// Refuses what is no mesh of the line: as many nodes as it has, from end to end, in order.
@@ -356,9 +371,9 @@ impl Line {
     fn measured(
         &self,
         t: f64,
-        iteration: &Iteration<'_>,
         pieces: &Pieces,
         exact: &Pieces,
+        glued: &[f64],
         increment: f64,
         linear_solves: usize,
     ) -> Iterate {
@@ -369,7 +384,7 @@ impl Line {
             jumps.extend(u.map(|u| u.windows(2).map(|u| 2.0 * (u[1] - u[0]).abs()).fold(0.0, f64::max)));
         }
         let largest_jump = jumps.into_iter().reduce(f64::max);
-        let interpolation_error = self.interpolation_error(t, &iteration.glue(pieces));
+        let interpolation_error = self.interpolation_error(t, glued);
         Iterate { error, increment, largest_jump, interpolation_error, linear_solves }
     }
 
@@ -395,6 +410,33 @@ impl Line {
         let worst: Vec<[f64; 2]> =
             cells.into_iter().zip(rough).filter(|(_, off)| *off >= 0.9 * largest).map(|(x, _)| x).take(MOST).collect();
         errors(&worst, PARTS)?.into_iter().reduce(f64::max)
+    }
+}
+
+/// Meshes of an iteration, which may go on for ever.
+#[derive(Default)]
+struct Path {
+    meshes: Vec<(usize, Vec<f64>)>,
+    /// Meshes seen, and how many a kept one stands for.
+    seen: usize,
+    every: usize,
+}
+
+impl Path {
+    /// Keeps a mesh where it is due; half of those before go where there is no room.
+    fn take(&mut self, mesh: Vec<f64>) {
+        let most = (MOST_KEPT / mesh.len()).min(MOST_MESHES);
+        self.every = self.every.max(1);
+        if most > 0 && self.seen.is_multiple_of(self.every) {
+            if self.meshes.len() == most {
+                self.every *= 2;
+                self.meshes.retain(|(n, _)| n.is_multiple_of(self.every));
+            }
+            if self.seen.is_multiple_of(self.every) && self.meshes.len() < most {
+                self.meshes.push((self.seen, mesh));
+            }
+        }
+        self.seen += 1;
     }
 }
 

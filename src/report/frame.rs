@@ -7,6 +7,7 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 pub struct Frame {
     pub t: f64,
+    /// Along both axes; none along the second of a line.
     pub cells: [usize; 2],
     /// Nodes, of shape cells + 1.
     pub x: Vec<[f64; 2]>,
@@ -27,9 +28,11 @@ impl Frame {
         };
         let points = doubles(array("Points", "Points")?)?;
         let x: Vec<[f64; 2]> = points.chunks_exact(3).map(|p| [p[0], p[1]]).collect();
-        // the first cell names node (1, 0), which begins the second row
+        // the first cell names node (1, 0), which begins the second row; those of a line have a node each
         let row = integers::<8>(array("Cells", "connectivity")?, 2)?.get(1).copied().unwrap_or(0);
-        if row < 2 || x.len() < 2 * row || !x.len().is_multiple_of(row) {
+        let corners = integers::<8>(array("Cells", "offsets")?, 1)?.first().copied().unwrap_or(0);
+        let fits = if corners == 2 { row == 1 } else { row > 1 };
+        if !fits || x.len() < 2 * row || !x.len().is_multiple_of(row) {
             return Err("its nodes are not those of a structured mesh".into());
         }
         let cells = [x.len() / row - 1, row - 1];
@@ -44,10 +47,14 @@ impl Frame {
         if !x.as_flattened().iter().chain(fields.iter().flat_map(|(_, values)| values)).all(|v| v.is_finite()) {
             return Err("it holds a value that is not finite".into());
         }
-        let count = cells[0] * cells[1];
-        let subdomains =
-            array("CellData", "subdomain").and_then(|array| integers::<4>(array, count)).unwrap_or_default();
-        let cuts = if subdomains.len() == count { cuts(cells, &subdomains) } else { Default::default() };
+        let count = cells[0] * cells[1].max(1);
+        let numbers = |name: &str| array("CellData", name).and_then(|array| integers::<4>(array, count)).ok();
+        // pieces of a line may overlap
+        let overlap = numbers("overlap").filter(|more| more.len() == count).unwrap_or_else(|| vec![0; count]);
+        let cuts = match numbers("subdomain").filter(|of| of.len() == count) {
+            Some(subdomains) => cuts(cells, &subdomains.into_iter().zip(overlap).collect::<Vec<_>>()),
+            None => Default::default(),
+        };
         Ok(Self { t, cells, x, fields, cuts })
     }
 
@@ -59,11 +66,11 @@ impl Frame {
 }
 
 /// Where the subdomain changes along the first row and the first column; 0 where it does around a periodic axis.
-fn cuts([n, m]: [usize; 2], subdomains: &[usize]) -> [Vec<usize>; 2] {
-    let changes = |count: usize, at: &dyn Fn(usize) -> usize| {
-        (0..count).filter(|&k| at(k) != at((k + count - 1) % count)).collect::<Vec<_>>()
+fn cuts<T: PartialEq>([n, m]: [usize; 2], subdomains: &[T]) -> [Vec<usize>; 2] {
+    let changes = |count: usize, stride: usize| {
+        (0..count).filter(|&k| subdomains[k * stride] != subdomains[(k + count - 1) % count * stride]).collect()
     };
-    [changes(n, &|i| subdomains[i * m]), changes(m, &|j| subdomains[j])]
+    [changes(n, m.max(1)), changes(m, 1)]
 }
 
 /// An array as it stands in a file.

@@ -39,7 +39,9 @@ struct Page<'a> {
 #[derive(Serialize)]
 struct ViewerOnPage<'a> {
     data: &'a str,
+    line: bool,
     moves: bool,
+    clock: &'static str,
     thinned: Option<&'a str>,
 }
 
@@ -83,7 +85,13 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
         help: told("help"),
         warnings: warnings.into_iter().flatten().filter_map(Value::as_str).collect(),
         notes: &run.notes,
-        viewer: viewer.map(|v| ViewerOnPage { data: &v.data, moves: v.moves, thinned: v.thinned.as_deref() }),
+        viewer: viewer.map(|v| ViewerOnPage {
+            data: &v.data,
+            line: v.line,
+            moves: v.moves,
+            clock: v.clock,
+            thinned: v.thinned.as_deref(),
+        }),
         tables: tables::of(&run.summary),
         wall,
         parts,

@@ -10,8 +10,11 @@ use std::io::Write;
 pub struct Viewer {
     /// Its data, as JSON that cannot end a script element.
     pub data: String,
-    /// Whether there is time in it.
+    /// Whether it is of a line.
+    pub line: bool,
+    /// Whether there is more than one frame, and what numbers them.
     pub moves: bool,
+    pub clock: &'static str,
     /// What is not shown, if something is not.
     pub thinned: Option<String>,
 }
@@ -70,7 +73,7 @@ impl Viewer {
         });
         run.notes.extend(thinned.clone());
         let data = packed.json(run).to_string().replace('<', "\\u003c");
-        Some(Self { data, moves: shown > 1, thinned })
+        Some(Self { data, line: first.cells[1] == 0, moves: shown > 1, clock: clock(run), thinned })
     }
 }
 
@@ -153,9 +156,21 @@ impl Packed {
             "lower": lower, "extent": [upper[0] - lower[0], upper[1] - lower[1]],
             "periodic": [wraps(0), wraps(1)],
             "between": if run.front().is_some() { "front" } else { "subdomains" },
-            "timed": run.word("kind") != "poisson",
+            "line": self.first.cells[1] == 0,
+            "clock": clock(run),
             "maps": maps, "meshes": meshes.collect::<Vec<_>>(),
         })
+    }
+}
+
+/// What numbers the frames: t, iterations, or nothing.
+pub fn clock(run: &RunFiles) -> &'static str {
+    match run.word("kind") {
+        "poisson" => "",
+        "equidistribution" if run.setting(&["time"]).is_none() => {
+            if run.setting(&["schwarz"]).is_some() { "iteration" } else { "" }
+        }
+        _ => "t",
     }
 }
 

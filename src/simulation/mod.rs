@@ -13,7 +13,7 @@ mod schedule;
 pub use checkpoint::CheckpointsAt;
 pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
-pub(crate) use observer::Rows;
+pub(crate) use observer::{Rows, frame_name, vtu};
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
 pub(crate) use report::{Canvas, status, write_file};
 pub use report::{

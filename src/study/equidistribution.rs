@@ -291,10 +291,6 @@ impl EquidistributionStudy {
             return Err(Error::invalid("grid.cells", format!("[{cells}]"), "must be 2 or more"));
         }
         super::memory::check_memory(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
-        if self.output.animation {
-            let rule = "studies of a line have no frames; mesh.png shows the paths of nodes. Leave it out";
-            return Err(Error::invalid("output.animation", true, rule));
-        }
         self.resolve_time()?;
         self.check_density()?;
         if let Some(schwarz) = &mut self.schwarz {

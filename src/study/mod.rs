@@ -4,6 +4,7 @@ mod any;
 mod ending;
 mod equidistribution;
 mod front_run;
+mod line_files;
 mod line_run;
 mod mapped;
 mod memory;

@@ -73,6 +73,11 @@ pub struct Frames {
     writer: Option<Writer>,
 }
 
+/// The file of a frame, in its folder.
+pub(crate) fn frame_name(folder: &str, number: usize) -> String {
+    format!("{folder}/step-{number:06}.vtu")
+}
+
 /// A thread beside the run that writes one frame at a time; starting one a frame would cost more than to prepare the frame.
 #[derive(Debug)]
 struct Writer {
@@ -194,17 +199,12 @@ impl Frames {
     }
 
     fn name(&self, step: usize) -> String {
-        format!("{}/step-{step:06}.vtu", self.names[0])
+        frame_name(self.names[0], step)
     }
 
     /// The file that puts the frames in time.
     fn series(&self) -> String {
-        let entry = |(t, step): &(f64, usize)| format!("<DataSet timestep=\"{t}\" file=\"{}\"/>\n", self.name(*step));
-        let entries: String = self.written.iter().map(entry).collect();
-        format!(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
-             <Collection>\n{entries}</Collection>\n</VTKFile>\n"
-        )
+        vtu::collection(self.written.iter().map(|(t, step)| (*t, self.name(*step))))
     }
 
     /// Goes on behind the frames that a checkpoint knows of, from its state; later ones are removed.

@@ -3,8 +3,9 @@
 mod frames;
 mod history;
 mod rows;
-mod vtu;
+pub(crate) mod vtu;
 
+pub(crate) use frames::frame_name;
 pub use frames::{Frames, FramesAt};
 pub use history::History;
 pub(crate) use rows::Rows;

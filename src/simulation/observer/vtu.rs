@@ -3,45 +3,58 @@ use flate2::{Compression, write::ZlibEncoder};
 use std::fmt::Write;
 use std::io::Write as _;
 
-/// VTK's number of the quadrilateral.
+/// VTK's numbers of the shapes of cells.
+const LINE: u8 = 3;
 const QUAD: u8 = 9;
 
 /// A named array with one value, or the two components of a vector, for each point or cell.
 #[derive(Debug)]
-pub(super) enum Values {
+pub(crate) enum Values {
     Scalars(Vec<f64>),
     Vectors(Vec<[f64; 2]>),
     Numbers(Vec<usize>),
 }
 
-/// A series of unstructured grids of quadrilaterals over one lattice, as `.vtu` files with compressed inline arrays.
+/// A series of unstructured grids over one lattice, as `.vtu` files with compressed inline arrays.
 #[derive(Debug)]
-pub(super) struct Grid {
-    cells: [usize; 2],
-    /// The cells of all documents.
+pub(crate) struct Grid {
+    /// Cells of a document.
+    count: usize,
+    /// They themselves, in all documents.
     topology: String,
 }
 
 impl Grid {
+    /// Quadrilaterals.
     pub fn new(cells: [usize; 2]) -> Self {
-        let (count, row) = (cells[0] * cells[1], cells[1] + 1);
-        let mut xml = Xml::of("<Cells>\n".into());
+        let row = cells[1] + 1;
         let corners = (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| i * row + j));
-        let connectivity = corners.flat_map(|k| [k, k + row, k + row + 1, k + 1]);
-        xml.array("Int64", "connectivity", 1, connectivity.map(|k| (k as u64).to_le_bytes()));
-        xml.array("Int64", "offsets", 1, (1..=count as u64).map(|n| (4 * n).to_le_bytes()));
-        xml.array("UInt8", "types", 1, std::iter::repeat_n([QUAD], count));
-        Self { cells, topology: xml.text + "</Cells>\n" }
+        Self::of(QUAD, corners.map(|k| [k, k + row, k + row + 1, k + 1]))
     }
 
-    /// One document: `points` and `nodes` have shape cells + 1 in lattice order, `cells` one value a cell.
+    /// Pieces of a line.
+    pub fn line(cells: usize) -> Self {
+        Self::of(LINE, (0..cells).map(|k| [k, k + 1]))
+    }
+
+    /// Cells of one shape, by the nodes at their corners.
+    fn of<const N: usize>(shape: u8, cells: impl Iterator<Item = [usize; N]> + Clone) -> Self {
+        let count = cells.clone().count();
+        let mut xml = Xml::of("<Cells>\n".into());
+        xml.array("Int64", "connectivity", 1, cells.flatten().map(|k| (k as u64).to_le_bytes()));
+        xml.array("Int64", "offsets", 1, (1..=count).map(|n| ((N * n) as u64).to_le_bytes()));
+        xml.array("UInt8", "types", 1, std::iter::repeat_n([shape], count));
+        Self { count, topology: xml.text + "</Cells>\n" }
+    }
+
+    /// One document: `points` and `nodes` in the order of the lattice, `cells` one value a cell.
     pub fn document(&self, points: &[[f64; 2]], nodes: &[(String, Values)], cells: &[(String, Values)]) -> String {
-        let count = self.cells[0] * self.cells[1];
         let mut xml = Xml::of(format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
              header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n\
-             <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{count}\">\n<Points>\n",
-            points.len()
+             <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n<Points>\n",
+            points.len(),
+            self.count
         ));
         xml.vectors("Points", points);
         xml.text.push_str("</Points>\n");
@@ -59,6 +72,15 @@ impl Grid {
         }
         xml.text + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
     }
+}
+
+/// The file that puts others in time.
+pub(crate) fn collection(files: impl Iterator<Item = (f64, String)>) -> String {
+    let entries: String = files.map(|(t, file)| format!("<DataSet timestep=\"{t}\" file=\"{file}\"/>\n")).collect();
+    format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
+         <Collection>\n{entries}</Collection>\n</VTKFile>\n"
+    )
 }
 
 /// A document in the making. Its arrays share one compressor: a new one costs more than a small array.
