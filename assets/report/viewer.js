@@ -4,6 +4,8 @@ document.getElementById("theme").addEventListener("click", () => {
   const root = document.documentElement;
   const dark = root.style.colorScheme ? root.style.colorScheme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
   root.style.colorScheme = dark ? "light" : "dark";
+  root.classList.toggle("dark", !dark);
+  root.classList.toggle("light", dark);
   window.viewer?.draw();
 });
 
@@ -192,8 +194,8 @@ class Viewer {
 
   /** A moment in words, and nothing where there is none. */
   when(t, digits) {
-    if (this.data.clock === "iteration") return `iteration\u00a0${Math.round(t)}`;
-    return this.data.clock && `t\u00a0=\u00a0${moment(digits ? +t.toPrecision(digits) : t)}`;
+    if (this.data.clock === "iteration") return `iteration ${Math.round(t)}`;
+    return this.data.clock && `t = ${moment(digits ? +t.toPrecision(digits) : t)}`;
   }
 
   get last() { return this.data.meshes[0].times.length - 1; }
@@ -395,7 +397,7 @@ class Viewer {
     const [t, place] = this.placeOf(mesh);
     stage.place = place;
     stage.t = Number.isInteger(place) ? mesh.times[place] : t;
-    const pair = (this.stages.length > 1 || !this.controls.now) && this.when(stage.t), role = stage.m ? "compared with: " : "generator: ";
+    const pair = (this.stages.length > 1 || !this.controls.now) && this.when(stage.t).replace(/ /g, "\u00a0"), role = stage.m ? "compared with: " : "generator: ";
     stage.caption.textContent = [mesh.name && role + mesh.name, pair].filter(Boolean).join(", ");
     stage.caption.hidden = !stage.caption.textContent;
   }

@@ -10,11 +10,16 @@ struct Run {
 impl Run {
     /// A short study, run into `out` with settings laid over it.
     fn new(set: &[&str]) -> Self {
-        let run = Self { sandbox: tempfile::tempdir().unwrap() };
-        let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("../studies/burgers-b-stochastic.toml");
         let short = ["grid.cells=[12,10]", "time.end=0.27", "time.report=[0.26,0.27]", "output.frames.every=5"];
+        Self::of("burgers-b-stochastic", &[&short, set].concat())
+    }
+
+    /// A study of ours.
+    fn of(name: &str, set: &[&str]) -> Self {
+        let run = Self { sandbox: tempfile::tempdir().unwrap() };
+        let study = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../studies/{name}.toml"));
         let mut arguments = vec!["run", study.to_str().unwrap(), "--quiet", "--out", "out"];
-        short.iter().chain(set).for_each(|assignment| arguments.extend(["--set", assignment]));
+        set.iter().for_each(|assignment| arguments.extend(["--set", assignment]));
         let output = run.call(&arguments);
         assert!(output.status.success(), "{}", words(&output));
         run
@@ -97,7 +102,7 @@ fn an_interrupted_run_has_a_report_of_what_is_there() {
     std::fs::remove_file(run.path("frames/step-000005.vtu")).unwrap();
     std::fs::remove_file(run.path("compare.pvd")).unwrap();
     let (html, said) = run.rebuilt();
-    assert!(html.contains("it was interrupted, or still goes on"));
+    assert!(html.contains("did not come to its end"));
     for part in ["frames/step-000020.vtu is left out", "frames/step-000005.vtu is left out", "history.csv: 1 row(s)"] {
         assert!(said.contains(part) && html.contains(part), "{part:?} is not in {said}");
     }
@@ -176,6 +181,24 @@ fn large_runs_are_thinned_and_say_so() {
     let times = data["meshes"][0]["times"].as_array().unwrap();
     assert!((2..41).contains(&times.len()));
     assert_eq!([times[0].as_f64(), times[times.len() - 1].as_f64()], [Some(0.25), Some(0.29)]);
+}
+
+/// A line too, whose iterates are the frames: in colours that are those of the curve.
+#[test]
+fn an_animation_of_a_line_has_every_iterate() {
+    let run = Run::of("table-8-1-nonlinear", &["output.animation=true", "output.report=false"]);
+    let file = std::fs::File::open(run.path("animation.gif")).unwrap();
+    let mut gif = gif::DecodeOptions::new().read_info(file).unwrap();
+    let palette = gif.global_palette().unwrap().to_vec();
+    let blue = palette.chunks(3).position(|colour| colour == [0, 114, 178]).unwrap() as u8;
+    let mut frames = 0;
+    while let Some(frame) = gif.read_next_frame().unwrap() {
+        assert!(frame.buffer.contains(&blue));
+        frames += 1;
+    }
+    let files = std::fs::read_dir(run.path("frames")).unwrap().count();
+    assert_eq!(frames, files);
+    assert!(frames > 5, "{frames}");
 }
 
 #[test]

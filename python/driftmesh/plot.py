@@ -73,10 +73,12 @@ def animation(of: Run, path: str | PathLike[str] | None, field: str | None) -> F
         raise ValueError(f"{of.directory} has no frames to animate")
     name = of.frames[0].names[0] if field is None else field
     values = [frame[name] for frame in of.frames]
-    if values[0].ndim != 2:
+    if values[0].ndim != len(of.frames[0].shape):
         raise ValueError(f"`field` is {name!r}, a vector of shape {values[0].shape}; give one with a value a node")
     limits = min(v.min() for v in values), max(v.max() for v in values)
     ax = _axes(None)
+    if values[0].ndim == 1:
+        return _moving_line(of, values, name, ax, limits, path)
     _state(of.frames[0].x, of.frames[0].y, values[0], ax, limits)
     ax.set_title(_title(of.summary["study"], name, of.frames[0].t))
     # laid out once: the frames differ in what is inside
@@ -91,7 +93,27 @@ def animation(of: Run, path: str | PathLike[str] | None, field: str | None) -> F
         ax.set_title(_title(of.summary["study"], name, frame.t))
         return []
 
-    moving = FuncAnimation(_figure(ax), draw, frames=len(of.frames), init_func=lambda: [], interval=100)
+    return _moving(ax, draw, len(of.frames), path)
+
+
+def _moving_line(of: Run, values: list[Floats], name: str, ax: Axes, limits: tuple[float, float], path: str | PathLike[str] | None) -> FuncAnimation:
+    """A field over x, through the nodes of a line."""
+    [curve] = ax.plot(of.frames[0].x, values[0], marker=".")
+    room = 0.05 * (limits[1] - limits[0]) or 0.5
+    ax.set_ylim(limits[0] - room, limits[1] + room)
+    ax.set_xlabel("x")
+    ax.set_ylabel(name)
+
+    def draw(number: int) -> list[Any]:
+        curve.set_data(of.frames[number].x, values[number])
+        ax.set_title(f"{of.summary['study']}, {'t =' if 't' in of.history else 'iteration'} {of.frames[number].t:.4g}")
+        return []
+
+    return _moving(ax, draw, len(of.frames), path)
+
+
+def _moving(ax: Axes, draw: Any, frames: int, path: str | PathLike[str] | None) -> FuncAnimation:
+    moving = FuncAnimation(_figure(ax), draw, frames=frames, init_func=lambda: [], interval=100)
     if path is not None:
         moving.save(fspath(path), writer="pillow" if fspath(path).endswith(".gif") else None)
         plt.close(_figure(ax))

@@ -40,9 +40,9 @@ class Frame:
     """A state of a run, read from its file when it is first looked at.
 
     Attributes:
-        t: Time.
+        t: Time; the number of an iteration, for a line without time.
         path: The ``.vtu`` file, which ParaView, PyVista and meshio open too.
-        shape: (nx + 1, ny + 1).
+        shape: (nx + 1, ny + 1), or (n + 1,) for a line.
 
     Raises:
         RuntimeError: The file is gone or another one since the run was opened.
@@ -52,7 +52,7 @@ class Frame:
 
     t: float
     path: Path
-    shape: tuple[int, int]
+    shape: tuple[int, ...]
     _domain: dict[str, Any] = field(repr=False)
     _stamp: tuple[int, int] | None = field(repr=False)
 
@@ -82,12 +82,12 @@ class Frame:
 
     @property
     def y(self) -> Floats:
-        """y of the nodes."""
+        """y of the nodes, 0 on a line."""
         return np.ascontiguousarray(self._arrays["points"][..., 1])
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh, closing nodes of periodic axes included."""
+        """The mesh, of kinds in two dimensions, closing nodes of periodic axes included."""
         return Mesh(self.x, self.y, **self._domain)
 
     @property
@@ -96,7 +96,7 @@ class Frame:
         return [name for name in self._arrays if name != "points"]
 
     def __getitem__(self, name: str) -> Floats:
-        """A nodal field by name: shape (nx + 1, ny + 1), with two components behind that for a vector."""
+        """A nodal field by name: of the shape of the frame, with two components behind that for a vector."""
         if name not in self.names:
             raise KeyError(f"{name!r}; this frame has {', '.join(self.names)}")
         return self._arrays[name]
@@ -363,10 +363,10 @@ def _domain(directory: Path) -> dict[str, Any]:
 def _frames(directory: Path, final: Mapping[str, Floats], domain: dict[str, Any]) -> list[Frame]:
     index = directory / "run.pvd"
     x = final.get("x")
-    if not index.is_file() or x is None or x.ndim != 2:
+    if not index.is_file() or x is None:
         return []
     entries: Sequence[ElementTree.Element] = ElementTree.parse(index).getroot().findall(".//DataSet")
-    shape = (x.shape[0], x.shape[1])
+    shape: tuple[int, ...] = x.shape
     files = [(float(entry.attrib["timestep"]), directory / entry.attrib["file"]) for entry in entries]
     return [Frame(t, path, shape, domain, _stamp(path)) for t, path in files]
 

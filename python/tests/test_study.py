@@ -130,6 +130,19 @@ def test_pictures_and_animations(result, tmp_path):
         result.animate(field="mesh velocity")
 
 
+def test_the_iterates_of_a_line_are_frames(tmp_path):
+    from PIL import Image
+
+    result = driftmesh.run(ROOT / "studies/table-8-1-nonlinear.toml", out=tmp_path / "out", set={"output.report": False})
+    iterations = result.summary["iterations"]
+    assert [frame.t for frame in result.frames] == [iterate["n"] for iterate in iterations]
+    assert np.array_equal(result.frames[-1].x, result.final["x"])
+    assert np.array_equal(result.frames[0].x, np.linspace(0, 1, 101))
+    result.animate(tmp_path / "moving.gif")
+    with Image.open(tmp_path / "moving.gif") as moving:
+        assert moving.n_frames == len(iterations)
+
+
 MISTAKES = [
     ("[grid]\ncels = [3, 3]", {}),
     ("[pde]\nkind = \"burger\"", {}),

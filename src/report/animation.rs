@@ -1,7 +1,10 @@
 use super::files::RunFiles;
+use super::frame::Frame;
+use super::viewer::clock;
 use crate::error::{Error, Result};
-use crate::simulation::{Sheet, write_file};
+use crate::simulation::{COLOURS, Curve, Figure, Pixels, Scale, Sheet, write_file};
 use gif::{Encoder, Repeat};
+use plotters::style::RGBColor;
 use std::collections::HashMap;
 
 /// Frames of an animation at most; more are thinned.
@@ -16,6 +19,10 @@ const PURE: usize = 96;
 const BLENDED: usize = 33;
 const STRENGTHS: [f64; 2] = [0.25, 0.5];
 const GREYS: usize = 26;
+/// From white to a colour.
+const STEPS: usize = 128;
+/// What spans so much, and is positive, has a logarithmic axis.
+const MUCH: f64 = 30.0;
 /// Of a front, and of its soft edge on white.
 const FRONT: [[u8; 3]; 2] = [[213, 94, 0], [234, 174, 128]];
 
@@ -35,41 +42,17 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
         return Ok(());
     };
     let Some((unknown, _)) = first.fields.first() else { return Ok(()) };
-    let around = |[l, h]: [f64; 2], v: f64| [l.min(v), h.max(v)];
-    let none = [f64::INFINITY, f64::NEG_INFINITY];
-    let range = frames.iter().flat_map(|frame| &frame.fields[0].1).copied().fold(none, around);
-    let all = [0, 1].map(|d| frames.iter().flat_map(|frame| &frame.x).map(|x| x[d]).fold(none, around));
-    let number = |key: &str, d: usize| {
-        let value = run.setting(&["domain", key])?.get(d)?;
-        value.as_float().or(value.as_integer().map(|n| n as f64))
+    let draw: Box<dyn Fn(&Frame) -> Pixels> = match first.cells[1] {
+        0 => of_line(run, &frames, unknown),
+        _ => of_mesh(run, &frames, unknown),
     };
-    let lower = [0, 1].map(|d| number("lower", d).unwrap_or(all[d][0]));
-    let upper = [0, 1].map(|d| number("upper", d).unwrap_or(all[d][1]));
-    let periodic =
-        [0, 1].map(|d| run.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false));
     let each = (WHOLE / frames.len()).clamp(ONE[0], ONE[1]) as u16;
 
     let unwritable = |error: gif::EncodingError| Error::Unwritable { path: path.clone(), reason: error.to_string() };
-    let front = run.front();
-    let mut palette = Palette::new();
+    let mut palette = if first.cells[1] == 0 { Palette::of_curves() } else { Palette::of_maps() };
     let mut encoder: Option<Encoder<Vec<u8>>> = None;
     for (k, frame) in frames.iter().enumerate() {
-        let along =
-            |j: usize| (0..=frame.cells[0]).filter_map(move |i| frame.x.get(i * (frame.cells[1] + 1) + j).copied());
-        let line: Vec<[f64; 2]> = front.filter(|j| *j <= frame.cells[1]).map_or(Vec::new(), |j| along(j).collect());
-        let sheet = Sheet {
-            title: &format!("{}, t = {:.4}", run.word("study"), frame.t),
-            unknown,
-            cells: frame.cells,
-            periodic,
-            lower,
-            extent: [upper[0] - lower[0], upper[1] - lower[1]],
-            x: &frame.x,
-            u: &frame.fields[0].1,
-            range: Some(range),
-            line: &line,
-        };
-        let pixels = sheet.pixels();
+        let pixels = draw(frame);
         let [width, height] = pixels.size.map(|n| n.min(u32::from(u16::MAX)) as u16);
         let encoder = match &mut encoder {
             Some(encoder) => encoder,
@@ -91,6 +74,68 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
     }
 }
 
+fn title(run: &RunFiles, frame: &Frame) -> String {
+    match clock(run) {
+        "" => run.word("study").into(),
+        "iteration" => format!("{}, iteration {}", run.word("study"), frame.t),
+        _ => format!("{}, t = {:.4}", run.word("study"), frame.t),
+    }
+}
+
+/// The first field over the line, through all nodes.
+fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Box<dyn Fn(&Frame) -> Pixels + 'a> {
+    let points = |frame: &Frame| frame.x.iter().zip(&frame.fields[0].1).map(|(x, v)| [x[0], *v]).collect::<Vec<_>>();
+    let all = frames.iter().flat_map(points);
+    let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+    let ends = all.fold(none, |[l, h], p| [[0, 1].map(|d| l[d].min(p[d])), [0, 1].map(|d| h[d].max(p[d]))]);
+    let spans_much = ends[0][1] > 0.0 && ends[1][1] > MUCH * ends[0][1];
+    Box::new(move |frame| {
+        let figure = Figure {
+            title: title(run, frame),
+            labels: ["x".into(), field.into()],
+            scales: [Scale::Linear, if spans_much { Scale::Logarithmic } else { Scale::Linear }],
+            curves: vec![Curve { points: points(frame), ..Curve::default() }],
+            room: ends.to_vec(),
+        };
+        figure.pixels()
+    })
+}
+
+/// The mesh over the first field.
+fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Box<dyn Fn(&Frame) -> Pixels + 'a> {
+    let around = |[l, h]: [f64; 2], v: f64| [l.min(v), h.max(v)];
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    let range = frames.iter().flat_map(|frame| &frame.fields[0].1).copied().fold(none, around);
+    let all = [0, 1].map(|d| frames.iter().flat_map(|frame| &frame.x).map(|x| x[d]).fold(none, around));
+    let number = |key: &str, d: usize| {
+        let value = run.setting(&["domain", key])?.get(d)?;
+        value.as_float().or(value.as_integer().map(|n| n as f64))
+    };
+    let lower = [0, 1].map(|d| number("lower", d).unwrap_or(all[d][0]));
+    let upper = [0, 1].map(|d| number("upper", d).unwrap_or(all[d][1]));
+    let periodic =
+        [0, 1].map(|d| run.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false));
+    let front = run.front();
+    Box::new(move |frame| {
+        let along =
+            |j: usize| (0..=frame.cells[0]).filter_map(move |i| frame.x.get(i * (frame.cells[1] + 1) + j).copied());
+        let line: Vec<[f64; 2]> = front.filter(|j| *j <= frame.cells[1]).map_or(Vec::new(), |j| along(j).collect());
+        let sheet = Sheet {
+            title: &title(run, frame),
+            unknown,
+            cells: frame.cells,
+            periodic,
+            lower,
+            extent: [upper[0] - lower[0], upper[1] - lower[1]],
+            x: &frame.x,
+            u: &frame.fields[0].1,
+            range: Some(range),
+            line: &line,
+        };
+        sheet.pixels()
+    })
+}
+
 /// The colours of all frames.
 struct Palette {
     colours: Vec<[u8; 3]>,
@@ -98,7 +143,17 @@ struct Palette {
 }
 
 impl Palette {
-    fn new() -> Self {
+    /// Of curves: black and the first colour on white, in all steps between.
+    fn of_curves() -> Self {
+        let steps = |colour: [u8; 3]| {
+            (0..STEPS).map(move |k| colour.map(|c| (255 - (255 - usize::from(c)) * k / (STEPS - 1)) as u8))
+        };
+        let RGBColor(r, g, b) = COLOURS[0];
+        Self { colours: steps([0; 3]).chain(steps([r, g, b])).collect(), found: HashMap::new() }
+    }
+
+    /// Of meshes over a colour map.
+    fn of_maps() -> Self {
         let map = |k: usize, of: usize| colorous::VIRIDIS.eval_rational(k, of).as_array();
         let mut colours: Vec<[u8; 3]> = (0..PURE).map(|k| map(k, PURE)).collect();
         for (strength, line) in STRENGTHS.into_iter().flat_map(|s| [(s, 255.0), (s, 0.0)]) {
@@ -127,7 +182,7 @@ mod tests {
     /// Every colour of the map, bare or under a mesh line, is met within a few levels; black, white and a front exactly.
     #[test]
     fn the_palette_meets_the_colours_of_the_drawings() {
-        let mut palette = Palette::new();
+        let mut palette = Palette::of_maps();
         assert_eq!(palette.colours.len(), 256);
         for k in 0..500 {
             let bare = colorous::VIRIDIS.eval_rational(k, 500).as_array();

@@ -1,6 +1,7 @@
 use super::frame::{Frame, attribute};
 use crate::error::{Error, Result};
 use crate::parallel::map;
+use crate::simulation::RunDirectory;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,8 @@ pub struct RunFiles {
     pub history: Vec<Column>,
     /// Frames of the run, and of the one that it is compared with.
     pub series: [Series; 2],
+    /// Whether a run writes there now.
+    pub busy: bool,
     /// What was damaged or left out.
     pub notes: Vec<String>,
 }
@@ -61,7 +64,11 @@ impl RunFiles {
         });
         let history = history(&directory.join("history.csv"), &mut notes);
         let series = ["run.pvd", "compare.pvd"].map(|name| Series::read(&directory.join(name)));
-        Ok(Self { directory: directory.into(), summary, study_text, study, history, series, notes })
+        if study.contains_key("compare") && series[1].frames.is_empty() {
+            notes.push("the mesh of [compare] is not here: it is computed after the run itself".into());
+        }
+        let busy = RunDirectory::is_busy(directory);
+        Ok(Self { directory: directory.into(), summary, study_text, study, history, series, busy, notes })
     }
 
     /// A text of the summary.

@@ -57,6 +57,8 @@ pub struct Plot {
 struct Shown {
     title: &'static str,
     source: String,
+    /// Whether it has a colour map, whose light and dark mean something.
+    mapped: bool,
 }
 
 /// The page, everything in it.
@@ -65,7 +67,10 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
     let failed = run.summary.values().find(|value| value.get("message").is_some());
     let told = |key: &str| failed.and_then(|failed| failed.get(key)?.as_str());
     let warnings = run.summary.get("warnings").and_then(Value::as_array);
-    let status = run.word("status");
+    let status = match run.word("status") {
+        "running" if !run.busy => "killed",
+        other => other,
+    };
     let page = Page {
         study: run.word("study"),
         kind: run.word("kind"),
@@ -76,8 +81,11 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
             "failed" => "The run failed; everything up to the last good state is here.".into(),
             "not-converged" => "The iteration did not converge.".into(),
             "interrupted" => "The run was interrupted; everything up to the last good state is here.".into(),
-            "running" => {
-                "The run has not ended: it was interrupted, or still goes on. This is what it left so far.".into()
+            "running" => "The run still goes on. This is what it left so far.".into(),
+            "killed" => {
+                "The run did not come to its end, and goes on no more. This is what it left; the same command with --resume \
+                 goes on from its newest checkpoint."
+                    .into()
             }
             other => format!("Status: {other}."),
         },
@@ -109,8 +117,10 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
 
 /// Pictures that the run drew itself; the mesh only where no viewer shows it.
 fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
+    // that of a line shows the paths of its nodes
+    let line = run.word("kind") == "equidistribution";
     let candidates = [
-        ("mesh", "The mesh", !viewed),
+        ("mesh", if line { "The nodes" } else { "The mesh" }, line || !viewed),
         ("density", "The density", true),
         ("convergence", "Convergence", true),
         ("front", "The front over time", true),
@@ -121,7 +131,11 @@ fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
             let path = run.directory.join(format!("{name}.{format}"));
             let small = std::fs::metadata(&path).is_ok_and(|file| file.len() <= LARGE);
             let bytes = small.then(|| std::fs::read(&path).ok()).flatten()?;
-            Some(Shown { title, source: format!("data:{mime};base64,{}", STANDARD.encode(bytes)) })
+            Some(Shown {
+                title,
+                mapped: !line && name == "mesh",
+                source: format!("data:{mime};base64,{}", STANDARD.encode(bytes)),
+            })
         })
     };
     candidates.into_iter().filter_map(picture).collect()

@@ -92,6 +92,9 @@ const GROUPS: [Group; 9] = [
     },
 ];
 
+/// A start below this share of what follows is rounding.
+const ROUNDING: f64 = 1e-6;
+
 /// Plots of a history over time, as far as it has something to show.
 pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
     let column = |name: &str| run.history.iter().find(|column| column.name == name);
@@ -112,6 +115,7 @@ pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
                 labels: ["time t".into(), group.label.into()],
                 scales: [Scale::Linear, group.scale],
                 curves,
+                ..Figure::default()
             };
             (group.name, figure)
         })
@@ -122,9 +126,16 @@ pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
 /// A column over time.
 fn curve(name: &str, t: &Column, column: &Column, scale: Scale) -> Curve {
     let placed = |v: f64| scale == Scale::Linear || v > 0.0;
-    let points: Vec<[f64; 2]> = (t.values.iter().zip(&column.values))
+    let mut points: Vec<[f64; 2]> = (t.values.iter().zip(&column.values))
         .filter_map(|(t, v)| Some([(*t)?, (*v)?]))
         .filter(|p| placed(p[1]))
         .collect();
+    // the start is given: its error is rounding, which would stretch the axis over all powers of ten
+    if let [first, second, ..] = points[..]
+        && scale == Scale::Logarithmic
+        && first[1] < ROUNDING * second[1]
+    {
+        points.remove(0);
+    }
     Curve { name: name.into(), points, plain: true, ..Curve::default() }.outlined()
 }

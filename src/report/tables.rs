@@ -26,7 +26,7 @@ const ELSEWHERE: [&str; 8] = ["schema", "study", "kind", "version", "status", "s
 const MANY: usize = 8;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 45] = [
+const NAMES: [(&str, &str, &str); 46] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -80,6 +80,7 @@ const NAMES: [(&str, &str, &str); 45] = [
     ("linear_iterations", "iterations of linear solvers", ""),
     ("newton_iterations", "iterations of Newton's method", ""),
     ("path_steps", "steps of random paths", ""),
+    ("iterations_to_tolerance", "iterations to the tolerance", ""),
 ];
 
 /// Everything of a summary that makes a table.
@@ -90,7 +91,10 @@ pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
         match value {
             // a failure is told at the top
             Value::Object(object) if object.contains_key("message") => {}
-            Value::Array(records) if records.iter().any(Value::is_object) => tables.push(of_records(key, records)),
+            Value::Array(records) if records.iter().any(Value::is_object) => {
+                let last = key == "iterations" && summary.contains_key("iterations_per_step");
+                tables.push(of_records(if last { "iterations of the last step" } else { key }, records));
+            }
             Value::Array(records) if records.is_empty() => {}
             // of a contraction that nobody knows
             Value::Object(rate) if key == "rate" && rate.iter().all(|(key, v)| key == "stride" || v.is_null()) => {}
@@ -105,6 +109,8 @@ pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
                 tables.push(Table { title: title(key), head: Vec::new(), rows, words });
             }
             Value::Null => {}
+            // of the last step
+            _ if key == "iterations_to_tolerance" && summary.contains_key("iterations_per_step") => {}
             _ => loose.push((key.clone(), value.clone())),
         }
     }

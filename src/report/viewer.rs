@@ -168,7 +168,11 @@ pub fn clock(run: &RunFiles) -> &'static str {
     match run.word("kind") {
         "poisson" => "",
         "equidistribution" if run.setting(&["time"]).is_none() => {
-            if run.setting(&["schwarz"]).is_some() { "iteration" } else { "" }
+            if run.setting(&["schwarz"]).is_some() {
+                "iteration"
+            } else {
+                ""
+            }
         }
         _ => "t",
     }

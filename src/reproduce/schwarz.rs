@@ -87,6 +87,7 @@ fn errors(title: &str, along: &str, curves: Vec<Curve>) -> Figure {
         labels: [along.into(), "distance to the single-domain mesh".into()],
         scales: [Scale::Linear, Scale::Logarithmic],
         curves,
+        ..Figure::default()
     }
 }
 
@@ -171,6 +172,7 @@ pub fn table_8_1(_: Options) -> Result<Rerun> {
         labels: ["iterations".into(), "2 max |u_i − u_{i−1}|".into()],
         scales: [Scale::Linear, Scale::Logarithmic],
         curves,
+        ..Figure::default()
     };
     Ok(Rerun { tables: vec![table], pictures: vec![("table-8-1".into(), figure.draw())] })
 }
@@ -322,6 +324,7 @@ pub fn figure_8_3(_: Options) -> Result<Rerun> {
         labels: ["x".into(), "u".into()],
         scales: [Scale::Linear; 2],
         curves: vec![Curve { points: mesh.iter().zip(u).map(|(x, u)| [*x, u]).collect(), ..Curve::default() }],
+        ..Figure::default()
     };
     let row = |(n, mesh): (usize, &Vec<f64>)| Curve {
         points: mesh.iter().map(|x| [*x, n as f64]).collect(),
@@ -332,6 +335,7 @@ pub fn figure_8_3(_: Options) -> Result<Rerun> {
         labels: ["x".into(), "iteration".into()],
         scales: [Scale::Linear; 2],
         curves: meshes.iter().enumerate().map(row).collect(),
+        ..Figure::default()
     };
     Ok(Rerun {
         tables: vec![table],
@@ -512,6 +516,7 @@ pub fn figure_8_6(_: Options) -> Result<Rerun> {
             labels: ["x".into(), "t".into()],
             scales: [Scale::Linear; 2],
             curves,
+            ..Figure::default()
         };
         pictures.push((format!("figure-8-6-{side}"), figure.draw()));
     }

@@ -13,9 +13,9 @@ mod schedule;
 pub use checkpoint::CheckpointsAt;
 pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
-pub(crate) use observer::{Rows, frame_name, vtu};
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
-pub(crate) use report::{Canvas, status, write_file};
+pub(crate) use observer::{Rows, frame_name, vtu};
+pub(crate) use report::{COLOURS, Canvas, status, write_file};
 pub use report::{
     Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Standing, Summary, WorkTotal,
 };

@@ -258,7 +258,7 @@ impl StefanStudy {
         };
         let (event, mut tables, mut frames, mut fronts) = match resumed {
             Some(((found, tables, frames), refused)) => {
-                directory.clear_ended()?;
+                directory.clear_ended(&RunDirectory::GROWING)?;
                 prepared.state = found.state;
                 (summary.seconds, summary.work, summary.reports) = (found.seconds, found.work, found.reports);
                 summary.warnings = [found.warnings, refused].concat();

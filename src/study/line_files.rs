@@ -20,7 +20,12 @@ const BETWEEN: usize = 8;
 const PATHS: usize = 40;
 
 /// Writes the history, the arrays, the frames and the pictures.
-pub(super) fn keep(study: &EquidistributionStudy, line: &Line, directory: &RunDirectory, evolution: &Evolution) -> Result<()> {
+pub(super) fn keep(
+    study: &EquidistributionStudy,
+    line: &Line,
+    directory: &RunDirectory,
+    evolution: &Evolution,
+) -> Result<()> {
     let iterates = evolution.last.iter().flat_map(|history| &history.iterates);
     let table = match study.time {
         Some(_) => csv_of(&evolution.steps),
@@ -80,8 +85,8 @@ fn write_frames(
         .map_err(|error| Error::Unwritable { path: folder.clone(), reason: error.to_string() })?;
     let meshes: Vec<(usize, f64, &[f64])> = match (&study.time, &evolution.last) {
         (Some(_), _) => {
-            let kept = evolution.times.iter().zip(&evolution.meshes).enumerate();
-            kept.map(|(k, (t, mesh))| (k, *t, mesh.as_slice())).collect()
+            let kept = evolution.kept.iter().zip(&evolution.times).zip(&evolution.meshes);
+            kept.map(|((step, t), mesh)| (*step, *t, mesh.as_slice())).collect()
         }
         (None, Some(history)) => {
             let path = history.path.iter().map(|(n, mesh)| (*n, mesh.as_slice()));
@@ -137,15 +142,21 @@ pub(super) fn thinned(count: usize, most: usize) -> impl Iterator<Item = usize> 
     (0..count).filter(move |i| i % every == 0 || i + 1 == count)
 }
 
+/// What a title says of a mesh that is none.
+fn folded(mesh: &[f64]) -> &'static str {
+    if mesh.is_sorted_by(|a, b| a < b) { "" } else { ", folded: nodes have changed their order" }
+}
+
 /// x over ξ.
 fn mapping(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Figure {
     let mesh = evolution.mesh();
     let points = thinned(mesh.len(), DRAWN).map(|i| [i as f64 / line.cells as f64, mesh[i]]).collect();
     Figure {
-        title: format!("{}, {} cells", study.study.name, line.cells),
+        title: format!("{}, {} cells{}", study.study.name, line.cells, folded(mesh)),
         labels: ["ξ".into(), "x".into()],
         scales: [Scale::Linear; 2],
         curves: vec![Curve { points, plain: line.cells > DRAWN, ..Curve::default() }],
+        ..Figure::default()
     }
 }
 
@@ -174,6 +185,7 @@ fn paths(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> F
         labels: ["x".into(), "t".into()],
         scales: [Scale::Linear; 2],
         curves,
+        ..Figure::default()
     }
 }
 
@@ -206,6 +218,7 @@ fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) ->
         labels: ["x".into(), "M".into()],
         scales: [Scale::Linear, if high > 30.0 * low { Scale::Logarithmic } else { Scale::Linear }],
         curves,
+        ..Figure::default()
     }
 }
 
@@ -218,20 +231,17 @@ fn convergence(study: &EquidistributionStudy, history: &History) -> Figure {
         let rate = rate.filter(|rate| *rate > 0.0)?;
         let points = (0..=last).map(|k| [k as f64, error.max(floor) * rate.powf(0.5 * (k as f64 - n))]);
         let points = points.filter(|p| (0.1 * floor..10.0 * errors[0][1].max(floor)).contains(&p[1])).collect();
-        Some(Curve { name: format!("{name}, {rate:.4} in two"), points, plain: true, ..Curve::default() })
+        Some(Curve { name: format!("{name}, {rate:.4} in two iterations"), points, plain: true, ..Curve::default() })
     };
-    let mut curves = vec![Curve { name: "error".into(), points: errors.clone(), ..Curve::default() }.outlined()];
+    let mut curves = vec![Curve { name: "observed".into(), points: errors.clone(), ..Curve::default() }.outlined()];
     // slopes: what is predicted holds in the end, a bound from the start, for even iterates and odd ones apart
-    curves.extend(line("slope predicted", history.prediction.predicted, errors[last]));
-    curves.extend(line(
-        "slope of the bound",
-        history.prediction.bound,
-        [0.0, errors[0][1].max(errors[1.min(last)][1])],
-    ));
+    curves.extend(line("predicted", history.prediction.predicted, errors[last]));
+    curves.extend(line("bound", history.prediction.bound, [0.0, errors[0][1].max(errors[1.min(last)][1])]));
     Figure {
         title: format!("{}, convergence{}", study.study.name, study.time.as_ref().map_or("", |_| " in the last step")),
         labels: ["iterations".into(), "distance to the single-domain mesh".into()],
         scales: [Scale::Linear, Scale::Logarithmic],
         curves,
+        ..Figure::default()
     }
 }

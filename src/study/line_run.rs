@@ -150,6 +150,8 @@ pub struct Evolution {
     pub times: Vec<f64>,
     /// The meshes.
     pub meshes: Vec<Vec<f64>>,
+    /// The steps that led to them.
+    pub kept: Vec<usize>,
     /// How the iteration of each step went, in a line; none without subdomains.
     pub steps: Vec<StepRow>,
     /// The last of these iterations.
@@ -211,7 +213,7 @@ impl EquidistributionStudy {
         let divided = self.decomposition()?;
         if evolution.newest.is_empty() {
             evolution.newest = self.first(line)?;
-            (evolution.times, evolution.meshes) = (vec![start], vec![evolution.newest.clone()]);
+            evolution.keep(start);
         }
         for step in evolution.done + 1..=steps {
             let mesh = std::mem::take(&mut evolution.newest);
@@ -242,8 +244,7 @@ impl EquidistributionStudy {
             evolution.done = step;
             let kept = self.output.frames.as_ref().is_none_or(|frames| frames.due(step, t, dt));
             if kept || step == steps {
-                evolution.times.push(t);
-                evolution.meshes.push(evolution.newest.clone());
+                evolution.keep(t);
             }
             after(t, evolution)?;
         }
@@ -255,12 +256,12 @@ impl EquidistributionStudy {
         let damaged = |error: Error| Unfit::Damaged(error.to_string());
         let schedule = self.time.map(|time| time.schedule()).transpose().map_err(damaged)?;
         let divided = self.decomposition().map_err(damaged)?.is_some();
-        let Evolution { times, meshes, steps, last, done, newest, .. } = evolution;
+        let Evolution { times, meshes, kept, steps, last, done, newest, .. } = evolution;
         let nodes = |mesh: &Vec<f64>| check_nodal("mesh", mesh.as_chunks::<1>().0, line.cells + 1);
         let glued = last.iter().flat_map(|history| [&history.mesh, &history.reference]);
         meshes.iter().chain([newest]).chain(glued).try_for_each(nodes)?;
         let counted = schedule.and_then(|schedule| schedule.steps()).is_some_and(|steps| *done <= steps)
-            && times.len() == meshes.len()
+            && [times.len(), kept.len()] == [meshes.len(); 2]
             && !times.is_empty()
             && steps.len() == if divided { *done } else { 0 }
             && last.is_some() == (divided && *done > 0)
@@ -307,7 +308,7 @@ impl EquidistributionStudy {
             }
         };
         match &resumed {
-            Some(_) => directory.clear_ended()?,
+            Some(_) => directory.clear_ended(&[])?,
             None => directory.clear()?,
         }
         let mut summary = study.summary();
@@ -332,8 +333,7 @@ impl EquidistributionStudy {
         if let Some(Error::Interrupted(Moment { t, .. })) = failure
             && evolution.times.last() != Some(&t)
         {
-            evolution.times.push(t);
-            evolution.meshes.push(evolution.newest.clone());
+            evolution.keep(t);
         }
         summary.seconds = spent();
         let output = Instant::now();
@@ -381,6 +381,13 @@ impl EquidistributionStudy {
 }
 
 impl Evolution {
+    /// Keeps the newest mesh, of this time.
+    fn keep(&mut self, t: f64) {
+        self.times.push(t);
+        self.meshes.push(self.newest.clone());
+        self.kept.push(self.done);
+    }
+
     fn tell(&mut self, t: f64, history: History) {
         let last = history.iterates[history.count()];
         self.linear_solves += last.linear_solves;

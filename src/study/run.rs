@@ -65,7 +65,7 @@ fn run_from(
         Begin::Resumed => checkpoints.resume(|found| Underway::resume(&study, &mut simulation, &directory, found))?,
     };
     match &resumed {
-        Some(_) => directory.clear_ended()?,
+        Some(_) => directory.clear_ended(&RunDirectory::GROWING)?,
         None => directory.clear()?,
     }
     let mut summary = Summary {
@@ -130,9 +130,8 @@ fn run_from(
     let (state, failure) = match outcome {
         Ok(ended) => ended,
         Err(error) => {
-            note(&mut summary, Some(&error), 0.0);
-            let _ = directory.write_summary(&summary);
-            return Err(error);
+            let told = |status: &str| report::finish(directory.path(), study.output.report, false, status);
+            return Err(end(&directory, &mut summary, Some(error), note, told).expect("what failed is told of"));
         }
     };
     let failure = end(&directory, &mut summary, failure, note, |status| {

@@ -177,6 +177,65 @@ def test_subdomains_colours_zoom_and_keys_change_the_picture(run, chromium):
 
 
 @browser_is_here
+def test_the_nodes_of_a_line_move_with_the_iterations(chromium, tmp_path):
+    """Every iterate is a frame; what is read at a node stands in its file, and the ends of both subdomains are marked."""
+    out = study("table-8-1-nonlinear", tmp_path / "out")
+    opened(chromium, out)
+    count = len(json.loads((out / "summary.json").read_text())["iterations"]) - 1
+    assert chromium.find_element("id", "now").text == f"iteration {count}"
+    last = pixels(chromium)
+    chromium.find_element("id", "time").send_keys(webdriver.Keys.HOME)
+    assert chromium.find_element("id", "now").text == "iteration 0"
+    assert not np.array_equal(pixels(chromium), last), "the slider moves the nodes"
+    for shown in (1, 2):
+        chromium.find_element("id", "time").send_keys(webdriver.Keys.ARROW_RIGHT)
+        frame = pyvista.read(out / f"frames/step-{shown:06}.vtu")
+        x = frame.points[:, 0]
+        canvas = chromium.find_element("css selector", ".stages canvas")
+        width, node = canvas.rect["width"], 70
+        to = [62 + x[node] * (width - 76) - width / 2, 0]
+        webdriver.ActionChains(chromium).move_to_element_with_offset(canvas, round(to[0]), 0).perform()
+        read = readout(chromium)
+        # neighbours may be nearer to the pixel
+        node = int(read["node"])
+        assert abs(node - 70) <= 1 and figure(read["ξ"]) == node / 100
+        assert figure(read["x"]) == pytest.approx(x[node], rel=1e-5, abs=1e-6)
+        for name in set(frame.point_data) & {"u", "M"}:
+            assert figure(read[name]) == pytest.approx(frame[name][node], rel=1e-5, abs=1e-5), name
+        share, length = frame.cell_data["share"][node], frame.cell_data["jacobian"][node]
+        assert figure(read["cell length, over the mean"]) == pytest.approx(length, rel=1e-3)
+        assert figure(read["M × cell length, over the mean"]) == pytest.approx(share, rel=1e-3)
+    cells = frame.cell_data
+    assert chromium.execute_script("return viewer.data.meshes[0].cuts[0]") == [
+        k for k in range(1, 100) if (cells["subdomain"][k], cells["overlap"][k]) != (cells["subdomain"][k - 1], cells["overlap"][k - 1])
+    ]
+    chromium.find_element("id", "play").click()
+    chromium.execute_async_script(
+        "const done = arguments[0], look = () => viewer.playing ? setTimeout(look, 50) : done(); look()"
+    )
+    assert chromium.find_element("id", "now").text == f"iteration {count}"
+    # everything that the curve can show, from afar and from near
+    pictures = []
+    for field in chromium.execute_script("return [...viewer.controls.field.options].map((option) => option.value)"):
+        chromium.execute_script("viewer.controls.field.value = arguments[0]; viewer.draw()", field)
+        pictures.append(pixels(chromium))
+    chromium.execute_script("viewer.scale(40)")
+    pictures.append(pixels(chromium))
+    assert all(not np.array_equal(a, b) for k, a in enumerate(pictures) for b in pictures[:k])
+    assert [entry for entry in chromium.get_log("browser") if "readback" not in entry["message"]] == []
+
+
+@browser_is_here
+def test_a_killed_run_is_not_called_running(chromium, tmp_path):
+    out = study("table-8-1-nonlinear", tmp_path / "out")
+    summary = json.loads((out / "summary.json").read_text())
+    (out / "summary.json").write_text(json.dumps(summary | {"status": "running"}))
+    subprocess.run([ROOT / "target/release/driftmesh", "report", out], check=True, capture_output=True)
+    opened(chromium, out)
+    assert chromium.find_element("css selector", ".status").text == "killed"
+
+
+@browser_is_here
 def test_everything_on_the_page_has_a_name(run, chromium):
     opened(chromium, run)
     unnamed = chromium.execute_script(
@@ -207,6 +266,7 @@ KINDS = [
     ("poisson", "laplacian-model-problem", []),
     ("stefan", "stefan-slides", ["time.end=0.2", "time.report=[0.2]"]),
     ("equidistribution", "table-8-1-nonlinear", []),
+    ("equidistribution-in-time", "moving-front-1d", ["time.end=0.02"]),
 ]
 
 

@@ -40,7 +40,7 @@ pub fn draw_curves(
             colour((t - ends.0) / (ends.1 - ends.0))
         );
     }
-    axes(&mut s, lower, extent, [width, height]);
+    axes(&mut s, lower, extent, [width, height], &["x", "y"]);
     colour_bar(&mut s, parameter, ends.0, ends.1, LEFT + width + BAR, height);
     s.push_str("</svg>\n");
     Picture::of(&s, &mut Canvas::default())

@@ -102,10 +102,12 @@ impl RunDirectory {
         Ok(Self { path: path.into(), lock })
     }
 
-    /// Removes what only a run that ended writes, and leaves what one that goes on adds to.
-    pub(crate) fn clear_ended(&self) -> Result<()> {
-        let keep = ["summary.json", "study.toml", "history.csv", "front.csv", "run.pvd", FRAMES[0]];
-        self.clear_but(&[&keep[..], &Checkpoints::NAMES].concat())
+    /// Tables and frames, which a run adds to as it goes on.
+    pub(crate) const GROWING: [&str; 4] = ["history.csv", "front.csv", "run.pvd", FRAMES[0]];
+
+    /// Removes what only a run that ended writes, and leaves checkpoints and what the run adds to.
+    pub(crate) fn clear_ended(&self, growing: &[&str]) -> Result<()> {
+        self.clear_but(&[&["summary.json", "study.toml"], growing, &Checkpoints::NAMES].concat())
     }
 
     /// Removes what an earlier run wrote, and nothing else.
@@ -130,6 +132,11 @@ impl RunDirectory {
         // only an empty folder goes; what is not ours keeps it
         let _ = std::fs::remove_dir(path.join(FRAMES[1]));
         Ok(())
+    }
+
+    /// Whether a run writes there now.
+    pub fn is_busy(path: &Path) -> bool {
+        File::open(path.join(LOCK)).is_ok_and(|lock| lock.try_lock().is_err())
     }
 
     /// How far the run in a directory came.

@@ -1,5 +1,5 @@
-use super::picture::{Canvas, FONT, Picture, Ticks};
-use plotters::coord::combinators::LogCoord;
+use super::picture::{Canvas, FONT, Picture, Pixels, Ticks};
+use plotters::coord::combinators::{BindKeyPoints, LogCoord};
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -17,6 +17,8 @@ pub struct Figure {
     pub scales: [Scale; 2],
     /// The curves.
     pub curves: Vec<Curve>,
+    /// Points that have room in any case, also where no curve goes.
+    pub room: Vec<[f64; 2]>,
 }
 
 /// Of an axis.
@@ -47,7 +49,7 @@ pub struct Curve {
 }
 
 /// Colours that are told apart by everybody: Okabe and Ito (2008).
-const COLOURS: [RGBColor; 6] = [
+pub(crate) const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -55,7 +57,7 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),
 ];
-const SIZE: (u32, u32) = (760, 520);
+const SIZE: (u32, u32) = (620, 430);
 /// Parts of a pixel: the drawing library places by whole numbers.
 const FINE: u32 = 8;
 /// Narrow stretches along the bottom of a plot.
@@ -63,18 +65,26 @@ const STRETCHES: f64 = 150.0;
 /// More marks than this are small.
 const MANY: usize = 40;
 /// Size of the plot itself, of a row of the legend, and of what is beside its words, in pixels; a letter is so wide at most.
-const PLOT: [f64; 2] = [640.0, 410.0];
+const PLOT: [f64; 2] = [508.0, 320.0];
 const ROW: f64 = 22.0;
 const BESIDE: f64 = 64.0;
-const LETTER: f64 = 7.0;
+const LETTER: f64 = 7.5;
 /// Letters of a title at its full size.
-const LETTERS: f64 = 80.0;
+const LETTERS: f64 = 64.0;
 /// Places on a line between two points that are looked at.
 const BETWEEN: usize = 16;
 /// Room above and below a curve, as a share.
 const EDGE: f64 = 0.02;
 /// Room around the points, as a factor.
-const ROOM: f64 = 1.1;
+const ROOM: f64 = 1.05;
+/// Figures that round numbers begin with, and what may be rounding.
+const ROUND: [f64; 3] = [1.0, 2.0, 5.0];
+const SLACK: f64 = 1e-9;
+/// A logarithmic axis ends at powers of ten where it spans more than this, and at no round numbers where it spans less.
+const MANY_POWERS: f64 = 1e4;
+const NARROW: f64 = 4.0;
+/// Powers with a label, at most.
+const MOST_POWERS: i32 = 9;
 
 impl Curve {
     /// As few points as show the same, with their order along the bottom: of each narrow stretch its first and last, its
@@ -105,6 +115,11 @@ impl Figure {
         Picture::of(&self.svg(), &mut Canvas::default())
     }
 
+    /// Its pixels, in the size of the drawing.
+    pub fn pixels(&self) -> Pixels {
+        Canvas::default().pixels(&self.svg())
+    }
+
     /// Draws it for a page that has the font.
     pub fn svg(&self) -> String {
         let mut svg = String::new();
@@ -120,7 +135,10 @@ impl Figure {
         use Scale::{Linear, Logarithmic};
         let range = |d: usize| self.ends(d)[0]..self.ends(d)[1];
         let plain = |d: usize| RangedCoordf64::from(range(d));
-        let log = |d: usize| LogCoord::from(range(d).log_scale());
+        let log = |d: usize| {
+            let [bold, light] = log_marks(self.ends(d));
+            LogCoord::from(range(d).log_scale()).with_key_points(bold).with_light_points(light)
+        };
         match self.scales {
             [Logarithmic, Logarithmic] => self.chart(svg, log(0), log(1)),
             [Linear, Logarithmic] => self.chart(svg, plain(0), log(1)),
@@ -135,8 +153,8 @@ impl Figure {
         placed(0) && placed(1)
     }
 
-    /// From where to where an axis goes: around the points, and from power to power where it is logarithmic; further up
-    /// where a legend would find no free corner.
+    /// From where to where an axis goes: around the points, and from mark to mark where it is logarithmic; further up where
+    /// a legend would find no free corner.
     fn ends(&self, d: usize) -> [f64; 2] {
         let [low, high] = self.around(d);
         if d == 0 || !self.is_named() || self.free_corner().is_some() {
@@ -150,26 +168,28 @@ impl Figure {
     }
 
     fn around(&self, d: usize) -> [f64; 2] {
-        let points = self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated));
+        let points =
+            self.curves.iter().flat_map(|curve| curve.points.iter().chain(&curve.extrapolated)).chain(&self.room);
         let around = |[low, high]: [f64; 2], p: &[f64; 2]| [low.min(p[d]), high.max(p[d])];
         let [low, high] = points.filter(|p| self.shown(p)).fold([f64::INFINITY, f64::NEG_INFINITY], around);
         match self.scales[d] {
             _ if low > high => [1.0, 10.0],
-            // a little more, so that the powers at both ends are marked
             Scale::Logarithmic => {
-                [whole(low / ROOM, f64::floor) * (1.0 - 1e-9), whole(high * ROOM, f64::ceil) * (1.0 + 1e-9)]
+                let [low, high] = [low / ROOM, high * ROOM];
+                // powers of ten where there are many, else what begins with 1, 2 or 5, and neither in a narrow range
+                let round = match high / low {
+                    wide if wide > MANY_POWERS => [1.0].as_slice(),
+                    wide if wide > NARROW => &ROUND,
+                    _ => return [low, high],
+                };
+                // a little more, so that both ends are marked
+                [below(low, round) * (1.0 - SLACK), above(high, round) * (1.0 + SLACK)]
             }
             Scale::Linear if low == high => [low - 0.5, high + 0.5],
             // a curve does not lie on the frame
             Scale::Linear if d == 1 => [low - EDGE * (high - low), high + EDGE * (high - low)],
             Scale::Linear => [low, high],
         }
-    }
-
-    /// Lines between the numbers of an axis: of those that show powers.
-    fn between(&self, d: usize) -> usize {
-        let [low, high] = self.ends(d);
-        if self.scales[d] == Scale::Logarithmic && high > 20.0 * low { 10 } else { 0 }
     }
 
     /// What a curve goes through, as it is drawn.
@@ -248,19 +268,20 @@ impl Figure {
             [0, 1].map(|d| (self.scales[d] == Scale::Linear).then(|| Ticks::between(self.ends(d)[0], self.ends(d)[1])));
         let names =
             [0, 1].map(|d| plain[d].as_ref().map_or(self.labels[d].clone(), |ticks| ticks.named(&self.labels[d])));
-        let label = |value: f64, d: usize| plain[d].as_ref().map_or_else(|| power(value), |ticks| ticks.label(value));
+        let label = |value: f64, d: usize| plain[d].as_ref().map_or_else(|| short(value), |ticks| ticks.label(value));
+        let light = |d: usize| usize::from(plain[d].is_none());
         chart
             .configure_mesh()
             .x_desc(&names[0])
             .y_desc(&names[1])
-            .label_style(font(14))
-            .axis_desc_style(font(15))
+            .label_style(font(15))
+            .axis_desc_style(font(16))
             .axis_style(BLACK.stroke_width(FINE))
             .set_all_tick_mark_size(5 * FINE)
             .bold_line_style(BLACK.mix(0.15).stroke_width(FINE))
             .light_line_style(BLACK.mix(0.04).stroke_width(FINE))
-            .x_max_light_lines(self.between(0))
-            .y_max_light_lines(self.between(1))
+            .x_max_light_lines(light(0))
+            .y_max_light_lines(light(1))
             .x_label_formatter(&|x| label(*x, 0))
             .y_label_formatter(&|y| label(*y, 1))
             .draw()?;
@@ -271,8 +292,10 @@ impl Figure {
             let style = if curve.faint { BLACK.mix(0.25).stroke_width(FINE) } else { colour.stroke_width(2 * FINE) };
             let drawn = chart.draw_series(LineSeries::new(line, style))?;
             if !curve.name.is_empty() {
-                drawn.label(&curve.name).legend(move |(x, y)| {
-                    PathElement::new(vec![(x, y), (x + 22 * FINE as i32, y)], colour.stroke_width(2 * FINE))
+                let (fine, scattered) = (FINE as i32, curve.scattered);
+                drawn.label(&curve.name).legend(move |(x, y)| match scattered {
+                    true => Circle::new((x + 11 * fine, y), 4 * FINE, colour.filled()).into_dyn(),
+                    false => PathElement::new([(x, y), (x + 22 * fine, y)], colour.stroke_width(2 * FINE)).into_dyn(),
                 });
             }
             if !curve.plain {
@@ -284,7 +307,7 @@ impl Figure {
         if self.is_named() {
             chart
                 .configure_series_labels()
-                .label_font(font(14))
+                .label_font(font(15))
                 .background_style(WHITE.mix(0.9))
                 .border_style(BLACK.mix(0.4).stroke_width(FINE))
                 .margin(8 * FINE)
@@ -312,19 +335,46 @@ fn with_opacity_of_paint(svg: &str) -> String {
     out
 }
 
-/// The next power of ten, down or up.
-fn whole(x: f64, round: fn(f64) -> f64) -> f64 {
-    10_f64.powf(round(x.log10()))
+/// The largest number not above x that begins with one of these figures, which begin with 1.
+fn below(x: f64, round: &[f64]) -> f64 {
+    let ten = 10_f64.powf((x.log10() + SLACK).floor());
+    round.iter().map(|m| m * ten).rfind(|m| *m <= x * (1.0 + SLACK)).unwrap_or(ten)
 }
 
-/// A number on a logarithmic axis, as 0.01 or as 1e-5; nothing for those that would stand too close together.
-fn power(x: f64) -> String {
-    let text = format!("{x:.3e}").replacen(".000e", "e", 1);
-    match text.split('e').next() {
-        Some("1" | "2" | "5") if (0.0099..1.1e4).contains(&x) => format!("{}", (x * 1e6).round() / 1e6),
-        Some("1" | "2" | "5") => text,
-        _ => String::new(),
+/// The smallest one not below x.
+fn above(x: f64, round: &[f64]) -> f64 {
+    let ten = 10_f64.powf((x.log10() + SLACK).floor());
+    round.iter().chain(&[10.0]).map(|m| m * ten).find(|m| *m >= x * (1.0 - SLACK)).unwrap_or(10.0 * ten)
+}
+
+/// Where a logarithmic axis has labels, and where it has lines between them.
+fn log_marks([low, high]: [f64; 2]) -> [Vec<f64>; 2] {
+    let inside = |v: &f64| (low * (1.0 - SLACK)..=high * (1.0 + SLACK)).contains(v);
+    let [first, last] = [low, high].map(|end| end.log10().floor() as i32);
+    let decades = (last - first).max(1);
+    let beginning = |with: &[f64], every: i32| -> Vec<f64> {
+        let powers = (first..=last).filter(|k| k.rem_euclid(every) == 0).map(|k| 10_f64.powi(k));
+        powers.flat_map(|ten| with.iter().map(move |m| m * ten)).filter(inside).collect()
+    };
+    let every = (decades + MOST_POWERS - 1) / MOST_POWERS;
+    let all = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+    let between = if every == 1 { beginning(&all, 1) } else { beginning(&[1.0], 1) };
+    for bold in [beginning(&[1.0], every), beginning(&ROUND, 1)] {
+        if bold.len() >= 3 {
+            return [bold, between];
+        }
     }
+    [Ticks::between(low, high).places().filter(inside).collect(), Vec::new()]
+}
+
+/// A number on a logarithmic axis, as 0.001 or as 1e-4.
+fn short(x: f64) -> String {
+    if (0.00099..1.1e4).contains(&x) {
+        return format!("{}", (x * 1e6).round() / 1e6);
+    }
+    let text = format!("{x:.4e}");
+    let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+    format!("{}e{power}", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
 #[cfg(test)]
@@ -344,6 +394,31 @@ mod tests {
         let curve = Curve { points: jump.collect(), ..Curve::default() }.outlined();
         for p in (0..90).map(|k| [k as f64 / 100.0, 1.0]).chain([[0.9, 7.0]]) {
             assert!(curve.points.contains(&p), "{p:?} is lost");
+        }
+    }
+
+    /// Many powers of ten, few of them, and less than one: each axis has enough labels, no two alike, and ends near its
+    /// points.
+    #[test]
+    fn logarithmic_axes_have_labels_that_differ() {
+        for (low, high, ends) in [
+            (1e-16, 3e-3, [1e-17, 1e-2]),
+            (2e-5, 0.9, [1e-5, 1.0]),
+            (1.0, 30.0, [0.5, 50.0]),
+            (1.0, 1000.0, [0.5, 2000.0]),
+            (0.0072, 0.0077, [0.0072 / 1.05, 0.0077 * 1.05]),
+            (1.0, 1.0, [1.0 / 1.05, 1.05]),
+            (3e-300, 5e300, [1e-300, 1e301]),
+        ] {
+            let points = vec![[0.0, low], [1.0, high]];
+            let scales = [Scale::Linear, Scale::Logarithmic];
+            let figure = Figure { scales, curves: vec![Curve { points, ..Curve::default() }], ..Figure::default() };
+            let around = figure.around(1);
+            assert!((0..2).all(|k| (around[k] / ends[k] - 1.0).abs() < 1e-6), "{low} to {high}: {around:?}");
+            let [bold, light] = log_marks(around);
+            let labels: std::collections::BTreeSet<String> = bold.iter().map(|v| short(*v)).collect();
+            assert!(labels.len() == bold.len() && (3..=10).contains(&bold.len()), "{low} to {high}: {bold:?}");
+            assert!(bold.iter().chain(&light).all(|v| around[0] <= *v && *v <= around[1]), "{bold:?} {light:?}");
         }
     }
 

@@ -11,6 +11,7 @@ pub use arrays::final_arrays;
 pub use curves::draw_curves;
 pub use directory::{RunDirectory, Standing};
 pub(crate) use directory::{is_frame, remove, sync_directory, write_file};
+pub(crate) use figure::COLOURS;
 pub use figure::{Curve, Figure, Scale};
 pub(crate) use picture::Canvas;
 pub use picture::{Picture, Pixels, Sheet, draw};

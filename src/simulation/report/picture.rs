@@ -85,7 +85,7 @@ pub struct Sheet<'a> {
     pub u: &'a [f64],
     /// Values of the first and the last colour; those that occur where nothing is said.
     pub range: Option<[f64; 2]>,
-    /// A line over all of it, such as a front.
+    /// A front over all of it.
     pub line: &'a [[f64; 2]],
 }
 
@@ -111,9 +111,7 @@ pub fn draw(title: &str, unknown: &str, state: &State, line: &[[f64; 2]]) -> Pic
 impl Sheet<'_> {
     /// Its pixels, in the size of the drawing.
     pub fn pixels(&self) -> Pixels {
-        let mut canvas = Canvas::default();
-        let pixels = canvas.paint(&svg(self), 1);
-        Pixels { size: [pixels.width(), pixels.height()], rgba: pixels.data().to_vec() }
+        Canvas::default().pixels(&svg(self))
     }
 }
 
@@ -255,8 +253,22 @@ fn svg(sheet: &Sheet<'_>) -> String {
     }
     s.push_str("</g>\n");
 
-    axes(&mut s, [lx, ly], [wx, wy], [width, height]);
+    let stretched = [width / wx, height / wy].map(|each| each / scale);
+    let names = ["x", "y"].into_iter().zip(stretched).map(|(name, factor)| match factor > 1.0 + 1e-9 {
+        true => format!("{name}, stretched {} times", factor.round()),
+        false => name.into(),
+    });
+    axes(&mut s, [lx, ly], [wx, wy], [width, height], &names.collect::<Vec<_>>());
     colour_bar(&mut s, unknown, low, high, LEFT + width + BAR, height);
+    if !line.is_empty() {
+        let (x, y) = (LEFT + width + BAR, TOP + height + 20.0);
+        let _ = writeln!(
+            s,
+            "<path d=\"M{x:.1} {:.1}h16\" stroke=\"#d55e00\" stroke-width=\"2.5\"/><text x=\"{:.1}\" y=\"{y:.1}\">front</text>",
+            y - 4.5,
+            x + 25.0
+        );
+    }
     s.push_str("</svg>\n");
     s
 }
@@ -274,7 +286,13 @@ pub(super) fn heading(s: &mut String, title: &str, width: f64) {
     );
 }
 
-pub(super) fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, height]: [f64; 2]) {
+pub(super) fn axes(
+    s: &mut String,
+    lower: [f64; 2],
+    extent: [f64; 2],
+    [width, height]: [f64; 2],
+    names: &[impl AsRef<str>],
+) {
     let bottom = TOP + height;
     let _ = writeln!(
         s,
@@ -299,11 +317,11 @@ pub(super) fn axes(s: &mut String, lower: [f64; 2], extent: [f64; 2], [width, he
         );
     }
     let (x, y) = (LEFT + 0.5 * width, TOP + 0.5 * height);
-    let name = along.named("x");
+    let name = along.named(names[0].as_ref());
     let below = bottom + 44.0;
     let _ = writeln!(s, "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"middle\" font-size=\"14\">{name}</text>");
-    let (name, beside) = (up.named("y"), y + 5.0);
-    let turned = if name == "y" { String::new() } else { format!(" transform=\"rotate(-90 20 {beside:.1})\"") };
+    let (name, beside) = (up.named(names[1].as_ref()), y + 5.0);
+    let turned = if name.len() == 1 { String::new() } else { format!(" transform=\"rotate(-90 20 {beside:.1})\"") };
     let _ =
         writeln!(s, "<text x=\"20\" y=\"{beside:.1}\" text-anchor=\"middle\" font-size=\"14\"{turned}>{name}</text>");
 }
@@ -364,7 +382,10 @@ impl Ticks {
         let scale = low.abs().max(high.abs());
         if !(span > 1e-12 * scale && span.is_finite()) {
             let plain = low == 0.0 || (1e-3..1e5).contains(&low.abs());
-            let label = if plain { format!("{low:.4}") } else { format!("{low:.3e}") };
+            let label = match plain {
+                true => format!("{low:.4}").trim_end_matches('0').trim_end_matches('.').into(),
+                false => format!("{low:.3e}"),
+            };
             return Self { marks: vec![(low, label)], less: None, unit: None, start: 0.0, size: 1.0 };
         }
         let power = 10_f64.powf((span / 4.0).log10().floor());
@@ -393,6 +414,11 @@ impl Ticks {
         });
         let named = (exponent != 0).then(|| format!("1e{exponent}"));
         Self { marks: marks.collect(), less, unit: named, start: start * ten, size: unit }
+    }
+
+    /// Where the marks are.
+    pub(super) fn places(&self) -> impl Iterator<Item = f64> {
+        self.marks.iter().map(|(place, _)| *place)
     }
 
     /// The label of any place on the axis.
@@ -447,6 +473,12 @@ pub(super) fn escape(text: &str) -> String {
 pub(crate) struct Canvas(Option<tiny_skia::Pixmap>);
 
 impl Canvas {
+    /// A drawing as pixels, in its size.
+    pub(super) fn pixels(&mut self, svg: &str) -> Pixels {
+        let painted = self.paint(svg, 1);
+        Pixels { size: [painted.width(), painted.height()], rgba: painted.data().to_vec() }
+    }
+
     /// A drawing as pixels, so many times its size.
     fn paint(&mut self, svg: &str, times: u32) -> &tiny_skia::Pixmap {
         static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
