@@ -69,6 +69,9 @@ function quadrilateral(out, w, h, colours, ax, ay, av, bx, by, bv, cx, cy, cv, d
   }
 }
 
+/** Of lines over a colour of the map: white on dark ones, black on light ones, and no jump between, which would look like a line. */
+function shade(v) { return v < 102 ? 255 : v > 204 ? 0 : 2.5 * (204 - v) | 0; }
+
 /** Mixes a share (of 256) of black or white (0 or 255) into a pixel. */
 function mix(pixel, shade, share) {
   const r = pixel & 255, g = pixel >> 8 & 255, b = pixel >> 16 & 255;
@@ -437,10 +440,10 @@ class Viewer {
       if (lines) {
         // c is a node of the cell beside: lines fade where that is few pixels wide
         const segment = (a, b, c, v) => {
-          const shade = levels ? (v < 153 ? 255 : 0) : dark ? 255 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
+          const tone = levels ? shade(v) : dark ? 255 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
           const wide = Math.abs(dx * (py[c] - py[a]) - dy * (px[c] - px[a])) / Math.sqrt(dx * dx + dy * dy);
           const strength = Math.min(levels ? 0.55 : 0.8, (levels ? 0.1 : 0.25) * wide);
-          if (strength > 0.02) line(out, w, h, px[a], py[a], px[b], py[b], shade, strength);
+          if (strength > 0.02) line(out, w, h, px[a], py[a], px[b], py[b], tone, strength);
         };
         const value = (k, i, j) => !levels ? 0 : cell ? levels[Math.min(i, n - 2) * (m - 1) + Math.min(j, m - 2)] : levels[k];
         for (let i = 0, k = 0; i < n; i++) {

@@ -137,7 +137,7 @@ def test_the_iterates_of_a_line_are_frames(tmp_path):
     iterations = result.summary["iterations"]
     assert [frame.t for frame in result.frames] == [iterate["n"] for iterate in iterations]
     assert np.array_equal(result.frames[-1].x, result.final["x"])
-    assert np.array_equal(result.frames[0].x, np.linspace(0, 1, 101))
+    assert np.allclose(result.frames[0].x, np.linspace(0, 1, 101), rtol=0, atol=1e-15)
     result.animate(tmp_path / "moving.gif")
     with Image.open(tmp_path / "moving.gif") as moving:
         assert moving.n_frames == len(iterations)

@@ -133,7 +133,7 @@ fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
             let bytes = small.then(|| std::fs::read(&path).ok()).flatten()?;
             Some(Shown {
                 title,
-                mapped: !line && name == "mesh",
+                mapped: !line && ["mesh", "front"].contains(&name),
                 source: format!("data:{mime};base64,{}", STANDARD.encode(bytes)),
             })
         })

@@ -58,6 +58,10 @@ pub(super) const BAR: f64 = 24.0;
 const WIDE: f64 = 0.64;
 /// Opacities of mesh lines, and what a cell beside them has of it for each unit that it is wide.
 const STRENGTHS: [f64; 4] = [0.1, 0.25, 0.4, 0.6];
+/// Their colours, and the shares of the colour map over which they change.
+const TONES: [&str; 5] = ["#fff", "#bfbfbf", "#808080", "#404040", "#000"];
+const WHITE_UP_TO: f64 = 0.4;
+const BLACK_FROM: f64 = 0.8;
 const FADES: f64 = 0.08;
 /// Bytes of a part of a PNG.
 const CHUNK: usize = 1 << 16;
@@ -200,10 +204,15 @@ fn svg(sheet: &Sheet<'_>) -> String {
     }
     s.push_str("</g>\n");
 
-    // mesh lines, light on dark colours and dark on light ones, fainter where cells are few pixels wide, so that the colours
-    // stay what they are; one pixel of the PNG wide, which is drawn fast
-    let mut paths = [false, true].map(|_| STRENGTHS.map(|_| String::new()));
-    let light = |a: usize, b: usize| 0.5 * (u[a] + u[b]) - low < 0.6 * (high - low);
+    // mesh lines, white on dark colours, black on light ones and grey between, for a jump would look like a line of its own;
+    // fainter where cells are few pixels wide, so that the colours stay what they are; one pixel of the PNG wide, which is
+    // drawn fast
+    let mut paths = TONES.map(|_| STRENGTHS.map(|_| String::new()));
+    let tone = |a: usize, b: usize| {
+        let part = (0.5 * (u[a] + u[b]) - low) / (high - low);
+        let grey = (part - WHITE_UP_TO) / (BLACK_FROM - WHITE_UP_TO);
+        (grey.clamp(0.0, 1.0) * (TONES.len() - 1) as f64).round() as usize
+    };
     let strength = |a: usize, b: usize, beside: usize| {
         let [a, b, c] = [a, b, beside].map(|k| to(x[k]));
         let [e, f] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
@@ -211,14 +220,14 @@ fn svg(sheet: &Sheet<'_>) -> String {
         STRENGTHS.iter().rposition(|strength| FADES * wide >= *strength)
     };
     let mut mesh_line = |nodes: &[usize], beside: &[usize]| {
-        let look = |e: &[usize], c: usize| Some((light(e[0], e[1]), strength(e[0], e[1], c)?));
+        let look = |e: &[usize], c: usize| Some((tone(e[0], e[1]), strength(e[0], e[1], c)?));
         let edges: Vec<_> = nodes.windows(2).zip(beside).map(|(e, &c)| (e, look(e, c))).collect();
         for part in edges.chunk_by(|(_, before), (_, after)| before == after) {
-            let Some((light, strength)) = part[0].1 else { continue };
+            let Some((tone, strength)) = part[0].1 else { continue };
             let seen = |shift: &&[f64; 2]| part.iter().any(|(edge, _)| shown(edge, **shift));
             for &shift in shifts.iter().filter(seen) {
                 let nodes = [part[0].0[0]].into_iter().chain(part.iter().map(|(edge, _)| edge[1]));
-                through(&mut paths[usize::from(light)][strength], &mut { nodes }, shift);
+                through(&mut paths[tone][strength], &mut { nodes }, shift);
             }
         }
     };
@@ -233,7 +242,7 @@ fn svg(sheet: &Sheet<'_>) -> String {
         let along = |j: usize| lines[0].iter().map(|&i| at(i, j)).collect::<Vec<_>>();
         mesh_line(&along(j), &along(beside));
     }
-    for (paths, colour) in paths.iter().zip(["black", "white"]) {
+    for (paths, colour) in paths.iter().zip(TONES) {
         for (path, strength) in paths.iter().zip(STRENGTHS).filter(|(path, _)| !path.is_empty()) {
             let _ = writeln!(
                 s,
