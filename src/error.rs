@@ -201,7 +201,8 @@ pub enum Failure {
     },
     /// An iteration between subdomains of a line did not converge.
     #[error(
-        "not converged: the {measure} is {last:.2e} after {iterations} iterations, {tolerance:.0e} asked for{advice}"
+        "not converged: the {measure} is {last:.2e} after {iterations} iteration{}, {tolerance:.0e} asked for{advice}",
+        if *.iterations == 1 { "" } else { "s" }
     )]
     NotConverged {
         /// What is measured.
@@ -362,7 +363,7 @@ impl Failure {
                 "mend density.value or density.of; with conditions of Robin's kind M is asked for outside the domain too"
             }
             Self::LineStalled { .. } => {
-                "refine grid.cells; where the density jumps or peaks within a cell smooth it, or set equidistribution.face_density to \"exact\"; or begin nearer with start.mesh"
+                "begin nearer: set start.mesh to \"equidistributed\"; or refine grid.cells, smooth a density that jumps or peaks within a cell, or set equidistribution.face_density to \"exact\""
             }
             Self::NotConverged { remedy, .. } if !remedy.is_empty() => remedy,
             Self::NotConverged { .. } => {
@@ -405,6 +406,9 @@ pub enum Error {
         /// The step that failed.
         moment: Option<Moment>,
     },
+    /// What ended the run that a complete one is compared with.
+    #[error("the run itself is complete; in the one of [compare]: {0}")]
+    Compared(Box<Error>),
     /// Somebody asked a run to end.
     #[error("interrupted at t = {:.6} (step {})", .0.t, .0.step)]
     Interrupted(Moment),
@@ -600,6 +604,14 @@ impl Error {
         }
     }
 
+    /// What went wrong, in whichever run.
+    pub fn cause(&self) -> &Self {
+        match self {
+            Self::Compared(cause) => cause,
+            other => other,
+        }
+    }
+
     /// The same in a study of kind `poisson` or `stefan`, as [`Failure::help_without_density`].
     pub fn help_without_density(&self) -> Option<String> {
         match self {
@@ -612,6 +624,7 @@ impl Error {
     pub fn help(&self) -> Option<String> {
         match self {
             Self::Failed { failure, .. } => Some(failure.help().into()),
+            Self::Compared(cause) => cause.help().map(|help| help.replace("mesh.generator", "compare.generator")),
             Self::Study(diagnostic) => diagnostic.help.clone(),
             Self::Formula { help, .. } => help.clone(),
             Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
@@ -633,12 +646,12 @@ impl Error {
 
     /// True if what ended a run lies outside it: it may go on from its checkpoint.
     pub fn is_resumable(&self) -> bool {
-        matches!(self, Self::Interrupted(_) | Self::Unwritable { .. })
+        matches!(self.cause(), Self::Interrupted(_) | Self::Unwritable { .. })
     }
 
     /// True if the computation failed (exit status 1), false if what was asked for is wrong (exit status 2).
     pub fn is_failure(&self) -> bool {
-        matches!(self, Self::Failed { .. } | Self::Interrupted(_) | Self::Unwritable { .. })
+        matches!(self.cause(), Self::Failed { .. } | Self::Interrupted(_) | Self::Unwritable { .. })
     }
 }
 

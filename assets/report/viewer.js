@@ -69,8 +69,9 @@ function quadrilateral(out, w, h, colours, ax, ay, av, bx, by, bv, cx, cy, cv, d
   }
 }
 
-/** Of lines over a colour of the map: white on dark ones, black on light ones, and no jump between, which would look like a line. */
-function shade(v) { return v < 102 ? 255 : v > 204 ? 0 : 2.5 * (204 - v) | 0; }
+/** Share of white in lines over a colour of the map: they are white on dark colours and black on light ones, and where neither
+    stands out a white one beside a black one; a jump would look like a line of its own. */
+function whiteness(v) { return v < 90 ? 1 : v > 166 ? 0 : (166 - v) / 76; }
 
 /** Mixes a share (of 256) of black or white (0 or 255) into a pixel. */
 function mix(pixel, shade, share) {
@@ -126,6 +127,13 @@ function rounded(v, { low, high }) {
   return Math.round(v / unit) * unit;
 }
 
+/** A value as text, with the digits that tell it from its neighbours far from 0. */
+function reading(v, array) {
+  const span = array.high - array.low, size = Math.max(Math.abs(array.low), Math.abs(array.high));
+  const digits = span > 0 ? Math.ceil(Math.log10(size / span)) + 5 : 6;
+  return digits > 6 && size < 1e12 ? String(+v.toPrecision(Math.min(15, digits))).replace(/-/g, "−") : number(rounded(v, array));
+}
+
 /** Round values between two ends with their labels, and, as `less`, what the labels leave out where they would all begin alike. */
 function ticks(low, high, most) {
   const span = high - low, size = Math.max(Math.abs(low), Math.abs(high));
@@ -137,10 +145,14 @@ function ticks(low, high, most) {
   return Object.assign(found, { less });
 }
 
-/** Powers of ten between two ends, six at most, with their labels. */
+/** Powers of ten between two ends, about six at most, with their labels. */
 function powers(low, high) {
   const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9), every = Math.ceil((to - from + 1) / 6), found = [];
-  for (let k = from; k <= to; k += every) found.push([10 ** k, number(+(10 ** k).toPrecision(3))]);
+  // of two powers or fewer also twice and five times
+  const times = to - from < 2 ? [1, 2, 5] : [1];
+  for (let k = times.length > 1 ? from - 1 : from; k <= to; k += every) {
+    for (const m of times) if (m * 10 ** k >= low * (1 - 1e-9) && m * 10 ** k <= high * (1 + 1e-9)) found.push([m * 10 ** k, number(+(m * 10 ** k).toPrecision(3))]);
+  }
   return found;
 }
 
@@ -160,7 +172,7 @@ class Viewer {
       }),
     }));
     this.maps.forEach(({ name }) => this.controls.map.add(new Option(name, name)));
-    this.fields = data.meshes[0].arrays.map((array) => array.name).filter((name) => name !== "x" && name !== "y");
+    this.fields = data.meshes[0].arrays.filter(({ name, inside }) => name !== "x" && name !== "y" && !inside).map((array) => array.name);
     const longest = Math.max(...data.extent);
     this.stretch = data.extent.map((length) => Math.max(1, longest / ELONGATED / length) || 1);
     for (const name of [...this.fields, ...this.figures(), "nothing"]) this.controls.field.add(new Option(symbol(name), name));
@@ -391,7 +403,7 @@ class Viewer {
   prepare(stage, height) {
     const { canvas, mesh } = stage, { extent } = this.data, ratio = Math.min(2, window.devicePixelRatio || 1);
     const style = getComputedStyle(document.body), ink = style.color, paper = style.backgroundColor;
-    const [left, right, top, bottom] = [62, 14, 8, 44].map((p) => Math.round(p * ratio));
+    const [left, right, top, bottom] = [70, 14, 8, 44].map((p) => Math.round(p * ratio));
     const width = Math.max(160, Math.round(canvas.clientWidth * ratio)), w = width - left - right, h = Math.round(w * height);
     if (canvas.width !== width || canvas.height !== top + h + bottom) Object.assign(canvas, { width, height: top + h + bottom });
     canvas.style.height = `${canvas.height / ratio}px`;
@@ -440,10 +452,14 @@ class Viewer {
       if (lines) {
         // c is a node of the cell beside: lines fade where that is few pixels wide
         const segment = (a, b, c, v) => {
-          const tone = levels ? shade(v) : dark ? 255 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
+          const white = levels ? whiteness(v) : dark ? 1 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
           const wide = Math.abs(dx * (py[c] - py[a]) - dy * (px[c] - px[a])) / Math.sqrt(dx * dx + dy * dy);
-          const strength = Math.min(levels ? 0.55 : 0.8, (levels ? 0.1 : 0.25) * wide);
-          if (strength > 0.02) line(out, w, h, px[a], py[a], px[b], py[b], tone, strength);
+          const strength = Math.min(levels ? 0.55 : 0.8, levels ? 0.1 * (wide / ratio - 2) : 0.25 * wide);
+          if (strength <= 0.02) return;
+          const off = white > 0 && white < 1 ? 0.5 : 0, ox = Math.abs(dy) > Math.abs(dx) ? off : 0, oy = off - ox;
+          const side = (shade, share, o) => { if (share > 0) line(out, w, h, px[a] + o * ox, py[a] + o * oy, px[b] + o * ox, py[b] + o * oy, shade, strength * share); };
+          side(255, white, -1);
+          side(0, 1 - white, 1);
         };
         const value = (k, i, j) => !levels ? 0 : cell ? levels[Math.min(i, n - 2) * (m - 1) + Math.min(j, m - 2)] : levels[k];
         for (let i = 0, k = 0; i < n; i++) {
@@ -455,8 +471,8 @@ class Viewer {
       }
       if (this.controls.cuts.checked) {
         const path = (count, at) => Array.from({ length: count }, (_, k) => [left + px[at(k)], top + py[at(k)]]);
-        mesh.cuts[0].forEach((i) => cuts.push(path(m, (k) => i * m + k)));
-        mesh.cuts[1].forEach((j) => cuts.push(path(n, (k) => k * m + j)));
+        const lines = [mesh.cuts[0].map((i) => path(m, (k) => i * m + k)), mesh.cuts[1].map((j) => path(n, (k) => k * m + j))];
+        lines.forEach((paths) => paths.forEach((path, c) => cuts.push([path, paths[c - 1], paths[c + 1]])));
       }
     }
     context.fillStyle = paper;
@@ -471,11 +487,23 @@ class Viewer {
     // told from mesh lines, also where there is no colour below
     const core = this.data.between === "front" ? "#f28e2b" : levels ? "#fff" : "#2a8fd0";
     for (const [colour, thick] of [["rgba(0,0,0,.8)", 3.6], [core, 2]]) {
-      Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
-      for (const cut of cuts) {
-        context.beginPath();
-        cut.forEach(([a, b], k) => (k ? context.lineTo(a, b) : context.moveTo(a, b)));
-        context.stroke();
+      context.strokeStyle = colour;
+      for (const [path, before, after] of cuts) {
+        // thin where another is near: what lies between them is to be seen
+        const width = (k) => {
+          const [a, b] = [path[k], path[k + 1] ?? path[k - 1]], [ex, ey] = [b[0] - a[0], b[1] - a[1]];
+          const beside = ([x, y]) => Math.abs(ex * (y - a[1]) - ey * (x - a[0])) / (Math.hypot(ex, ey) || 1);
+          const near = Math.min(...[before, after].filter(Boolean).map((other) => beside(other[k])), Infinity);
+          return Math.round(4 * Math.min(1, Math.max(0.25, near / ratio / 14))) / 4;
+        };
+        for (let k = 1, from = 0; k < path.length; k++) {
+          if (k + 1 < path.length && width(k) === width(from)) continue;
+          context.lineWidth = thick * width(from) * ratio;
+          context.beginPath();
+          for (let j = from; j <= k; j++) j > from ? context.lineTo(...path[j]) : context.moveTo(...path[j]);
+          context.stroke();
+          from = k;
+        }
       }
     }
     if (this.node) {
@@ -497,7 +525,7 @@ class Viewer {
     this.frame(stage, along, up, (v) => top + h / 2 - (v - this.centre[1]) * scale[1], names);
     const what = field === "nothing" ? "the mesh" : `the mesh over ${symbol(field)}`;
     const lattice = `${(n - 1) * stride} by ${(m - 1) * stride} cells`;
-    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, ${this.data.clock ? `at ${this.when(stage.t)}, ` : ""}from x = ${number(lower[0])} to ${number(lower[0] + extent[0])} and y = ${number(lower[1])} to ${number(lower[1] + extent[1])}`);
+    canvas.setAttribute("aria-label", `${mesh.name ? `${mesh.name}: ` : ""}${what}, ${lattice}, ${this.data.clock ? `at ${this.when(stage.t)}, ` : ""}from x = ${moment(from[0])} to ${moment(to[0])} and y = ${moment(from[1])} to ${moment(to[1])}`);
   }
 
   /** The frame of a canvas, with ticks along x and up, and what the axes are named. */
@@ -518,7 +546,7 @@ class Viewer {
     for (const [v, text] of up) {
       const p = height(v);
       context.fillRect(left - 4 * ratio, p - ratio / 2, 4 * ratio, ratio);
-      context.fillText(text, left - 7 * ratio, Math.max(7 * ratio, p), left - 22 * ratio);
+      context.fillText(text, left - 7 * ratio, Math.max(7 * ratio, p), left - 26 * ratio);
     }
     context.textAlign = "center";
     context.fillText(names[0], left + w / 2, canvas.height - 8 * ratio);
@@ -623,27 +651,25 @@ class Viewer {
     const digits = this.node && this.digits(stage, levels, figures[1]);
     return [
       ["node", () => `(${this.node.map((index, d) => Math.min(index * stride, cells[d])).join(", ")})`],
-      ...["x", "y"].map((name) => [name, () => number(rounded(stage[name][k], levels[name]))]),
-      ...this.fields.map((name) => [symbol(name), () => number(rounded(this.values(stage, name, stage.place)[k], levels[name]))]),
+      ...["x", "y"].map((name) => [name, () => reading(stage[name][k], levels[name])]),
+      ...this.fields.map((name) => [symbol(name), () => reading(this.values(stage, name, stage.place)[k], levels[name])]),
       ["Q of the cell", () => number(figures[0], digits)],
       ["its Jacobian", () => number(figures[1], digits)],
     ];
   }
 }
 
+/** Figures of the cells of a line, over their means, and the arrays that hold them. */
+const FIGURES = { "cell length": "jacobian", "∫M of a cell": "share" };
+
 /** Of a line: a curve over x through all nodes, which stand under it. */
 class LineViewer extends Viewer {
-  figures() { return ["cell length", ...(this.fields.includes("M") ? ["M × cell length"] : []), "ξ"]; }
+  figures() { return [...Object.keys(FIGURES).filter((name) => this.arrays[0][FIGURES[name]]), "ξ"]; }
 
-  /** Values in the cells over their mean, of what is no field of the nodes. */
+  /** Values in the cells, of what is no field of the nodes; ξ at the nodes. */
   cellValues(stage, field, place) {
-    const x = this.values(stage, "x", place), n = x.length, mean = this.data.extent[0] / (n - 1);
-    if (field === "ξ") return Float64Array.from(x, (_, i) => i / (n - 1));
-    const lengths = Float64Array.from({ length: n - 1 }, (_, i) => x[i + 1] - x[i]);
-    if (field === "cell length") return lengths.map((length) => length / mean);
-    const m = this.values(stage, "M", place), shares = lengths.map((length, i) => 0.5 * (m[i] + m[i + 1]) * length);
-    const whole = shares.reduce((sum, share) => sum + share, 0);
-    return shares.map((share) => share / whole * (n - 1));
+    const n = stage.mesh.lines[0];
+    return field === "ξ" ? Float64Array.from({ length: n }, (_, i) => i / (n - 1)) : this.values(stage, FIGURES[field], place).subarray(0, n - 1);
   }
 
   drawBar() { document.querySelector(".bar").hidden = true; }
@@ -692,15 +718,20 @@ class LineViewer extends Viewer {
       context.globalAlpha = 1;
     }
     if (this.controls.cuts.checked) {
-      for (const [colour, thick] of [[paper, 4], ["#d55e00", 2]]) {
-        Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
-        context.beginPath();
-        for (const i of mesh.cuts[0]) {
+      // thin and faint where another is near: the curve is to be seen
+      mesh.cuts[0].forEach((i, c, all) => {
+        const near = Math.min(...[all[c - 1], all[c + 1]].map((other) => (other === undefined ? Infinity : Math.abs(px[other] - px[i])))) / ratio;
+        const strength = Math.min(1, Math.max(0.12, near / 12));
+        for (const [colour, thick] of [[paper, 4], ["#d55e00", 2]]) {
+          if (colour === paper && strength < 1) continue;
+          Object.assign(context, { strokeStyle: colour, lineWidth: Math.max(0.75, thick * strength) * ratio, globalAlpha: strength });
+          context.beginPath();
           context.moveTo(px[i], floor);
           context.lineTo(px[i], top);
+          context.stroke();
         }
-        context.stroke();
-      }
+      });
+      context.globalAlpha = 1;
     }
     if (!nothing) {
       Object.assign(context, { strokeStyle: accent, fillStyle: accent, lineWidth: 2 * ratio });
@@ -736,7 +767,7 @@ class LineViewer extends Viewer {
     const what = nothing ? "" : field + (up.less ?? "") + (stepped ? ", over the mean" : "");
     this.frame(stage, along, up, height, [`x${along.less}`, what]);
     const when = this.data.clock ? `at ${this.when(stage.t)}, ` : "";
-    canvas.setAttribute("aria-label", `${nothing ? "the nodes" : `${what} over x`}, ${(n - 1) * stride} cells, ${when}from x = ${number(lower[0])} to ${number(lower[0] + extent[0])}`);
+    canvas.setAttribute("aria-label", `${nothing ? "the nodes" : `${what} over x`}, ${(n - 1) * stride} cells, ${when}from x = ${moment(ends[0])} to ${moment(ends[1])}`);
   }
 
   pan(stage, dx) { super.pan(stage, dx, 0); }
@@ -753,10 +784,10 @@ class LineViewer extends Viewer {
     const node = Math.min(i * this.data.stride, this.data.cells[0]), figures = this.figures().filter((name) => name !== "ξ");
     return [
       ["node", () => String(node)],
-      ["x", () => number(rounded(stage.x[i], levels.x))],
+      ["x", () => reading(stage.x[i], levels.x)],
       ["ξ", () => number(node / this.data.cells[0])],
-      ...this.fields.map((name) => [name, () => number(rounded(this.values(stage, name, stage.place)[i], levels[name]))]),
-      ...figures.map((name) => [`${name}, over the mean`, () => number(this.cellValues(stage, name, stage.place)[Math.min(i, n - 2)], 4)]),
+      ...this.fields.map((name) => [name, () => reading(this.values(stage, name, stage.place)[i], levels[name])]),
+      ...figures.map((name) => [`${name}, over the mean`, () => number(rounded(this.cellValues(stage, name, stage.place)[Math.min(i, n - 2)], levels[FIGURES[name]]))]),
     ];
   }
 }

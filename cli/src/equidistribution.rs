@@ -48,7 +48,7 @@ fn table(summary: &EquidistributionSummary) -> String {
                 "{:8} {:9.3e} {:>10} {:>13} {:>14} {:14}\n",
                 it.n,
                 it.error_linf,
-                if it.n == 0 { "-".into() } else { format!("{:.3e}", it.increment) },
+                it.increment.map_or("-".into(), |increment| format!("{increment:.3e}")),
                 figure(it.largest_jump),
                 figure(it.interpolation_error),
                 it.linear_solves

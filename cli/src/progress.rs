@@ -1,3 +1,4 @@
+use crate::terminal;
 use driftmesh::simulation::{Event, Observer, Snapshot};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write, stderr};
@@ -62,8 +63,11 @@ impl Observer for Progress {
 fn words(snapshot: &Snapshot<'_>) -> Vec<String> {
     let (state, jacobian) = (snapshot.state, snapshot.quality.min_scaled_jacobian);
     let of = snapshot.steps.map_or(String::new(), |steps| format!(" of {steps}"));
-    let mut words =
-        vec![format!("t = {:.4}", state.t), format!("step {}{of}", state.step), format!("min J {jacobian:.3}")];
+    let mut words = vec![
+        format!("t = {}", terminal::moment(state.t)),
+        format!("step {}{of}", state.step),
+        format!("min J {jacobian:.3}"),
+    ];
     if snapshot.share > 0.0 && snapshot.share < 1.0 {
         words.push(format!("{} left", duration(snapshot.seconds * (1.0 - snapshot.share) / snapshot.share)));
     }

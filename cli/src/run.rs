@@ -79,7 +79,7 @@ impl Run {
         if !self.quiet {
             terminal::say(table(&finished.summary));
             // whoever interrupted the run does not wait for others
-            if !matches!(finished.failure, Some(Error::Interrupted(_)))
+            if !matches!(finished.failure.as_ref().map(Error::cause), Some(Error::Interrupted(_)))
                 && let Some(line) = uniform(study, &finished.summary)?
             {
                 terminal::say(line);
@@ -133,8 +133,11 @@ fn table(summary: &Summary) -> String {
             j => format!("{j:.4}"),
         };
         text += &format!(
-            "{:8.4} {linf:>9} {l2:>9} {:7.3} {:7.3} {smallest:>7} {:9.3}",
-            report.t, q.q_max, q.q_mean, q.equidistribution
+            "{:>8} {linf:>9} {l2:>9} {:7.3} {:7.3} {smallest:>7} {:9.3}",
+            terminal::moment(report.t),
+            q.q_max,
+            q.q_mean,
+            q.equidistribution
         );
         if let Some(c) = report.comparison {
             text += &format!(" {:7.4} {:7.4} {:9.1e}", c.r_max, c.r_mean, c.mesh_rms);

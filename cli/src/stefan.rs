@@ -39,13 +39,15 @@ pub fn run(study: &StefanStudy, out: &Path, begin: Begin, quiet: bool) -> driftm
 
 /// Fronts, errors and balances in a few lines.
 fn table(summary: &StefanSummary) -> String {
-    let mut text =
-        String::from("       t  front mean       min       max  front error  u error    energy  3-point  step limit\n");
+    let mut text = String::new();
+    if !summary.reports.is_empty() {
+        text += "       t  front mean       min       max  front error  u error    energy  3-point  step limit\n";
+    }
     for report in &summary.reports {
         let figure = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.2e}"));
         text += &format!(
-            "{:8.4} {:11.6} {:9.6} {:9.6} {:>12} {:>8} {:>9} {:>8} {:>11}\n",
-            report.t,
+            "{:>8} {:11.6} {:9.6} {:9.6} {:>12} {:>8} {:>9} {:>8} {:>11}\n",
+            terminal::moment(report.t),
             report.front.mean,
             report.front.range[0],
             report.front.range[1],

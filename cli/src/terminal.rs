@@ -68,3 +68,8 @@ pub fn use_threads(threads: Option<u16>) -> driftmesh::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(number).use_current_thread().build_global();
     pool.map_err(|error| Error::invalid("--threads", number, format!("no such pool can be made: {error}")))
 }
+
+/// A time in eight letters or so.
+pub fn moment(t: f64) -> String {
+    if t == 0.0 || (1e-2..1e6).contains(&t.abs()) { format!("{t:.4}") } else { format!("{t:.2e}") }
+}

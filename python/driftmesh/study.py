@@ -337,7 +337,9 @@ def _table(path: Path) -> dict[str, Floats]:
         return {}
     with path.open(newline="", encoding="utf-8") as file:
         rows = csv.reader(file)
-        names = next(rows, [])
+        names = next(rows, None)
+        if names is None:
+            return {}
         # a run that was killed may leave half a row
         values = [[float(entry) if entry else np.nan for entry in row] for row in rows if len(row) == len(names)]
     columns = np.array(values, dtype=np.float64).reshape(-1, len(names)).T

@@ -13,7 +13,7 @@ pub fn raised(py: Python<'_>, error: &Error, help: Option<String>) -> PyErr {
         }),
     };
     let text = help.as_ref().map_or(error.to_string(), |help| format!("{error}\n  help: {help}"));
-    match error {
+    match error.cause() {
         Error::Failed { failure, moment } => {
             let place = (moment.map(|m| m.t), moment.map(|m| m.step));
             numerical(py, failure, text, place).unwrap_or_else(|error| error)

@@ -140,15 +140,18 @@ impl History {
 
     /// What to say where the tolerance was missed.
     pub fn missed(&self, method: Method, stop: Stop) -> Option<Failure> {
-        let tolerance = stop.tolerance.filter(|_| !self.converged)? * (self.mesh[self.mesh.len() - 1] - self.mesh[0]);
+        let length = self.mesh[self.mesh.len() - 1] - self.mesh[0];
+        let tolerance = stop.tolerance.filter(|_| !self.converged)? * length;
         let measured: Vec<f64> = self.iterates.iter().map(|iterate| stop.measure.of(iterate)).collect();
         let (count, last) = (self.count(), measured[self.count()]);
         let size = self.mesh.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
-        let rounding = IS_ROUNDING * size;
+        // an iteration that stands still has come as far as rounding lets it
+        let still = count > 0 && self.iterates[count].increment <= f64::EPSILON * size;
+        let rounding = if still { STILL * last } else { IS_ROUNDING * size };
         let linearized = matches!(method, Method::Classical { linearized: true, .. });
         let advice = match contraction(&measured) {
             _ if last <= rounding => {
-                format!("; that is rounding, which no iteration lowers: ask for {rounding:.0e} or more")
+                format!("; that is rounding, which no iteration lowers: ask for {:.0e} or more", rounding / length)
             }
             Some(rate) => {
                 let more = 2.0 * (tolerance.max(rounding) / last).ln() / rate.ln();
@@ -157,6 +160,7 @@ impl History {
             None if linearized => {
                 "; the linearised iteration need not converge where M varies much over the overlap".into()
             }
+            None if count < FEW => "; so few do not tell whether it contracts".into(),
             None => "; it does not contract".into(),
         };
         let remedy = match method {
@@ -194,6 +198,10 @@ fn contraction(measured: &[f64]) -> Option<f64> {
 
 /// Errors below this share of the largest coordinate are of rounding.
 const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// What to ask for of what stands still, over what it came to.
+const STILL: f64 = 1.5;
+/// Iterations that tell nothing of an iteration that has not fallen in them.
+const FEW: usize = 4;
 /// Iterates with errors below this share of the line's length are rounding.
 const ROUNDING: f64 = 1e-11;
 /// Contractions that count for the observed rate.

@@ -2,7 +2,7 @@ use super::files::RunFiles;
 use super::frame::Frame;
 use super::viewer::clock;
 use crate::error::{Error, Result};
-use crate::simulation::{COLOURS, Curve, Figure, Pixels, Scale, Sheet, write_file};
+use crate::simulation::{COLOURS, Canvas, Curve, Figure, Picture, Scale, Sheet, write_file};
 use gif::{Encoder, Repeat};
 use plotters::style::RGBColor;
 use std::collections::HashMap;
@@ -41,18 +41,15 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
         run.notes.push("animation.gif is not written: there is no frame".into());
         return Ok(());
     };
-    let Some((unknown, _)) = first.fields.first() else { return Ok(()) };
-    let draw: Box<dyn Fn(&Frame) -> Pixels> = match first.cells[1] {
-        0 => of_line(run, &frames, unknown),
-        _ => of_mesh(run, &frames, unknown),
-    };
+    let Some(draw) = drawing(run, &frames) else { return Ok(()) };
     let each = (WHOLE / frames.len()).clamp(ONE[0], ONE[1]) as u16;
 
     let unwritable = |error: gif::EncodingError| Error::Unwritable { path: path.clone(), reason: error.to_string() };
     let mut palette = if first.cells[1] == 0 { Palette::of_curves() } else { Palette::of_maps() };
     let mut encoder: Option<Encoder<Vec<u8>>> = None;
+    let mut canvas = Canvas::default();
     for (k, frame) in frames.iter().enumerate() {
-        let pixels = draw(frame);
+        let pixels = canvas.pixels(&draw(frame));
         let [width, height] = pixels.size.map(|n| n.min(u32::from(u16::MAX)) as u16);
         let encoder = match &mut encoder {
             Some(encoder) => encoder,
@@ -78,12 +75,39 @@ fn title(run: &RunFiles, frame: &Frame) -> String {
     match clock(run) {
         "" => run.word("study").into(),
         "iteration" => format!("{}, iteration {}", run.word("study"), frame.t),
-        _ => format!("{}, t = {:.4}", run.word("study"), frame.t),
+        _ => {
+            // as many decimals in all frames, so that nothing jumps
+            let times = &run.series[0].frames;
+            let span = times.last().map_or(0.0, |(last, _)| last - times[0].0);
+            let decimals = (3.0 - span.log10()).ceil().clamp(2.0, 12.0);
+            match decimals < 9.0 {
+                true => format!("{}, t = {:.*}", run.word("study"), decimals as usize, frame.t),
+                false => format!("{}, t = {:.3e}", run.word("study"), frame.t),
+            }
+        }
     }
 }
 
+/// What draws any of these frames, as SVG: the mesh over the first field.
+fn drawing<'a>(run: &'a RunFiles, frames: &'a [Frame]) -> Option<Box<dyn Fn(&Frame) -> String + 'a>> {
+    let first = frames.first()?;
+    let (field, _) = first.fields.first()?;
+    Some(if first.cells[1] == 0 { of_line(run, frames, field) } else { of_mesh(run, frames, field) })
+}
+
+/// Draws `mesh.png` and `.svg` from the last frame, where the run did not come to drawing them.
+pub fn still(run: &mut RunFiles) -> Result<()> {
+    let Some(last) = run.series[0].frames.len().checked_sub(1) else { return Ok(()) };
+    if run.directory.join("mesh.png").exists() {
+        return Ok(());
+    }
+    let frames = run.frames(0, &[last]);
+    let picture = drawing(run, &frames).map(|draw| Picture::of(&draw(&frames[0]), &mut Canvas::default()));
+    picture.map_or(Ok(()), |picture| picture.write(&run.directory, "mesh"))
+}
+
 /// The first field over the line, through all nodes.
-fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Box<dyn Fn(&Frame) -> Pixels + 'a> {
+fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Box<dyn Fn(&Frame) -> String + 'a> {
     let points = |frame: &Frame| frame.x.iter().zip(&frame.fields[0].1).map(|(x, v)| [x[0], *v]).collect::<Vec<_>>();
     let all = frames.iter().flat_map(points);
     let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
@@ -97,12 +121,12 @@ fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Box<dyn F
             curves: vec![Curve { points: points(frame), ..Curve::default() }],
             room: ends.to_vec(),
         };
-        figure.pixels()
+        figure.svg()
     })
 }
 
 /// The mesh over the first field.
-fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Box<dyn Fn(&Frame) -> Pixels + 'a> {
+fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Box<dyn Fn(&Frame) -> String + 'a> {
     let around = |[l, h]: [f64; 2], v: f64| [l.min(v), h.max(v)];
     let none = [f64::INFINITY, f64::NEG_INFINITY];
     let range = frames.iter().flat_map(|frame| &frame.fields[0].1).copied().fold(none, around);
@@ -132,7 +156,7 @@ fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Box<dyn
             range: Some(range),
             line: &line,
         };
-        sheet.pixels()
+        sheet.svg()
     })
 }
 

@@ -1,7 +1,7 @@
 use super::frame::{Frame, attribute};
 use crate::error::{Error, Result};
 use crate::parallel::map;
-use crate::simulation::RunDirectory;
+use crate::simulation::{Checkpoints, RunDirectory};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -18,8 +18,9 @@ pub struct RunFiles {
     pub history: Vec<Column>,
     /// Frames of the run, and of the one that it is compared with.
     pub series: [Series; 2],
-    /// Whether a run writes there now.
+    /// Whether a run writes there now, and whether there is a checkpoint to go on from.
     pub busy: bool,
+    pub resumable: bool,
     /// What was damaged or left out.
     pub notes: Vec<String>,
 }
@@ -67,8 +68,12 @@ impl RunFiles {
         if study.contains_key("compare") && series[1].frames.is_empty() {
             notes.push("the mesh of [compare] is not here: it is computed after the run itself".into());
         }
+        if series[0].frames.is_empty() {
+            notes.push("the mesh is not here: the run has written no frame".into());
+        }
         let busy = RunDirectory::is_busy(directory);
-        Ok(Self { directory: directory.into(), summary, study_text, study, history, series, busy, notes })
+        let resumable = Checkpoints::are_in(directory);
+        Ok(Self { directory: directory.into(), summary, study_text, study, history, series, busy, resumable, notes })
     }
 
     /// A text of the summary.

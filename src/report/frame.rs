@@ -13,6 +13,8 @@ pub struct Frame {
     pub x: Vec<[f64; 2]>,
     /// Values at the nodes, by name.
     pub fields: Vec<(String, Vec<f64>)>,
+    /// Values in the cells of a line, by name; those of other meshes follow from their nodes.
+    pub cell_fields: Vec<(String, Vec<f64>)>,
     /// Between which nodes along each axis another subdomain begins.
     pub cuts: [Vec<usize>; 2],
 }
@@ -36,31 +38,40 @@ impl Frame {
             return Err("its nodes are not those of a structured mesh".into());
         }
         let cells = [x.len() / row - 1, row - 1];
-        let mut fields = Vec::new();
-        for array in arrays.iter().filter(|array| array.section == "PointData" && array.scalar) {
-            let values = doubles(array)?;
-            if values.len() != x.len() {
-                return Err(format!("{:?} has {} values for {} nodes", array.name, values.len(), x.len()));
-            }
-            fields.push((array.name.clone(), values));
-        }
-        if !x.as_flattened().iter().chain(fields.iter().flat_map(|(_, values)| values)).all(|v| v.is_finite()) {
+        let scalars = |section: &str, count: usize| {
+            let found = arrays.iter().filter(|array| array.section == section && array.scalar && array.real);
+            let read = found.map(|array| match doubles(array)? {
+                values if values.len() == count => Ok((array.name.clone(), values)),
+                values => Err(format!("{:?} has {} values for {count} places", array.name, values.len())),
+            });
+            read.collect::<Result<Vec<_>, String>>()
+        };
+        let fields = scalars("PointData", x.len())?;
+        let cell_fields = if corners == 2 { scalars("CellData", cells[0])? } else { Vec::new() };
+        let values = fields.iter().chain(&cell_fields).flat_map(|(_, values)| values);
+        if !x.as_flattened().iter().chain(values).all(|v| v.is_finite()) {
             return Err("it holds a value that is not finite".into());
         }
         let count = cells[0] * cells[1].max(1);
-        let numbers = |name: &str| array("CellData", name).and_then(|array| integers::<4>(array, count)).ok();
+        // an unknown may have that name
+        let numbers = |name: &str| {
+            let found = array("CellData", name).or_else(|_| array("CellData", &format!("{name} of cells")));
+            found.and_then(|array| integers::<4>(array, count)).ok()
+        };
         // pieces of a line may overlap
         let overlap = numbers("overlap").filter(|more| more.len() == count).unwrap_or_else(|| vec![0; count]);
         let cuts = match numbers("subdomain").filter(|of| of.len() == count) {
             Some(subdomains) => cuts(cells, &subdomains.into_iter().zip(overlap).collect::<Vec<_>>()),
             None => Default::default(),
         };
-        Ok(Self { t, cells, x, fields, cuts })
+        Ok(Self { t, cells, x, fields, cell_fields, cuts })
     }
 
     /// Whether both are of one series.
     pub fn fits(&self, other: &Self) -> bool {
-        let names = |frame: &Self| frame.fields.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+        let names = |frame: &Self| {
+            frame.fields.iter().chain(&frame.cell_fields).map(|(name, _)| name.clone()).collect::<Vec<_>>()
+        };
         self.cells == other.cells && names(self) == names(other)
     }
 }
@@ -78,6 +89,8 @@ struct Array<'a> {
     section: &'a str,
     name: String,
     scalar: bool,
+    /// Of floating point.
+    real: bool,
     text: &'a str,
 }
 
@@ -89,7 +102,9 @@ fn arrays(text: &str) -> Vec<Array<'_>> {
         match line.strip_prefix("<DataArray ").and_then(|line| line.strip_suffix("</DataArray>")?.split_once('>')) {
             Some((head, text)) => {
                 let name = attribute(head, "Name").unwrap_or_default();
-                arrays.push(Array { section, name, scalar: attribute(head, "NumberOfComponents").is_none(), text });
+                let scalar = attribute(head, "NumberOfComponents").is_none();
+                let real = attribute(head, "type").is_some_and(|kind| kind == "Float64");
+                arrays.push(Array { section, name, scalar, real, text });
             }
             None => section = line.trim_start_matches('<').trim_end_matches('>'),
         }

@@ -25,7 +25,8 @@ pub struct Built {
     pub notes: Vec<String>,
 }
 
-/// (Re)builds `report.html`, the plots over time and, where the study asks for it, `animation.gif`.
+/// (Re)builds `report.html` and the plots over time, with the picture of the mesh where there is none, and `animation.gif`
+/// where the study asks for it.
 ///
 /// The run may be finished, interrupted or still going on. What is damaged is left out and told of.
 ///
@@ -33,7 +34,12 @@ pub struct Built {
 /// [`Error::NotARun`](crate::Error::NotARun) for any other directory; [`Error::Unreadable`](crate::Error::Unreadable) or
 /// [`Error::Unwritable`](crate::Error::Unwritable).
 pub fn build(directory: &Path) -> Result<Built> {
-    of(RunFiles::read(directory)?, directory)
+    let mut run = RunFiles::read(directory)?;
+    // a run that goes on, or was killed, has not drawn it; one that goes on draws it at its end
+    if !run.busy {
+        animation::still(&mut run)?;
+    }
+    of(run, directory)
 }
 
 fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {

@@ -23,6 +23,8 @@ struct Page<'a> {
     failure: Option<&'a str>,
     /// What may cure it.
     help: Option<&'a str>,
+    /// How to go on with a run that ended early.
+    resume: Option<&'static str>,
     warnings: Vec<&'a str>,
     notes: &'a [String],
     viewer: Option<ViewerOnPage<'a>>,
@@ -82,15 +84,15 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
             "not-converged" => "The iteration did not converge.".into(),
             "interrupted" => "The run was interrupted; everything up to the last good state is here.".into(),
             "running" => "The run still goes on. This is what it left so far.".into(),
-            "killed" => {
-                "The run did not come to its end, and goes on no more. This is what it left; the same command with --resume \
-                 goes on from its newest checkpoint."
-                    .into()
-            }
+            "killed" => "The run did not come to its end, and goes on no more. This is what it left.".into(),
             other => format!("Status: {other}."),
         },
         failure: told("message"),
         help: told("help"),
+        resume: ["interrupted", "killed"].contains(&status).then_some(match run.resumable {
+            true => "The same command with --resume goes on.",
+            false => "There is no checkpoint to go on from: the same command begins anew.",
+        }),
         warnings: warnings.into_iter().flatten().filter_map(Value::as_str).collect(),
         notes: &run.notes,
         viewer: viewer.map(|v| ViewerOnPage {

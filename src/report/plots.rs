@@ -14,7 +14,7 @@ struct Group {
     columns: &'static [(&'static str, &'static str)],
 }
 
-const GROUPS: [Group; 9] = [
+const GROUPS: [Group; 10] = [
     Group {
         name: "error",
         title: "Error over time",
@@ -70,6 +70,14 @@ const GROUPS: [Group; 9] = [
         scale: Scale::Linear,
         line: true,
         columns: &[("observed_rate", "observed"), ("bound", "bound")],
+    },
+    Group {
+        name: "quality",
+        title: "Quality of the mesh over time",
+        label: "share of the mean (dimensionless)",
+        scale: Scale::Logarithmic,
+        line: true,
+        columns: &[("equidistribution", "largest ∫M of a cell"), ("shortest_cell", "shortest cell")],
     },
     Group {
         name: "energy",

@@ -24,9 +24,11 @@ pub struct Part {
 const ELSEWHERE: [&str; 8] = ["schema", "study", "kind", "version", "status", "seconds", "warnings", "mesh"];
 /// More rows than this keep the order of the file: one report a row.
 const MANY: usize = 8;
+/// Rows of a long table at its beginning, and at its end.
+const SHOWN: usize = 250;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 46] = [
+const NAMES: [(&str, &str, &str); 49] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -41,7 +43,7 @@ const NAMES: [(&str, &str, &str); 46] = [
     ),
     ("quality.equidistribution", "equidistribution", "largest over mean density × size of a cell; 1 is perfect"),
     ("quality.shortest_cell", "shortest cell", "over the mean one; negative where nodes have changed their order"),
-    ("quality.error_linf", "largest distance from the exact mesh", ""),
+    ("quality.error_linf", "distance from the continuous mesh", "largest, of up to a thousand nodes"),
     ("conserved.mass", "integral of the first unknown", ""),
     ("conserved.drift", "change of the integral", "since the start, over its size there"),
     ("interface.points", "points between subdomains", ""),
@@ -59,7 +61,10 @@ const NAMES: [(&str, &str, &str); 46] = [
     ("comparison.r_mean", "mean Q, reference over this mesh", ""),
     ("comparison.cell_max", "… largest in one cell", ""),
     ("comparison.mesh_rms", "distance of the meshes", "root mean square over the nodes"),
-    ("rate.stride", "iterations that these factors are for", ""),
+    ("rate.stride", "iterations", "that these factors are of"),
+    ("rate.observed", "observed", ""),
+    ("rate.predicted", "predicted", "by theory, for the error in the end; – where no theory says"),
+    ("parallel.ranks", "processes", ""),
     ("rate.bound", "predicted bound", ""),
     ("front.mean", "mean height of the front", ""),
     ("front.range", "its lowest and highest point", ""),
@@ -68,7 +73,7 @@ const NAMES: [(&str, &str, &str); 46] = [
     ("energy_imbalance_by_differences", "… with fluxes by differences", ""),
     ("step_limit", "longest stable step", "of the explicit front, as estimated"),
     ("error_linf", "largest error", "against the discrete solution on one domain"),
-    ("increment", "increment", "largest way of a node since the iteration before"),
+    ("increment", "increment", "how far a node has moved at most since the iteration before"),
     ("interpolation_error", "interpolation error", "largest error of linear interpolation on the glued mesh"),
     ("largest_jump", "largest jump", "twice the largest change of u over a cell"),
     ("points_per_second", "stencils a second", ""),
@@ -138,8 +143,15 @@ fn of_records(key: &str, records: &[Value]) -> Table {
     };
     let words = meanings(paths.iter().map(|path| path.as_str()));
     let (head, rows) = if records.len() > MANY {
-        let row = |record: &Vec<(String, Value)>| paths.iter().map(|path| at(record, path)).collect();
-        (paths.iter().map(|path| name(path)).collect(), flat.iter().map(row).collect())
+        let row = |record: &Vec<(String, Value)>| paths.iter().map(|path| at(record, path)).collect::<Vec<_>>();
+        let mut rows: Vec<Vec<String>> = flat.iter().take(SHOWN).map(row).collect();
+        // of very many the first and the last
+        let rest = &flat[rows.len()..];
+        if rest.len() > SHOWN {
+            rows.push(paths.iter().map(|_| "…".into()).collect());
+        }
+        rows.extend(rest[rest.len().saturating_sub(SHOWN)..].iter().map(row));
+        (paths.iter().map(|path| name(path)).collect(), rows)
     } else {
         let line =
             |path: &&String| [name(path)].into_iter().chain(flat.iter().map(|record| at(record, path))).collect();

@@ -35,7 +35,7 @@ impl Viewer {
         let counts = [0, 1].map(|series| run.series[series].frames.len());
         let first = (0..counts[0]).find_map(|place| run.frames(0, &[place]).pop())?;
         // bytes of a frame as if nothing could be compressed
-        let arrays = (2 + first.fields.len()) * if counts[1] > 0 { 2 } else { 1 };
+        let arrays = (2 + first.fields.len() + first.cell_fields.len()) * if counts[1] > 0 { 2 } else { 1 };
         let size = |stride: usize| {
             let nodes: usize = first.cells.iter().map(|n| n.div_ceil(stride) + 1).product();
             (3 * nodes * arrays) as f64 * TEXT
@@ -59,7 +59,8 @@ impl Viewer {
         }
         let shown = packed.meshes[0].shown;
         let mut left_out = Vec::new();
-        if shown < counts[0] && share < 1.0 {
+        // what is damaged is told of elsewhere
+        if packed.wanted < counts[0] {
             left_out.push(format!("{shown} of {} frames", counts[0]));
         }
         if stride > 1 {
@@ -79,6 +80,8 @@ impl Viewer {
 
 struct Packed {
     first: Frame,
+    /// Frames of the run that were asked for.
+    wanted: usize,
     stride: usize,
     /// The box that is shown.
     ends: [[f64; 2]; 2],
@@ -106,7 +109,7 @@ impl Packed {
             meshes.push(PackedSeries::of(&frames, stride));
             first.get_or_insert_with(|| one.clone());
         }
-        Some(Self { first: first?, stride, ends, meshes })
+        Some(Self { first: first?, wanted: spread(counts[0], share).len(), stride, ends, meshes })
     }
 
     fn bytes(&self) -> usize {
@@ -184,16 +187,23 @@ impl PackedSeries {
         let lines = first.cells.map(|n| (0..n).step_by(stride).chain([n]).collect::<Vec<usize>>());
         let row = first.cells[1] + 1;
         let nodes: Vec<usize> = lines[0].iter().flat_map(|i| lines[1].iter().map(move |j| i * row + j)).collect();
-        let names = ["x", "y"].into_iter().chain(first.fields.iter().map(|(name, _)| name.as_str()));
+        let (inside, count) = (&first.cell_fields, first.cells[0]);
+        let fields = first.fields.iter().chain(inside).map(|(name, _)| name.as_str());
+        let (names, nodal) = (["x", "y"].into_iter().chain(fields), 2 + first.fields.len());
         let packed = map(&names.enumerate().collect::<Vec<_>>(), |&(a, name)| {
-            let at = |frame: &Frame, k: usize| if a < 2 { frame.x[k][a] } else { frame.fields[a - 2].1[k] };
+            let at = |frame: &Frame, k: usize| match a {
+                0 | 1 => frame.x[k][a],
+                _ if a < nodal => frame.fields[a - 2].1[k],
+                // the cell behind a node, and the last once more
+                _ => frame.cell_fields[a - nodal].1[k.min(count - 1)],
+            };
             let all = || frames.iter().flat_map(|frame| nodes.iter().map(move |&k| at(frame, k)));
             let [low, high] = all().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
             // a density that nothing asked for is the same everywhere
             let needless = low == high && a >= 2 && first.fields.len() > 1 && ["rho", "mesh density"].contains(&name);
             (!needless).then(|| {
                 let bytes = pack(all().map(|v| quantised(v, low, high)), nodes.len());
-                (json!({ "name": name, "low": low, "high": high }), bytes)
+                (json!({ "name": name, "low": low, "high": high, "inside": a >= nodal }), bytes)
             })
         });
         let (arrays, bytes): (Vec<Value>, Vec<Vec<u8>>) = packed.into_iter().flatten().unzip();

@@ -15,11 +15,11 @@ pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
 pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
 pub(crate) use observer::{Rows, frame_name, vtu};
-pub(crate) use report::{COLOURS, Canvas, status, write_file};
+pub(crate) use report::{COLOURS, Canvas, Sheet, moment, status, write_file};
 pub use report::{
     Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Standing, Summary, WorkTotal,
 };
-pub use report::{Curve, Figure, Picture, Pixels, Scale, Sheet, draw, draw_curves, final_arrays};
+pub use report::{Curve, Figure, Picture, Scale, draw, draw_curves, final_arrays};
 pub use safety::{Retries, Safety};
 pub use schedule::Schedule;
 

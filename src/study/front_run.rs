@@ -10,7 +10,7 @@ use crate::kept::{Kept, check_nodal};
 use crate::report;
 use crate::simulation::{
     Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, Rows, RunDirectory, Schedule, Snapshot, State,
-    WorkTotal, draw, draw_curves, final_arrays, status,
+    WorkTotal, draw, draw_curves, final_arrays, moment, status,
 };
 use crate::stefan::{Energy, Front, FrontState, LOWER, Problem, Stepping, UPPER};
 use crate::stopwatch::Stopwatch;
@@ -399,7 +399,6 @@ impl FrontFinished {
 
     /// The mesh over the temperature, and the fronts over time.
     pub fn pictures(&self, title: &str) -> [Picture; 2] {
-        let t: f64 = format!("{:.9}", self.state.t).parse().unwrap_or(self.state.t);
         let all = || self.fronts.iter().flat_map(|(_, h)| h.iter().copied());
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
         let margin = (0.05 * (high - low)).max(1e-3 * high.abs().max(1e-12));
@@ -407,7 +406,7 @@ impl FrontFinished {
         let line: Vec<[f64; 2]> = x.iter().zip(&self.state.front).map(|(x, y)| [*x, *y]).collect();
         let over_time = format!("{title}, the front over time");
         [
-            draw(&format!("{title}, t = {t}"), "u", &self.whole, &line),
+            draw(&format!("{title}, t = {}", moment(self.state.t)), "u", &self.whole, &line),
             draw_curves(&over_time, "t", x, &self.fronts, [x[0], low - margin], [x[last], high + margin]),
         ]
     }

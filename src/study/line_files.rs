@@ -2,11 +2,11 @@
 
 use super::EquidistributionStudy;
 use super::line_run::{Evolution, NumberedIterate};
-use crate::equidistribution::{History, Line};
+use crate::equidistribution::{FaceDensity, History, Line};
 use crate::error::{Error, Result};
 use crate::parallel::map;
 use crate::simulation::vtu::{Grid, Values, collection};
-use crate::simulation::{Curve, Figure, RunDirectory, Scale, frame_name, write_file};
+use crate::simulation::{Curve, Figure, RunDirectory, Scale, frame_name, moment, write_file};
 use ndarray::{Array1, Array2, arr0};
 use ndarray_npy::{NpzWriter, WriteNpzError};
 use serde::Serialize;
@@ -16,24 +16,21 @@ use std::io::Cursor;
 const DRAWN: usize = 400;
 /// Places between two nodes at which M is drawn.
 const BETWEEN: usize = 8;
+/// Cells over which M is integrated to round-off; of more each is as good as its trapezoid.
+const EXACTLY: usize = 10_000;
 /// Paths of nodes drawn in time.
 const PATHS: usize = 40;
 
-/// Writes the history, the arrays, the frames and the pictures.
+/// Writes the history, the arrays, the frames and the pictures; so many frames are there already.
 pub(super) fn keep(
     study: &EquidistributionStudy,
     line: &Line,
     directory: &RunDirectory,
     evolution: &Evolution,
+    written: usize,
 ) -> Result<()> {
-    let iterates = evolution.last.iter().flat_map(|history| &history.iterates);
-    let table = match study.time {
-        Some(_) => csv_of(&evolution.steps),
-        None => csv_of(iterates.enumerate().map(|(n, iterate)| NumberedIterate::new(n, iterate))),
-    };
-    directory.write("history.csv", &table)?;
+    write_series(study, line, directory, evolution, written)?;
     directory.write("final.npz", &arrays(line, evolution))?;
-    write_frames(study, line, directory, evolution)?;
     let mut pictures = vec![(
         "mesh",
         if study.time.is_some() { paths(study, line, evolution) } else { mapping(study, line, evolution) },
@@ -70,16 +67,26 @@ fn arrays(line: &Line, evolution: &Evolution) -> Vec<u8> {
     write().expect("writing to memory cannot fail")
 }
 
-/// `frames/*.vtu` and `run.pvd`: the meshes over time; without time those of the iterates, or the one mesh that there is.
+/// `history.csv`, and `frames/*.vtu` with `run.pvd`: the meshes over time; without time those of the iterates, or the one
+/// mesh that there is. Of the frames so many are there already; how many are now is returned.
 ///
 /// At the nodes u, where M is the arc length of one, and M; in the cells ∫M and the length, both over their mean, the first
 /// subdomain that a cell lies in and how many more it lies in.
-fn write_frames(
+pub(super) fn write_series(
     study: &EquidistributionStudy,
     line: &Line,
     directory: &RunDirectory,
     evolution: &Evolution,
-) -> Result<()> {
+    written: usize,
+) -> Result<usize> {
+    let iterates = evolution.last.iter().flat_map(|history| &history.iterates);
+    let table = match study.time {
+        Some(_) => csv_of(&evolution.steps),
+        None => csv_of(iterates.enumerate().map(|(n, iterate)| NumberedIterate::new(n, iterate))),
+    };
+    if !table.is_empty() {
+        directory.write("history.csv", &table)?;
+    }
     let folder = directory.path().join("frames");
     std::fs::create_dir_all(&folder)
         .map_err(|error| Error::Unwritable { path: folder.clone(), reason: error.to_string() })?;
@@ -98,14 +105,15 @@ fn write_frames(
     };
     let ranges = study.decomposition()?.map_or(Vec::new(), |(_, ranges)| ranges);
     let grid = Grid::line(line.cells);
-    let written = map(&meshes, |&(number, at, mesh)| {
+    let outcomes = map(&meshes[written..], |&(number, at, mesh)| {
         let t = study.time.map_or(0.0, |_| at);
         let document = frame(line, t, mesh, &ranges, &grid);
         write_file(&directory.path().join(frame_name("frames", number)), document.as_bytes())
     });
-    written.into_iter().collect::<Result<()>>()?;
+    outcomes.into_iter().collect::<Result<()>>()?;
     let files = meshes.iter().map(|(number, at, _)| (*at, frame_name("frames", *number)));
-    directory.write("run.pvd", collection(files).as_bytes())
+    directory.write("run.pvd", collection(files).as_bytes())?;
+    Ok(meshes.len())
 }
 
 fn frame(line: &Line, t: f64, mesh: &[f64], ranges: &[[usize; 2]], grid: &Grid) -> String {
@@ -120,7 +128,8 @@ fn frame(line: &Line, t: f64, mesh: &[f64], ranges: &[[usize; 2]], grid: &Grid) 
         let mean = values.iter().sum::<f64>() / line.cells as f64;
         values.into_iter().map(|v| v / mean).collect::<Vec<_>>()
     };
-    let shares = line.shares(t, &places).ok().map(over_mean);
+    let face = if line.cells <= EXACTLY { FaceDensity::Exact } else { line.face };
+    let shares = Line { face, ..line.clone() }.shares(t, &places).ok().map(over_mean);
     let lengths = over_mean(mesh.windows(2).map(|x| x[1] - x[0]).collect());
     let of_cell = |cell: usize| {
         let first = ranges.partition_point(|range| range[1] <= cell);
@@ -207,7 +216,7 @@ fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) ->
     let few = mesh.len() <= DRAWN;
     let nodes: Vec<[f64; 2]> = mesh.iter().filter(|_| few).filter_map(|x| place(*x)).collect();
     let [low, high] = all.iter().fold([f64::INFINITY, 0.0], |[l, h]: [f64; 2], p| [l.min(p[1]), h.max(p[1])]);
-    let when = study.time.as_ref().map_or(String::new(), |_| format!(", t = {t}"));
+    let when = study.time.as_ref().map_or(String::new(), |_| format!(", t = {}", moment(t)));
     let what = if few { "the density and the nodes" } else { "the density" };
     let mut curves = vec![Curve { name: "M".into(), points: all, plain: true, ..Curve::default() }.outlined()];
     if few {
@@ -234,9 +243,13 @@ fn convergence(study: &EquidistributionStudy, history: &History) -> Figure {
         Some(Curve { name: format!("{name}, {rate:.4} in two iterations"), points, plain: true, ..Curve::default() })
     };
     let mut curves = vec![Curve { name: "observed".into(), points: errors.clone(), ..Curve::default() }.outlined()];
-    // slopes: what is predicted holds in the end, a bound from the start, for even iterates and odd ones apart
-    curves.extend(line("predicted", history.prediction.predicted, errors[last]));
-    curves.extend(line("bound", history.prediction.bound, [0.0, errors[0][1].max(errors[1.min(last)][1])]));
+    // slopes: what is predicted holds in the end, before the error stands still; a bound from the start, for even iterates
+    // and odd ones apart
+    let end = errors.iter().rfind(|e| e[1] >= 10.0 * floor).unwrap_or(&errors[last]);
+    curves.extend(line("predicted", history.prediction.predicted, *end));
+    let [first, second] = [errors[0][1], errors[1.min(last)][1]];
+    let from = history.prediction.bound.map_or(first, |bound| first.max(second / bound.sqrt()));
+    curves.extend(line("bound", history.prediction.bound, [0.0, from]));
     Figure {
         title: format!("{}, convergence{}", study.study.name, study.time.as_ref().map_or("", |_| " in the last step")),
         labels: ["iterations".into(), "distance to the single-domain mesh".into()],

@@ -3,7 +3,7 @@
 use super::EquidistributionStudy;
 use super::any::Begin;
 use super::ending::end;
-use super::line_files::{keep, thinned};
+use super::line_files::{keep, thinned, write_series};
 use crate::equidistribution::{FaceDensity, History, Iterate, Line};
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::check_nodal;
@@ -98,8 +98,8 @@ pub struct NumberedIterate {
     pub n: usize,
     /// Largest distance from the discrete single-domain mesh, over the subdomains.
     pub error_linf: f64,
-    /// Largest change since the iterate before.
-    pub increment: f64,
+    /// Largest change since the iterate before; none of the start.
+    pub increment: Option<f64>,
     /// Largest error of linear interpolation on the glued mesh.
     pub interpolation_error: Option<f64>,
     /// 2 max |u_i − u_{i−1}| of it.
@@ -152,7 +152,7 @@ pub struct Evolution {
     pub meshes: Vec<Vec<f64>>,
     /// The steps that led to them.
     pub kept: Vec<usize>,
-    /// How the iteration of each step went, in a line; none without subdomains.
+    /// How each step went, in a line; without subdomains of steps in time only.
     pub steps: Vec<StepRow>,
     /// The last of these iterations.
     pub last: Option<History>,
@@ -176,14 +176,18 @@ struct LineCheckpoint {
 pub struct StepRow {
     /// Time.
     pub t: f64,
-    /// Iterations.
+    /// Iterations, of Newton's method where there are no subdomains.
     pub iterations: usize,
-    /// Error of the last against the discrete single-domain mesh.
-    pub error_linf: f64,
+    /// Error of the last against the discrete single-domain mesh, where there are subdomains.
+    pub error_linf: Option<f64>,
     /// Contraction in two iterations.
     pub observed_rate: Option<f64>,
     /// By theory at most.
     pub bound: Option<f64>,
+    /// max/mean of ∫M over the cells.
+    pub equidistribution: f64,
+    /// Shortest cell over the mean one.
+    pub shortest_cell: f64,
 }
 
 /// Nodes compared with the continuous mesh, and cells over which M is integrated to round-off.
@@ -228,12 +232,15 @@ impl EquidistributionStudy {
                 None => {
                     let (next, solves) = line.solve(t, &mesh, old).map_err(during)?;
                     evolution.linear_solves += solves;
+                    if self.time.is_some() {
+                        evolution.steps.push(StepRow::new(line, t, &next, solves)?);
+                    }
                     next
                 }
                 Some((method, ranges)) => {
                     let history = line.iterate(t, ranges, *method, &mesh, old, self.until()).map_err(during)?;
                     let (next, missed) = (history.mesh.clone(), history.missed(*method, self.until()));
-                    evolution.tell(t, history);
+                    evolution.tell(line, t, history).map_err(during)?;
                     if let Some(failure) = missed {
                         return Err(during(failure.into()));
                     }
@@ -263,7 +270,7 @@ impl EquidistributionStudy {
         let counted = schedule.and_then(|schedule| schedule.steps()).is_some_and(|steps| *done <= steps)
             && [times.len(), kept.len()] == [meshes.len(); 2]
             && !times.is_empty()
-            && steps.len() == if divided { *done } else { 0 }
+            && steps.len() == *done
             && last.is_some() == (divided && *done > 0)
             && last.as_ref().is_none_or(|history| !history.iterates.is_empty());
         match counted && newest.is_sorted_by(|a, b| a < b) {
@@ -321,11 +328,14 @@ impl EquidistributionStudy {
             let [wall, cpu] = clock.elapsed();
             LineSeconds { wall, cpu, mesh: seconds.mesh + solving.elapsed().as_secs_f64(), ..seconds }
         };
+        let mut written = 0;
         let outcome = study.evolve(&line, &mut evolution, &mut |t, evolution| {
             let step = evolution.done;
             let ends = study.time.is_some() && watchers.iter().any(|watcher| watcher.interrupts());
             if ends || study.time.is_some() && checkpoints.due(step) {
                 checkpoints.write(step, &LineCheckpoint { evolution: evolution.clone(), seconds: spent() })?;
+                // what a report of a run that goes on or is killed can show
+                written = write_series(&study, &line, &directory, evolution, written)?;
             }
             if ends { Err(Error::Interrupted(Moment { t, step })) } else { Ok(()) }
         });
@@ -342,7 +352,7 @@ impl EquidistributionStudy {
         let failure = failure.or(told.err());
         summary.warnings.extend(refused);
         // what went wrong first is what is reported
-        let failure = failure.or(keep(&study, &line, &directory, &evolution).err());
+        let failure = failure.or(keep(&study, &line, &directory, &evolution, written).err());
         summary.seconds.output += output.elapsed().as_secs_f64();
         let note = |summary: &mut EquidistributionSummary, failure: Option<&Error>, output: f64| {
             summary.status = status(failure).into();
@@ -388,17 +398,14 @@ impl Evolution {
         self.kept.push(self.done);
     }
 
-    fn tell(&mut self, t: f64, history: History) {
+    fn tell(&mut self, line: &Line, t: f64, history: History) -> Result<()> {
         let last = history.iterates[history.count()];
+        let row = StepRow::new(line, t, &history.mesh, history.count());
+        let (observed_rate, bound) = (history.observed, history.prediction.bound);
         self.linear_solves += last.linear_solves;
-        self.steps.push(StepRow {
-            t,
-            iterations: history.count(),
-            error_linf: last.error,
-            observed_rate: history.observed,
-            bound: history.prediction.bound,
-        });
         self.last = Some(history);
+        self.steps.push(StepRow { error_linf: Some(last.error), observed_rate, bound, ..row? });
+        Ok(())
     }
 
     /// The last mesh; that of an iteration which missed its tolerance, where one did.
@@ -408,6 +415,22 @@ impl Evolution {
             None => self.meshes.last().map_or(&[], Vec::as_slice),
         }
     }
+}
+
+impl StepRow {
+    fn new(line: &Line, t: f64, mesh: &[f64], iterations: usize) -> Result<Self> {
+        let shares = line.shares(t, mesh)?;
+        let largest = shares.iter().copied().fold(0.0, f64::max);
+        let equidistribution = largest * line.cells as f64 / shares.iter().sum::<f64>();
+        let shortest_cell = shortest(line, mesh);
+        Ok(Self { t, iterations, error_linf: None, observed_rate: None, bound: None, equidistribution, shortest_cell })
+    }
+}
+
+/// The shortest cell over the mean one.
+fn shortest(line: &Line, mesh: &[f64]) -> f64 {
+    let shortest = mesh.windows(2).map(|x| x[1] - x[0]).fold(f64::INFINITY, f64::min);
+    shortest * line.cells as f64 / (line.ends[1] - line.ends[0])
 }
 
 impl EquidistributionSummary {
@@ -451,6 +474,7 @@ impl EquidistributionSummary {
 impl NumberedIterate {
     pub(super) fn new(n: usize, iterate: &Iterate) -> Self {
         let Iterate { error, increment, largest_jump, interpolation_error, linear_solves } = *iterate;
+        let increment = (n > 0).then_some(increment);
         Self { n, error_linf: error, increment, interpolation_error, largest_jump, linear_solves }
     }
 }
@@ -461,7 +485,6 @@ impl LineQuality {
         let face = if line.cells <= EXACTLY { FaceDensity::Exact } else { FaceDensity::Trapezoid };
         let shares = Line { face, ..line.clone() }.shares(t, mesh)?;
         let mean = shares.iter().sum::<f64>() / line.cells as f64;
-        let shortest = mesh.windows(2).map(|x| x[1] - x[0]).fold(f64::INFINITY, f64::min);
         let compared = |cells: usize| -> Result<f64> {
             let nodes: Vec<usize> = thinned(cells + 1, COMPARED).collect();
             let xi: Vec<f64> = nodes.iter().map(|&i| i as f64 / cells as f64).collect();
@@ -471,7 +494,7 @@ impl LineQuality {
         };
         Ok(Self {
             equidistribution: shares.iter().copied().fold(0.0, f64::max) / mean,
-            shortest_cell: shortest * line.cells as f64 / (line.ends[1] - line.ends[0]),
+            shortest_cell: shortest(line, mesh),
             error_linf: steady.then(|| compared(line.cells)).transpose()?,
         })
     }

@@ -9,7 +9,7 @@ use crate::parallel::join;
 use crate::report;
 use crate::simulation::{
     Checkpoint, Checkpoints, Course, Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory,
-    Simulation, Snapshot, State, Summary, draw, final_arrays, status,
+    Simulation, Snapshot, State, Summary, draw, final_arrays, moment, status,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -288,7 +288,8 @@ fn reference_into(
 ) -> Result<()> {
     let Some(compare) = &study.compare else { return Ok(()) };
     let mut frames = Frames::of_reference(directory.path(), study.frames(), compare.generator.subdomains())?;
-    compare_with_reference(study, meshes, record, &mut [&mut frames, &mut Ends(watchers)])
+    let compared = compare_with_reference(study, meshes, record, &mut [&mut frames, &mut Ends(watchers)]);
+    compared.map_err(|error| Error::Compared(Box::new(error)))
 }
 
 /// Runs the study with the generator of `[compare]` and adds to each report how the meshes compare.
@@ -314,11 +315,6 @@ fn compare_with_reference(
 
 /// Draws the last good state.
 fn draw_mesh(study: &MovingMesh, directory: &RunDirectory, unknowns: &[String], state: &State) -> Result<()> {
-    let picture = draw(&format!("{}, t = {}", study.study.name, rounded(state.t)), &unknowns[0], state, &[]);
+    let picture = draw(&format!("{}, t = {}", study.study.name, moment(state.t)), &unknowns[0], state, &[]);
     picture.write(directory.path(), "mesh")
-}
-
-/// A time without the tail that binary fractions have.
-fn rounded(t: f64) -> f64 {
-    format!("{t:.9}").parse().unwrap_or(t)
 }

@@ -124,11 +124,11 @@ def test_hovering_shows_the_numbers_of_the_frame(run, chromium):
     i, j = 31, 12
     k = i * 41 + j
     x, y = frame.points[k, :2]
-    # where the node is on the canvas, by the axes: 62 + 14 pixels beside it, 8 above
+    # where the node is on the canvas, by the axes: 70 + 14 pixels beside it, 8 above
     canvas = chromium.find_element("css selector", ".stages canvas")
     box = canvas.rect
-    width = box["width"] - 76
-    to = [62 + x * width - box["width"] / 2, 8 + (1 - y) * width - box["height"] / 2]
+    width = box["width"] - 84
+    to = [70 + x * width - box["width"] / 2, 8 + (1 - y) * width - box["height"] / 2]
     webdriver.ActionChains(chromium).move_to_element_with_offset(canvas, round(to[0]), round(to[1])).perform()
     for mesh, expected in enumerate((frame, reference)):
         shown = readout(chromium, mesh)
@@ -193,7 +193,7 @@ def test_the_nodes_of_a_line_move_with_the_iterations(chromium, tmp_path):
         x = frame.points[:, 0]
         canvas = chromium.find_element("css selector", ".stages canvas")
         width, node = canvas.rect["width"], 70
-        to = [62 + x[node] * (width - 76) - width / 2, 0]
+        to = [70 + x[node] * (width - 84) - width / 2, 0]
         webdriver.ActionChains(chromium).move_to_element_with_offset(canvas, round(to[0]), 0).perform()
         read = readout(chromium)
         # neighbours may be nearer to the pixel
@@ -204,7 +204,7 @@ def test_the_nodes_of_a_line_move_with_the_iterations(chromium, tmp_path):
             assert figure(read[name]) == pytest.approx(frame[name][node], rel=1e-5, abs=1e-5), name
         share, length = frame.cell_data["share"][node], frame.cell_data["jacobian"][node]
         assert figure(read["cell length, over the mean"]) == pytest.approx(length, rel=1e-3)
-        assert figure(read["M × cell length, over the mean"]) == pytest.approx(share, rel=1e-3)
+        assert figure(read["∫M of a cell, over the mean"]) == pytest.approx(share, rel=1e-3)
     cells = frame.cell_data
     assert chromium.execute_script("return viewer.data.meshes[0].cuts[0]") == [
         k for k in range(1, 100) if (cells["subdomain"][k], cells["overlap"][k]) != (cells["subdomain"][k - 1], cells["overlap"][k - 1])

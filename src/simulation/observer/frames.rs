@@ -181,10 +181,14 @@ impl Frames {
         nodes.push((density.into(), scalars(&state.rho)));
         nodes.push(("mesh velocity".into(), Values::Vectors(lattice.closed(&self.velocity(state)).into_owned())));
         let subdomains = Decomposition::new(lattice, self.subdomains)?.of_cells();
+        let inside = |name: &str| match unknowns.iter().any(|unknown| unknown == name) {
+            true => format!("{name} of cells"),
+            false => name.into(),
+        };
         let cells = [
-            ("Q".into(), Values::Scalars(cell_qualities(&state.mesh))),
-            ("jacobian".into(), Values::Scalars(cell_jacobians(&state.mesh))),
-            ("subdomain".into(), Values::Numbers(subdomains)),
+            (inside("Q"), Values::Scalars(cell_qualities(&state.mesh))),
+            (inside("jacobian"), Values::Scalars(cell_jacobians(&state.mesh))),
+            (inside("subdomain"), Values::Numbers(subdomains)),
         ];
         let points = state.mesh.closed().into_owned();
         self.written.push((state.t, state.step));

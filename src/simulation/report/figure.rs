@@ -1,4 +1,4 @@
-use super::picture::{Canvas, FONT, Picture, Pixels, Ticks};
+use super::picture::{Canvas, FONT, Picture, Ticks};
 use plotters::coord::combinators::{BindKeyPoints, LogCoord};
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
@@ -113,11 +113,6 @@ impl Figure {
     /// Draws it.
     pub fn draw(&self) -> Picture {
         Picture::of(&self.svg(), &mut Canvas::default())
-    }
-
-    /// Its pixels, in the size of the drawing.
-    pub fn pixels(&self) -> Pixels {
-        Canvas::default().pixels(&self.svg())
     }
 
     /// Draws it for a page that has the font.

@@ -56,13 +56,17 @@ pub(super) const BOTTOM: f64 = 64.0;
 pub(super) const BAR: f64 = 24.0;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
-/// Opacities of mesh lines, and what a cell beside them has of it for each unit that it is wide.
+/// Opacities of mesh lines, and what a cell beside them has of it for each unit that it is wider than one.
 const STRENGTHS: [f64; 4] = [0.1, 0.25, 0.4, 0.6];
-/// Their colours, and the shares of the colour map over which they change.
-const TONES: [&str; 5] = ["#fff", "#bfbfbf", "#808080", "#404040", "#000"];
-const WHITE_UP_TO: f64 = 0.4;
-const BLACK_FROM: f64 = 0.8;
+/// Steps from white to black lines, and the shares of the colour map over which they change.
+const TONES: usize = 5;
+const WHITE_UP_TO: f64 = 0.35;
+const BLACK_FROM: f64 = 0.65;
+/// From the middle of a white line beside a black one to that of both: half a pixel of the PNG.
+const BESIDE: f64 = 0.25;
 const FADES: f64 = 0.08;
+/// An axis that begins so little below a round number, as a share of its length, counts from there.
+const NEARLY: f64 = 0.05;
 /// Bytes of a part of a PNG.
 const CHUNK: usize = 1 << 16;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
@@ -70,7 +74,7 @@ const MAX_CELLS: usize = 240;
 
 /// What a picture of a mesh shows.
 #[derive(Debug, Clone)]
-pub struct Sheet<'a> {
+pub(crate) struct Sheet<'a> {
     /// Above it.
     pub title: &'a str,
     /// Above the colour bar.
@@ -113,15 +117,15 @@ pub fn draw(title: &str, unknown: &str, state: &State, line: &[[f64; 2]]) -> Pic
 }
 
 impl Sheet<'_> {
-    /// Its pixels, in the size of the drawing.
-    pub fn pixels(&self) -> Pixels {
-        Canvas::default().pixels(&svg(self))
+    /// Draws it.
+    pub(crate) fn svg(&self) -> String {
+        svg(self)
     }
 }
 
 /// Colours of an image, row by row.
 #[derive(Debug, Clone)]
-pub struct Pixels {
+pub(crate) struct Pixels {
     /// Columns and rows.
     pub size: [u32; 2],
     /// Four bytes a pixel, all opaque.
@@ -204,30 +208,34 @@ fn svg(sheet: &Sheet<'_>) -> String {
     }
     s.push_str("</g>\n");
 
-    // mesh lines, white on dark colours, black on light ones and grey between, for a jump would look like a line of its own;
-    // fainter where cells are few pixels wide, so that the colours stay what they are; one pixel of the PNG wide, which is
-    // drawn fast
-    let mut paths = TONES.map(|_| STRENGTHS.map(|_| String::new()));
+    // mesh lines, white on dark colours and black on light ones; where neither stands out a white one beside a black one, for
+    // a jump would look like a line of its own; fainter where cells are few pixels wide, so that the colours stay what they
+    // are; one pixel of the PNG wide, which is drawn fast
+    let mut paths = [false, true].map(|_| [0; TONES].map(|_| STRENGTHS.map(|_| String::new())));
     let tone = |a: usize, b: usize| {
         let part = (0.5 * (u[a] + u[b]) - low) / (high - low);
-        let grey = (part - WHITE_UP_TO) / (BLACK_FROM - WHITE_UP_TO);
-        (grey.clamp(0.0, 1.0) * (TONES.len() - 1) as f64).round() as usize
+        let black = (part - WHITE_UP_TO) / (BLACK_FROM - WHITE_UP_TO);
+        (black.clamp(0.0, 1.0) * (TONES - 1) as f64).round() as usize
+    };
+    let steep = |a: usize, b: usize| {
+        let [a, b] = [a, b].map(|k| to(x[k]));
+        (b[1] - a[1]).abs() > (b[0] - a[0]).abs()
     };
     let strength = |a: usize, b: usize, beside: usize| {
         let [a, b, c] = [a, b, beside].map(|k| to(x[k]));
         let [e, f] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
         let wide = (e[0] * f[1] - e[1] * f[0]).abs() / e[0].hypot(e[1]);
-        STRENGTHS.iter().rposition(|strength| FADES * wide >= *strength)
+        STRENGTHS.iter().rposition(|strength| FADES * (wide - 1.0) >= *strength)
     };
     let mut mesh_line = |nodes: &[usize], beside: &[usize]| {
-        let look = |e: &[usize], c: usize| Some((tone(e[0], e[1]), strength(e[0], e[1], c)?));
+        let look = |e: &[usize], c: usize| Some((steep(e[0], e[1]), tone(e[0], e[1]), strength(e[0], e[1], c)?));
         let edges: Vec<_> = nodes.windows(2).zip(beside).map(|(e, &c)| (e, look(e, c))).collect();
         for part in edges.chunk_by(|(_, before), (_, after)| before == after) {
-            let Some((tone, strength)) = part[0].1 else { continue };
+            let Some((steep, tone, strength)) = part[0].1 else { continue };
             let seen = |shift: &&[f64; 2]| part.iter().any(|(edge, _)| shown(edge, **shift));
             for &shift in shifts.iter().filter(seen) {
                 let nodes = [part[0].0[0]].into_iter().chain(part.iter().map(|(edge, _)| edge[1]));
-                through(&mut paths[tone][strength], &mut { nodes }, shift);
+                through(&mut paths[usize::from(steep)][tone][strength], &mut { nodes }, shift);
             }
         }
     };
@@ -242,12 +250,23 @@ fn svg(sheet: &Sheet<'_>) -> String {
         let along = |j: usize| lines[0].iter().map(|&i| at(i, j)).collect::<Vec<_>>();
         mesh_line(&along(j), &along(beside));
     }
-    for (paths, colour) in paths.iter().zip(TONES) {
+    let [flat, steep] = paths.map(|tones| tones.into_iter().enumerate());
+    let tones = flat.map(|tone| ([0.0, BESIDE], tone)).chain(steep.map(|tone| ([BESIDE, 0.0], tone)));
+    for (side, (tone, paths)) in tones {
+        let black = tone as f64 / (TONES - 1) as f64;
+        let off = if black > 0.0 && black < 1.0 { 1.0 } else { 0.0 };
+        let lines =
+            [("#fff", 1.0 - black, -off), ("#000", black, off)].into_iter().filter(|(_, share, _)| *share > 0.0);
         for (path, strength) in paths.iter().zip(STRENGTHS).filter(|(path, _)| !path.is_empty()) {
-            let _ = writeln!(
-                s,
-                "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"{strength}\" stroke-width=\"0.5\"/>"
-            );
+            for (colour, share, way) in lines.clone() {
+                let [x, y] = side.map(|side| way * side);
+                let _ = writeln!(
+                    s,
+                    "<path d=\"{path}\" transform=\"translate({x} {y})\" fill=\"none\" stroke=\"{colour}\" \
+                     stroke-opacity=\"{:.3}\" stroke-width=\"0.5\"/>",
+                    strength * share
+                );
+            }
         }
     }
     if !line.is_empty() {
@@ -282,17 +301,30 @@ fn svg(sheet: &Sheet<'_>) -> String {
     s
 }
 
-/// The title, over the box; over the whole drawing where it is too wide for that, and as small as it needs to be.
+/// The title, over the box; over the whole drawing where it is too wide for that, and as small as it needs to be; in two
+/// lines where that would be too small to read.
 pub(super) fn heading(s: &mut String, title: &str, width: f64) {
     const SIZE: f64 = 15.0;
-    let (length, whole) = (WIDE * title.chars().count() as f64, LEFT + width + RIGHT);
-    let size = SIZE.min((whole - 20.0) / length);
-    let centre = if size * length <= width { LEFT + 0.5 * width } else { 0.5 * whole };
-    let _ = writeln!(
-        s,
-        "<text x=\"{centre:.1}\" y=\"20\" text-anchor=\"middle\" font-size=\"{size:.1}\">{}</text>",
-        escape(title)
-    );
+    const LEGIBLE: f64 = 10.0;
+    let whole = LEFT + width + RIGHT;
+    let letters = |line: &str| line.chars().count();
+    let fitting = |line: &str| SIZE.min((whole - 20.0) / (WIDE * letters(line) as f64));
+    let middle = |(place, _): &(usize, &str)| letters(&title[..*place]).abs_diff(letters(title) / 2);
+    let (head, tail) = match title.match_indices([' ', '-', '_', '.']).min_by_key(middle) {
+        Some((place, _)) if fitting(title) < LEGIBLE => title.split_at(place + 1),
+        _ => (title, ""),
+    };
+    let lines: &[(&str, f64)] = if tail.is_empty() { &[(head, 20.0)] } else { &[(head, 12.0), (tail, 24.0)] };
+    let largest = if tail.is_empty() { SIZE } else { LEGIBLE };
+    for (line, y) in lines {
+        let size = fitting(line).min(largest);
+        let centre = if size * WIDE * letters(line) as f64 <= width { LEFT + 0.5 * width } else { 0.5 * whole };
+        let _ = writeln!(
+            s,
+            "<text x=\"{centre:.1}\" y=\"{y}\" text-anchor=\"middle\" font-size=\"{size:.1}\">{}</text>",
+            escape(line.trim())
+        );
+    }
 }
 
 pub(super) fn axes(
@@ -402,7 +434,7 @@ impl Ticks {
         let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
         // what all of them begin with
         let ten = 10_f64.powf(span.log10().ceil());
-        let start = if span < 2e-3 * scale { (low / ten + 1e-9).floor() } else { 0.0 };
+        let start = if span < 2e-3 * scale { (low / ten + NEARLY * span / ten).floor() } else { 0.0 };
         let less = (start != 0.0).then(|| {
             let digits = (start.abs().log10().floor() as usize).min(15);
             let decimals = (-ten.log10().round()).max(0.0) as usize;
@@ -449,6 +481,16 @@ impl Ticks {
     }
 }
 
+/// A time without the tail that binary fractions have; as a power of ten where it is very small or large.
+pub(crate) fn moment(t: f64) -> String {
+    if t == 0.0 || (1e-4..1e9).contains(&t.abs()) {
+        return format!("{}", format!("{t:.9}").parse::<f64>().unwrap_or(t));
+    }
+    let text = format!("{t:.5e}");
+    let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+    format!("{}e{power}", digits.trim_end_matches('0').trim_end_matches('.'))
+}
+
 pub(super) fn colour(fraction: f64) -> String {
     let c = colorous::VIRIDIS.eval_continuous(if fraction.is_finite() { fraction.clamp(0.0, 1.0) } else { 0.5 });
     format!("#{c:x}")
@@ -483,7 +525,7 @@ pub(crate) struct Canvas(Option<tiny_skia::Pixmap>);
 
 impl Canvas {
     /// A drawing as pixels, in its size.
-    pub(super) fn pixels(&mut self, svg: &str) -> Pixels {
+    pub(crate) fn pixels(&mut self, svg: &str) -> Pixels {
         let painted = self.paint(svg, 1);
         Pixels { size: [painted.width(), painted.height()], rgba: painted.data().to_vec() }
     }

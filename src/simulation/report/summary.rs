@@ -54,7 +54,7 @@ pub struct Failed {
 
 impl From<&Error> for Failed {
     fn from(error: &Error) -> Self {
-        let (kind, moment) = match error {
+        let (kind, moment) = match error.cause() {
             Error::Failed { failure, moment } => (failure.name(), *moment),
             Error::Interrupted(moment) => ("interrupted", Some(*moment)),
             _ => ("unwritable", None),
@@ -71,7 +71,7 @@ impl From<&Error> for Failed {
 
 /// `status` of a run that has ended, from what ended it early.
 pub(crate) fn status(failure: Option<&Error>) -> &'static str {
-    match failure {
+    match failure.map(Error::cause) {
         None => "completed",
         Some(Error::Failed { failure: Failure::NotConverged { .. }, .. }) => "not-converged",
         Some(Error::Interrupted(_)) => "interrupted",
