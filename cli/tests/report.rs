@@ -7,22 +7,35 @@ struct Run {
     sandbox: tempfile::TempDir,
 }
 
+const SHORT: [&str; 4] = ["grid.cells=[12,10]", "time.end=0.27", "time.report=[0.26,0.27]", "output.frames.every=5"];
+
 impl Run {
     /// A short study, run into `out` with settings laid over it.
     fn new(set: &[&str]) -> Self {
-        let short = ["grid.cells=[12,10]", "time.end=0.27", "time.report=[0.26,0.27]", "output.frames.every=5"];
-        Self::of("burgers-b-stochastic", &[&short, set].concat())
+        Self::of("burgers-b-stochastic", &[&SHORT, set].concat())
+    }
+
+    /// The same, where it fails.
+    fn failing(set: &[&str]) -> Self {
+        let (run, output) = Self::ended("burgers-b-stochastic", &[&SHORT, set].concat());
+        assert_eq!(output.status.code(), Some(1), "{}", words(&output));
+        run
     }
 
     /// A study of ours.
     fn of(name: &str, set: &[&str]) -> Self {
+        let (run, output) = Self::ended(name, set);
+        assert!(output.status.success(), "{}", words(&output));
+        run
+    }
+
+    fn ended(name: &str, set: &[&str]) -> (Self, Output) {
         let run = Self { sandbox: tempfile::tempdir().unwrap() };
         let study = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../studies/{name}.toml"));
         let mut arguments = vec!["run", study.to_str().unwrap(), "--quiet", "--out", "out"];
         set.iter().for_each(|assignment| arguments.extend(["--set", assignment]));
         let output = run.call(&arguments);
-        assert!(output.status.success(), "{}", words(&output));
-        run
+        (run, output)
     }
 
     fn call(&self, arguments: &[&str]) -> Output {
@@ -181,6 +194,18 @@ fn large_runs_are_thinned_and_say_so() {
     let times = data["meshes"][0]["times"].as_array().unwrap();
     assert!((2..41).contains(&times.len()));
     assert_eq!([times[0].as_f64(), times[times.len() - 1].as_f64()], [Some(0.25), Some(0.29)]);
+}
+
+/// What fails in the run of [compare] is not called a failure of the run itself, which is whole.
+#[test]
+fn a_failure_of_the_compared_run_is_told_apart() {
+    let run = Run::failing(&["compare.generator={kind=\"schwarz\",subdomains=[3,3],iterations=1}"]);
+    let summary: serde_json::Value = serde_json::from_str(&run.text("summary.json")).unwrap();
+    let told = |key: &str| summary["error"][key].as_str().unwrap_or_default().to_string();
+    assert!(told("message").contains("the run itself is complete; in the one of [compare]: "), "{summary:#}");
+    assert!(told("help").contains("compare.generator.iterations") && !told("help").contains("mesh.generator"));
+    assert_eq!(summary["reports"].as_array().unwrap().len(), 2);
+    assert!(run.text("report.html").contains("in the one of [compare]"));
 }
 
 /// A line too, whose iterates are the frames: in colours that are those of the curve.

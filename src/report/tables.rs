@@ -279,5 +279,11 @@ mod tests {
         let summary = serde_json::json!({"iterations": iterations});
         let table = of(summary.as_object().unwrap()).remove(0);
         assert_eq!((table.head.len(), table.rows.len()), (2, 100));
+        let iterations: Vec<Value> = (0..9000).map(|n| serde_json::json!({"n": n})).collect();
+        let summary = serde_json::json!({"iterations": iterations});
+        let table = of(summary.as_object().unwrap()).remove(0);
+        let shown = |k: usize| table.rows[k][0].as_str();
+        assert_eq!([shown(0), shown(249), shown(250), shown(251), shown(500)], ["0", "249", "…", "8750", "8999"]);
+        assert_eq!(table.rows.len(), 501);
     }
 }

@@ -43,12 +43,18 @@ pub(super) fn keep(
     Ok(())
 }
 
-fn csv_of<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Vec<u8> {
+/// A table with its names, also where it has no row.
+fn csv_of<T: Serialize + Default>(rows: impl AsRef<[T]>) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
+    let (rows, nameless) = (rows.as_ref(), [T::default()]);
+    for row in if rows.is_empty() { &nameless } else { rows } {
         writer.serialize(row).expect("writing to memory cannot fail");
     }
-    writer.into_inner().expect("writing to memory cannot fail")
+    let mut table = writer.into_inner().expect("writing to memory cannot fail");
+    if rows.is_empty() {
+        table.truncate(table.iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1));
+    }
+    table
 }
 
 /// `xi`, `x` and `t` of the last mesh; `times` and `path`, a row a mesh.
@@ -82,11 +88,9 @@ pub(super) fn write_series(
     let iterates = evolution.last.iter().flat_map(|history| &history.iterates);
     let table = match study.time {
         Some(_) => csv_of(&evolution.steps),
-        None => csv_of(iterates.enumerate().map(|(n, iterate)| NumberedIterate::new(n, iterate))),
+        None => csv_of(iterates.enumerate().map(|(n, iterate)| NumberedIterate::new(n, iterate)).collect::<Vec<_>>()),
     };
-    if !table.is_empty() {
-        directory.write("history.csv", &table)?;
-    }
+    directory.write("history.csv", &table)?;
     let folder = directory.path().join("frames");
     std::fs::create_dir_all(&folder)
         .map_err(|error| Error::Unwritable { path: folder.clone(), reason: error.to_string() })?;

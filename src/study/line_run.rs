@@ -92,7 +92,7 @@ pub struct LineQuality {
 }
 
 /// An iterate.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct NumberedIterate {
     /// Its number; the start is 0.
     pub n: usize,
@@ -172,7 +172,7 @@ struct LineCheckpoint {
 }
 
 /// A step in `history.csv`.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct StepRow {
     /// Time.
     pub t: f64,

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,8 @@ browser_is_here = pytest.mark.skipif(
 
 def study(name, out, *settings):
     """Runs a study into a directory."""
-    command = [ROOT / "target/release/driftmesh", "run", ROOT / "studies" / f"{name}.toml", "--quiet", "--out", out]
+    file = (ROOT / "studies" / name).with_suffix(".toml")
+    command = [ROOT / "target/release/driftmesh", "run", file, "--quiet", "--out", out]
     subprocess.run(command + [part for setting in settings for part in ("--set", setting)], check=True)
     return out
 
@@ -223,6 +225,68 @@ def test_the_nodes_of_a_line_move_with_the_iterations(chromium, tmp_path):
     pictures.append(pixels(chromium))
     assert all(not np.array_equal(a, b) for k, a in enumerate(pictures) for b in pictures[:k])
     assert [entry for entry in chromium.get_log("browser") if "readback" not in entry["message"]] == []
+
+
+LINE = """[study]
+name = "line"
+kind = "equidistribution"
+[grid]
+cells = [{cells}]
+[density]
+kind = "formula"
+value = "{m}"
+"""
+
+
+@browser_is_here
+def test_readings_far_from_zero_tell_nodes_apart(chromium, tmp_path):
+    (tmp_path / "far.toml").write_text(
+        LINE.format(cells=40, m="1 + 50*exp(-200*(x - 1000000.5)^2)") + "[domain]\nlower = [1000000]\nupper = [1000001]\n"
+    )
+    out = study(tmp_path / "far", tmp_path / "out")
+    opened(chromium, out)
+    x = np.load(out / "final.npz")["x"]
+    shown = [chromium.execute_script("viewer.choose(arguments[0], 0); return 0", node) or readout(chromium)["x"] for node in range(41)]
+    assert len(set(shown)) == 41 and np.allclose([figure(text) for text in shown], x, rtol=0, atol=1e-5)
+
+
+@browser_is_here
+def test_figures_of_cells_of_a_line_are_those_of_the_run(chromium, tmp_path):
+    """Where M jumps the mean of its values at both ends is not ∫M; in a fine mesh lengths cannot be told from positions."""
+    (tmp_path / "jump.toml").write_text(
+        LINE.format(cells=60, m="if(x < 0.3, 1, 50)")
+        + '[equidistribution]\nface_density = "exact"\n[schwarz]\nmethod = "optimal"\ncuts = [0.25, 0.5, 0.75]\n[stop]\niterations = 4\n'
+    )
+    (tmp_path / "fine.toml").write_text(LINE.format(cells=20000, m="1 + 1e4*exp(-1e8*(x - 0.5)^2)"))
+    for name in ("jump", "fine"):
+        out = study(tmp_path / name, tmp_path / f"{name}-out")
+        frames = [pyvista.read(path) for path in sorted((out / "frames").iterdir())]
+        opened(chromium, out)
+        for field, array in (("cell length", "jacobian"), ("∫M of a cell", "share")):
+            shown = chromium.execute_script(
+                "return Array.from(viewer.cellValues(viewer.stages[0], arguments[0], viewer.last))", field
+            )
+            most = max(frame.cell_data[array].max() for frame in frames)
+            assert np.allclose(shown, frames[-1].cell_data[array], rtol=0, atol=1e-7 * most), (name, field)
+
+
+def test_a_killed_line_leaves_what_it_had(tmp_path):
+    """Frames and history up to its last checkpoint, and a picture of the last frame, which the report draws."""
+    command = [ROOT / "target/release/driftmesh", "run", ROOT / "studies/moving-front-1d.toml", "--quiet", "--out", tmp_path]
+    settings = ["time.step=1e-6", "output.frames.every=50", "output.checkpoint.steps=200"]
+    run = subprocess.Popen(command + [part for setting in settings for part in ("--set", setting)])
+    for _ in range(600):
+        if (tmp_path / "run.pvd").exists():
+            break
+        time.sleep(0.05)
+    run.kill()
+    run.wait()
+    assert not (tmp_path / "mesh.png").exists()
+    subprocess.run([ROOT / "target/release/driftmesh", "report", tmp_path], check=True)
+    page = (tmp_path / "report.html").read_text()
+    assert 'class="status killed"' in page and 'id="viewer-data"' in page and "with --resume goes on" in page
+    assert (tmp_path / "mesh.png").exists() and (tmp_path / "contraction.png").exists()
+    assert len(list((tmp_path / "frames").glob("*.vtu"))) >= 5
 
 
 @browser_is_here
