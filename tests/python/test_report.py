@@ -257,7 +257,7 @@ def test_figures_of_cells_of_a_line_are_those_of_the_run(chromium, tmp_path):
         LINE.format(cells=60, m="if(x < 0.3, 1, 50)")
         + '[equidistribution]\nface_density = "exact"\n[schwarz]\nmethod = "optimal"\ncuts = [0.25, 0.5, 0.75]\n[stop]\niterations = 4\n'
     )
-    (tmp_path / "fine.toml").write_text(LINE.format(cells=20000, m="1 + 1e4*exp(-1e8*(x - 0.5)^2)"))
+    (tmp_path / "fine.toml").write_text(LINE.format(cells=20000, m="sqrt(1 + (400/cosh(400*(x - 0.3))^2)^2)"))
     for name in ("jump", "fine"):
         out = study(tmp_path / name, tmp_path / f"{name}-out")
         frames = [pyvista.read(path) for path in sorted((out / "frames").iterdir())]

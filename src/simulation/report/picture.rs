@@ -254,16 +254,19 @@ fn svg(sheet: &Sheet<'_>) -> String {
     let tones = flat.map(|tone| ([0.0, BESIDE], tone)).chain(steep.map(|tone| ([BESIDE, 0.0], tone)));
     for (side, (tone, paths)) in tones {
         let black = tone as f64 / (TONES - 1) as f64;
-        let off = if black > 0.0 && black < 1.0 { 1.0 } else { 0.0 };
+        let mixed = black > 0.0 && black < 1.0;
         let lines =
-            [("#fff", 1.0 - black, -off), ("#000", black, off)].into_iter().filter(|(_, share, _)| *share > 0.0);
+            [("#fff", 1.0 - black, -1.0), ("#000", black, 1.0)].into_iter().filter(|(_, share, _)| *share > 0.0);
         for (path, strength) in paths.iter().zip(STRENGTHS).filter(|(path, _)| !path.is_empty()) {
             for (colour, share, way) in lines.clone() {
-                let [x, y] = side.map(|side| way * side);
+                let aside = if mixed {
+                    format!(" transform=\"translate({} {})\"", way * side[0], way * side[1])
+                } else {
+                    String::new()
+                };
                 let _ = writeln!(
                     s,
-                    "<path d=\"{path}\" transform=\"translate({x} {y})\" fill=\"none\" stroke=\"{colour}\" \
-                     stroke-opacity=\"{:.3}\" stroke-width=\"0.5\"/>",
+                    "<path d=\"{path}\"{aside} fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"{:.3}\" stroke-width=\"0.5\"/>",
                     strength * share
                 );
             }
