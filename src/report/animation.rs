@@ -88,8 +88,11 @@ fn title(run: &RunFiles, frame: &Frame) -> String {
     }
 }
 
-/// What draws any of these frames, as SVG: the mesh over the first field.
-fn drawing<'a>(run: &'a RunFiles, frames: &'a [Frame]) -> Option<Box<dyn Fn(&Frame) -> String + 'a>> {
+/// Draws a frame, as SVG.
+type Drawing<'a> = Box<dyn Fn(&Frame) -> String + 'a>;
+
+/// What draws any of these frames: the mesh over the first field.
+fn drawing<'a>(run: &'a RunFiles, frames: &'a [Frame]) -> Option<Drawing<'a>> {
     let first = frames.first()?;
     let (field, _) = first.fields.first()?;
     Some(if first.cells[1] == 0 { of_line(run, frames, field) } else { of_mesh(run, frames, field) })
@@ -107,7 +110,7 @@ pub fn still(run: &mut RunFiles) -> Result<()> {
 }
 
 /// The first field over the line, through all nodes.
-fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Box<dyn Fn(&Frame) -> String + 'a> {
+fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Drawing<'a> {
     let points = |frame: &Frame| frame.x.iter().zip(&frame.fields[0].1).map(|(x, v)| [x[0], *v]).collect::<Vec<_>>();
     let all = frames.iter().flat_map(points);
     let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
@@ -126,7 +129,7 @@ fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Box<dyn F
 }
 
 /// The mesh over the first field.
-fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Box<dyn Fn(&Frame) -> String + 'a> {
+fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Drawing<'a> {
     let around = |[l, h]: [f64; 2], v: f64| [l.min(v), h.max(v)];
     let none = [f64::INFINITY, f64::NEG_INFINITY];
     let range = frames.iter().flat_map(|frame| &frame.fields[0].1).copied().fold(none, around);
