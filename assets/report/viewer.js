@@ -101,7 +101,7 @@ function along(out, count, across, step, other, x0, y0, x1, y1, shade, strength)
 
 const SYMBOLS = { rho: "ρ", "mesh density": "mesh density ρ" };
 /** What is positive and may span much. */
-const SKEWED = ["rho", "mesh density", "Q", "Jacobian", "Q of cells", "Jacobian of cells"];
+const SKEWED = ["rho", "M", "mesh density", "Q", "Jacobian", "Q of cells", "Jacobian of cells"];
 /** Of the range of Q and the Jacobian, which come from rounded positions, what may be rounding alone. */
 const ROUNDING = 1e-4;
 const symbol = (name) => SYMBOLS[name] ?? name;
@@ -412,7 +412,7 @@ class Viewer {
     const [t, place] = this.placeOf(mesh);
     stage.place = place;
     stage.t = Number.isInteger(place) ? mesh.times[place] : t;
-    const pair = (this.stages.length > 1 || !this.controls.now) && this.when(stage.t).replace(/ /g, "\u00a0"), role = stage.m ? "compared with: " : "generator: ";
+    const pair = (this.stages.length > 1 || !this.controls.now) && this.when(stage.t).replace(/ /g, "\u00a0"), role = stage.m ? "compared with: " : "mesh generator: ";
     stage.caption.textContent = [mesh.name && role + mesh.name, pair].filter(Boolean).join(", ");
     stage.caption.hidden = !stage.caption.textContent;
   }
@@ -454,7 +454,7 @@ class Viewer {
         const segment = (a, b, c, v) => {
           const white = levels ? whiteness(v) : dark ? 1 : 0, dx = px[b] - px[a], dy = py[b] - py[a];
           const wide = Math.abs(dx * (py[c] - py[a]) - dy * (px[c] - px[a])) / Math.sqrt(dx * dx + dy * dy);
-          const strength = Math.min(levels ? 0.55 : 0.8, levels ? 0.1 * (wide / ratio - 2) : 0.25 * wide);
+          const strength = Math.min(levels ? 0.55 : 0.8, levels ? 0.08 * (wide / ratio - 1) : 0.25 * wide);
           if (strength <= 0.02) return;
           const off = white > 0 && white < 1 ? 0.5 : 0, ox = Math.abs(dy) > Math.abs(dx) ? off : 0, oy = off - ox;
           const side = (shade, share, o) => { if (share > 0) line(out, w, h, px[a] + o * ox, py[a] + o * oy, px[b] + o * ox, py[b] + o * oy, shade, strength * share); };
@@ -718,10 +718,10 @@ class LineViewer extends Viewer {
       context.globalAlpha = 1;
     }
     if (this.controls.cuts.checked) {
-      // thin and faint where another is near: the curve is to be seen
+      // thin and faint in a crowd: the curve is to be seen
       mesh.cuts[0].forEach((i, c, all) => {
-        const near = Math.min(...[all[c - 1], all[c + 1]].map((other) => (other === undefined ? Infinity : Math.abs(px[other] - px[i])))) / ratio;
-        const strength = Math.min(1, Math.max(0.12, near / 12));
+        const near = Math.max(...[all[c - 1], all[c + 1]].map((other) => (other === undefined ? Infinity : Math.abs(px[other] - px[i])))) / ratio;
+        const strength = Math.min(1, Math.max(0.2, near / 12));
         for (const [colour, thick] of [[paper, 4], ["#d55e00", 2]]) {
           if (colour === paper && strength < 1) continue;
           Object.assign(context, { strokeStyle: colour, lineWidth: Math.max(0.75, thick * strength) * ratio, globalAlpha: strength });
@@ -763,7 +763,7 @@ class LineViewer extends Viewer {
     context.restore();
 
     const [ends, most] = [[left, left + w].map((p) => this.physical(stage, [p, 0])[0]), Math.max(2, h / ratio / 60)];
-    const along = ticks(...ends, Math.max(2, w / ratio / 90)), up = nothing ? [] : log ? powers(low, high) : ticks(low, high, most);
+    const along = ticks(...ends, Math.max(2, w / ratio / 90)), up = nothing ? [] : log ? powers(low, high) : ticks(from, to, most);
     const what = nothing ? "" : field + (up.less ?? "") + (stepped ? ", over the mean" : "");
     this.frame(stage, along, up, height, [`x${along.less}`, what]);
     const when = this.data.clock ? `at ${this.when(stage.t)}, ` : "";

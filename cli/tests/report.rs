@@ -115,7 +115,7 @@ fn an_interrupted_run_has_a_report_of_what_is_there() {
     std::fs::remove_file(run.path("frames/step-000005.vtu")).unwrap();
     std::fs::remove_file(run.path("compare.pvd")).unwrap();
     let (html, said) = run.rebuilt();
-    assert!(html.contains("did not come to its end"));
+    assert!(html.contains("before its end. This is what it left."));
     for part in ["frames/step-000020.vtu is left out", "frames/step-000005.vtu is left out", "history.csv: 1 row(s)"] {
         assert!(said.contains(part) && html.contains(part), "{part:?} is not in {said}");
     }

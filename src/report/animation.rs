@@ -21,7 +21,7 @@ const STRENGTHS: [f64; 2] = [0.25, 0.5];
 const GREYS: usize = 26;
 /// From white to a colour.
 const STEPS: usize = 128;
-/// What spans so much, and is positive, has a logarithmic axis.
+/// A density that spans so much has a logarithmic axis.
 const MUCH: f64 = 30.0;
 /// Of a front, and of its soft edge on white.
 const FRONT: [[u8; 3]; 2] = [[213, 94, 0], [234, 174, 128]];
@@ -111,11 +111,17 @@ pub fn still(run: &mut RunFiles) -> Result<()> {
 
 /// The first field over the line, through all nodes.
 fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Drawing<'a> {
-    let points = |frame: &Frame| frame.x.iter().zip(&frame.fields[0].1).map(|(x, v)| [x[0], *v]).collect::<Vec<_>>();
-    let all = frames.iter().flat_map(points);
+    let end = |key: &str| run.setting(&["domain", key])?.get(0)?.as_float();
+    // iterates may leave the line
+    let line = end("lower").unwrap_or(0.0)..=end("upper").unwrap_or(1.0);
+    let points = move |frame: &Frame| -> Vec<[f64; 2]> {
+        let all = frame.x.iter().zip(&frame.fields[0].1).map(|(x, v)| [x[0], *v]);
+        all.filter(|p| line.contains(&p[0])).collect()
+    };
+    let all = frames.iter().flat_map(&points);
     let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     let ends = all.fold(none, |[l, h], p| [[0, 1].map(|d| l[d].min(p[d])), [0, 1].map(|d| h[d].max(p[d]))]);
-    let spans_much = ends[0][1] > 0.0 && ends[1][1] > MUCH * ends[0][1];
+    let spans_much = field == "M" && ends[1][1] > MUCH * ends[0][1];
     Box::new(move |frame| {
         let figure = Figure {
             title: title(run, frame),

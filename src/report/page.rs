@@ -73,6 +73,7 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
         "running" if !run.busy => "killed",
         other => other,
     };
+    let compared = failed.is_some_and(|failed| failed.get("compared").is_some());
     let page = Page {
         study: run.word("study"),
         kind: run.word("kind"),
@@ -80,11 +81,12 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
         status,
         said: match status {
             "completed" => "The run is complete.".into(),
+            _ if compared => "The run itself is complete; the one that it is compared with is not.".into(),
             "failed" => "The run failed; everything up to the last good state is here.".into(),
             "not-converged" => "The iteration did not converge.".into(),
             "interrupted" => "The run was interrupted; everything up to the last good state is here.".into(),
             "running" => "The run still goes on. This is what it left so far.".into(),
-            "killed" => "The run did not come to its end, and goes on no more. This is what it left.".into(),
+            "killed" => "The run was killed, or the machine stopped, before its end. This is what it left.".into(),
             other => format!("Status: {other}."),
         },
         failure: told("message"),

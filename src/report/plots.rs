@@ -77,7 +77,7 @@ const GROUPS: [Group; 10] = [
         label: "share of the mean (dimensionless)",
         scale: Scale::Logarithmic,
         line: true,
-        columns: &[("equidistribution", "largest ∫M of a cell"), ("shortest_cell", "shortest cell")],
+        columns: &[("equidistribution", "largest share of M in a cell"), ("shortest_cell", "shortest cell")],
     },
     Group {
         name: "energy",

@@ -61,7 +61,7 @@ const NAMES: [(&str, &str, &str); 49] = [
     ("comparison.r_mean", "mean Q, reference over this mesh", ""),
     ("comparison.cell_max", "… largest in one cell", ""),
     ("comparison.mesh_rms", "distance of the meshes", "root mean square over the nodes"),
-    ("rate.stride", "iterations", "that these factors are of"),
+    ("rate.stride", "in so many iterations", ""),
     ("rate.observed", "observed", ""),
     ("rate.predicted", "predicted", "by theory, for the error in the end; – where no theory says"),
     ("parallel.ranks", "processes", ""),

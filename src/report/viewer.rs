@@ -125,8 +125,12 @@ impl Packed {
         // a periodic mesh leaves its box, any other fills it
         let wraps =
             |d: usize| run.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false);
+        let line = self.first.cells[1] == 0;
+        let end = |key: &str| run.setting(&["domain", key])?.get(0)?.as_float();
         let [lower, upper] = match (pair("lower"), pair("upper")) {
             (Some(lower), Some(upper)) => [lower, upper],
+            // iterates of a line may leave it
+            _ if line => [end("lower").unwrap_or(0.0), end("upper").unwrap_or(1.0)].map(|x| [x, 0.0]),
             _ => self.ends,
         };
         let kinds = [&["mesh", "generator"][..], &["compare", "generator"][..]];
@@ -159,7 +163,7 @@ impl Packed {
             "lower": lower, "extent": [upper[0] - lower[0], upper[1] - lower[1]],
             "periodic": [wraps(0), wraps(1)],
             "between": if run.front().is_some() { "front" } else { "subdomains" },
-            "line": self.first.cells[1] == 0,
+            "line": line,
             "clock": clock(run),
             "maps": maps, "meshes": meshes.collect::<Vec<_>>(),
         })

@@ -190,6 +190,8 @@ pub struct StepRow {
     pub shortest_cell: f64,
 }
 
+/// Seconds of a run in time after which it leaves what it has.
+const SECONDS_UNSEEN: f64 = 1.0;
 /// Nodes compared with the continuous mesh, and cells over which M is integrated to round-off.
 const COMPARED: usize = 1000;
 const EXACTLY: usize = 100_000;
@@ -328,14 +330,17 @@ impl EquidistributionStudy {
             let [wall, cpu] = clock.elapsed();
             LineSeconds { wall, cpu, mesh: seconds.mesh + solving.elapsed().as_secs_f64(), ..seconds }
         };
-        let mut written = 0;
+        let (mut written, mut looked) = (0, Instant::now());
         let outcome = study.evolve(&line, &mut evolution, &mut |t, evolution| {
             let step = evolution.done;
             let ends = study.time.is_some() && watchers.iter().any(|watcher| watcher.interrupts());
             if ends || study.time.is_some() && checkpoints.due(step) {
                 checkpoints.write(step, &LineCheckpoint { evolution: evolution.clone(), seconds: spent() })?;
-                // what a report of a run that goes on or is killed can show
+            }
+            // what a report of a run that goes on or is killed can show
+            if study.time.is_some() && looked.elapsed().as_secs_f64() > SECONDS_UNSEEN {
                 written = write_series(&study, &line, &directory, evolution, written)?;
+                looked = Instant::now();
             }
             if ends { Err(Error::Interrupted(Moment { t, step })) } else { Ok(()) }
         });

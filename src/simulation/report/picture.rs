@@ -57,7 +57,7 @@ pub(super) const BAR: f64 = 24.0;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
 /// Opacities of mesh lines, and what a cell beside them has of it for each unit that it is wider than one.
-const STRENGTHS: [f64; 4] = [0.1, 0.25, 0.4, 0.6];
+const STRENGTHS: [f64; 8] = [0.04, 0.08, 0.13, 0.19, 0.26, 0.35, 0.46, 0.6];
 /// Steps from white to black lines, and the shares of the colour map over which they change.
 const TONES: usize = 5;
 const WHITE_UP_TO: f64 = 0.35;

@@ -50,6 +50,9 @@ pub struct Failed {
     pub t: Option<f64>,
     /// The step that failed.
     pub step: Option<usize>,
+    /// Whether that was in the run of `[compare]`, and the run itself is complete.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub compared: bool,
 }
 
 impl From<&Error> for Failed {
@@ -65,6 +68,7 @@ impl From<&Error> for Failed {
             help: error.help(),
             t: moment.map(|m| m.t),
             step: moment.map(|m| m.step),
+            compared: matches!(error, Error::Compared(_)),
         }
     }
 }
