@@ -1,4 +1,5 @@
 use crate::interrupts::Interrupts;
+use crate::progress::Progress;
 use crate::run::remedy;
 use crate::terminal;
 use driftmesh::study::{Begin, EquidistributionStudy, EquidistributionSummary, NumberedIterate};
@@ -7,11 +8,15 @@ use std::process::ExitCode;
 
 /// Runs a study of kind `equidistribution`.
 pub fn run(study: &EquidistributionStudy, out: &Path, begin: Begin, quiet: bool) -> driftmesh::Result<ExitCode> {
+    let mut progress = Progress::new();
     let finished = match &study.time {
-        Some(_) => study.run_from(out, &[&mut Interrupts::listen()], begin),
+        Some(_) if quiet => study.run_from(out, &mut [&mut Interrupts::listen()], begin),
+        Some(_) => study.run_from(out, &mut [&mut Interrupts::listen(), &mut progress], begin),
         // a single solve, which nobody can end half-way, ends with the program
-        None => study.run_from(out, &[], begin),
-    }?;
+        None => study.run_from(out, &mut [], begin),
+    };
+    progress.clear();
+    let finished = finished?;
     finished.summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {
         terminal::say(table(&finished.summary));

@@ -1,5 +1,5 @@
 use crate::terminal;
-use driftmesh::simulation::{Event, Observer, Snapshot};
+use driftmesh::simulation::{Advance, Event, Observer, Snapshot, State};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write, stderr};
 
@@ -30,49 +30,56 @@ impl Progress {
             bar.finish_and_clear();
         }
     }
-}
 
-impl Observer for Progress {
-    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
+    /// Where the run is, where that is news.
+    fn show(&mut self, event: Event, at: &Advance) {
         // beside the percentage and the smallest bar
         let room = || usize::from(console::Term::stderr().size().1).saturating_sub(16);
         let pieces = if self.bar.is_some() { OF_THE_BAR } else { LINES };
         // a share that is a whole number of pieces up to round-off is one
-        let done = (snapshot.share * pieces as f64 + 1e-9) as usize;
+        let done = (at.share * pieces as f64 + 1e-9) as usize;
         let news = done > std::mem::replace(&mut self.told, done);
         match &self.bar {
-            Some(bar) if matches!(event, Event::Started | Event::Resumed) => {
+            Some(bar) if news || matches!(event, Event::Started | Event::Resumed) => {
                 bar.set_length(pieces as u64);
-                bar.set_message(fitting(&words(snapshot), room()));
-            }
-            Some(bar) if news => {
                 bar.set_position(done as u64);
-                bar.set_message(fitting(&words(snapshot), room()));
+                bar.set_message(fitting(&words(at), room()));
             }
             Some(bar) if event == Event::Finished => bar.set_message("comparing, drawing and writing the report"),
             None if event == Event::Resumed || event == Event::Stepped && news => {
-                let _ = writeln!(stderr(), "{}", words(snapshot).join("  "));
+                let _ = writeln!(stderr(), "{}", words(at).join("  "));
             }
             _ => {}
         }
+    }
+}
+
+impl Observer for Progress {
+    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
+        let (State { t, step, .. }, quality) = (snapshot.state, snapshot.quality);
+        let Snapshot { steps, share, seconds, .. } = *snapshot;
+        self.show(event, &Advance { t: *t, step: *step, steps, share, smallest: quality.min_scaled_jacobian, seconds });
         Ok(())
+    }
+
+    fn advanced(&mut self, advance: &Advance) {
+        self.show(Event::Stepped, advance);
     }
 }
 
 /// Where a run is, how fast, and for how long still, as far as the time simulated so far tells; what matters most comes first.
-fn words(snapshot: &Snapshot<'_>) -> Vec<String> {
-    let (state, jacobian) = (snapshot.state, snapshot.quality.min_scaled_jacobian);
-    let of = snapshot.steps.map_or(String::new(), |steps| format!(" of {steps}"));
+fn words(at: &Advance) -> Vec<String> {
+    let of = at.steps.map_or(String::new(), |steps| format!(" of {steps}"));
     let mut words = vec![
-        format!("t = {}", terminal::moment(state.t)),
-        format!("step {}{of}", state.step),
-        format!("min J {jacobian:.3}"),
+        format!("t = {}", terminal::moment(at.t)),
+        format!("step {}{of}", at.step),
+        format!("min J {:.3}", at.smallest),
     ];
-    if snapshot.share > 0.0 && snapshot.share < 1.0 {
-        words.push(format!("{} left", duration(snapshot.seconds * (1.0 - snapshot.share) / snapshot.share)));
+    if at.share > 0.0 && at.share < 1.0 {
+        words.push(format!("{} left", duration(at.seconds * (1.0 - at.share) / at.share)));
     }
-    if state.step > 0 && snapshot.seconds > 0.0 {
-        words.push(format!("{} steps/s", rate(state.step as f64 / snapshot.seconds)));
+    if at.step > 0 && at.seconds > 0.0 {
+        words.push(format!("{} steps/s", rate(at.step as f64 / at.seconds)));
     }
     words
 }

@@ -196,6 +196,23 @@ fn large_runs_are_thinned_and_say_so() {
     assert_eq!([times[0].as_f64(), times[times.len() - 1].as_f64()], [Some(0.25), Some(0.29)]);
 }
 
+/// A line in time tells where it is, in plain lines where there is no terminal.
+#[test]
+fn a_line_tells_of_its_progress() {
+    let run = Run { sandbox: tempfile::tempdir().unwrap() };
+    let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("../studies/moving-front-1d.toml");
+    let arguments = ["run", study.to_str().unwrap(), "--out", "out", "--set", "time.end=0.04"];
+    let loud = run.call(&arguments);
+    let said = words(&loud);
+    let lines: Vec<&str> = said.lines().filter(|line| line.starts_with("t = ")).collect();
+    assert_eq!(lines.len(), 10, "{said}");
+    assert!(
+        lines[0].starts_with("t = 4.00e-3  step 4 of 40  min J 0.") && lines[9].contains("step 40 of 40"),
+        "{said}"
+    );
+    assert!(words(&run.call(&[&arguments[..], &["--quiet"]].concat())).is_empty());
+}
+
 /// What fails in the run of [compare] is not called a failure of the run itself, which is whole.
 #[test]
 fn a_failure_of_the_compared_run_is_told_apart() {

@@ -1,6 +1,6 @@
 use crate::errors::raised;
 use crate::threads::{BRIEFLY, Ended, PATIENCE, calls, interruptible};
-use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, Standing, State};
+use driftmesh::simulation::{Advance, Event, Observer, RunDirectory, Snapshot, Standing, State};
 use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
 use pyo3::prelude::*;
@@ -41,6 +41,10 @@ impl Observer for Watcher {
     fn adapting(&mut self, state: &State) -> Result<()> {
         self.saw(0.0, state);
         Ok(())
+    }
+
+    fn advanced(&mut self, advance: &Advance) {
+        *self.0.progress() = Some((advance.share, advance.t, advance.step));
     }
 
     fn interrupts(&self) -> bool {

@@ -13,7 +13,7 @@ mod schedule;
 pub use checkpoint::CheckpointsAt;
 pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
-pub use observer::{Event, Frames, FramesAt, History, Observer, Snapshot};
+pub use observer::{Advance, Event, Frames, FramesAt, History, Observer, Snapshot};
 pub(crate) use observer::{Rows, frame_name, vtu};
 pub(crate) use report::{COLOURS, Canvas, Sheet, moment, status, write_file};
 pub use report::{

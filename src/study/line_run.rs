@@ -8,7 +8,7 @@ use crate::equidistribution::{FaceDensity, History, Iterate, Line};
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::check_nodal;
 use crate::report;
-use crate::simulation::{Checkpoints, Failed, Observer, Parallel, RunDirectory, status};
+use crate::simulation::{Advance, Checkpoints, Failed, Observer, Parallel, RunDirectory, status};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -295,15 +295,15 @@ impl EquidistributionStudy {
     /// # Errors
     /// Settings out of range, and what hinders writing. What fails in the computation is in [`LineFinished::failure`].
     pub fn run(&self, directory: &Path) -> Result<LineFinished> {
-        self.run_from(directory, &[], Begin::Anew)
+        self.run_from(directory, &mut [], Begin::Anew)
     }
 
     /// The same from the newest checkpoint in the directory, to the bits of a run that nothing disturbed; from the start
-    /// where there is none, as there is without `[time]`. Watchers are asked after each step of `[time]` whether to end.
+    /// where there is none, as there is without `[time]`. Watchers are told of each step of `[time]`, and asked whether to end.
     ///
     /// # Errors
     /// As [`EquidistributionStudy::run`], and [`Error::Checkpoint`] where there are checkpoints, but none that will do.
-    pub fn run_from(&self, path: &Path, watchers: &[&mut dyn Observer], begin: Begin) -> Result<LineFinished> {
+    pub fn run_from(&self, path: &Path, watchers: &mut [&mut dyn Observer], begin: Begin) -> Result<LineFinished> {
         let clock = Stopwatch::start();
         let mut study = self.clone();
         study.resolve()?;
@@ -330,9 +330,16 @@ impl EquidistributionStudy {
             let [wall, cpu] = clock.elapsed();
             LineSeconds { wall, cpu, mesh: seconds.mesh + solving.elapsed().as_secs_f64(), ..seconds }
         };
+        let schedule = study.time.map(|time| time.schedule()).transpose()?;
         let (mut written, mut looked) = (0, Instant::now());
         let outcome = study.evolve(&line, &mut evolution, &mut |t, evolution| {
             let step = evolution.done;
+            if let (Some(time), Some(row)) = (study.time, evolution.steps.last()) {
+                let steps = schedule.as_ref().and_then(|schedule| schedule.steps());
+                let share = (t - time.start) / (time.end - time.start);
+                let advance = Advance { t, step, steps, share, smallest: row.shortest_cell, seconds: spent().wall };
+                watchers.iter_mut().for_each(|watcher| watcher.advanced(&advance));
+            }
             let ends = study.time.is_some() && watchers.iter().any(|watcher| watcher.interrupts());
             if ends || study.time.is_some() && checkpoints.due(step) {
                 checkpoints.write(step, &LineCheckpoint { evolution: evolution.clone(), seconds: spent() })?;

@@ -54,6 +54,23 @@ pub struct Snapshot<'a> {
     pub seconds: f64,
 }
 
+/// How far a run on a line has come in time.
+#[derive(Debug, Clone, Copy)]
+pub struct Advance {
+    /// Time.
+    pub t: f64,
+    /// Steps done.
+    pub step: usize,
+    /// Steps of the whole run, where they are known.
+    pub steps: Option<usize>,
+    /// Share of the simulated time that is done, 0 … 1.
+    pub share: f64,
+    /// The smallest Jacobian over that of equal cells: on a line, the shortest cell over the mean one.
+    pub smallest: f64,
+    /// Seconds since the run began, over all its parts.
+    pub seconds: f64,
+}
+
 /// Something that follows a run.
 pub trait Observer {
     /// Called after every event. An error ends the run.
@@ -70,6 +87,9 @@ pub trait Observer {
     fn adapting(&mut self, _state: &State) -> Result<()> {
         Ok(())
     }
+
+    /// Called in place of [`observe`](Self::observe) after every step of a run on a line.
+    fn advanced(&mut self, _advance: &Advance) {}
 
     /// Asked after every step: true ends the run there, with a checkpoint where it has any.
     fn interrupts(&self) -> bool {
