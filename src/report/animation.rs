@@ -111,9 +111,8 @@ pub fn still(run: &mut RunFiles) -> Result<()> {
 
 /// The first field over the line, through all nodes.
 fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Drawing<'a> {
-    let end = |key: &str| run.setting(&["domain", key])?.get(0)?.as_float();
     // iterates may leave the line
-    let line = end("lower").unwrap_or(0.0)..=end("upper").unwrap_or(1.0);
+    let line = run.corner("lower", 0).unwrap_or(0.0)..=run.corner("upper", 0).unwrap_or(1.0);
     let points = move |frame: &Frame| -> Vec<[f64; 2]> {
         let all = frame.x.iter().zip(&frame.fields[0].1).map(|(x, v)| [x[0], *v]);
         all.filter(|p| line.contains(&p[0])).collect()
@@ -140,14 +139,9 @@ fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Drawing
     let none = [f64::INFINITY, f64::NEG_INFINITY];
     let range = frames.iter().flat_map(|frame| &frame.fields[0].1).copied().fold(none, around);
     let all = [0, 1].map(|d| frames.iter().flat_map(|frame| &frame.x).map(|x| x[d]).fold(none, around));
-    let number = |key: &str, d: usize| {
-        let value = run.setting(&["domain", key])?.get(d)?;
-        value.as_float().or(value.as_integer().map(|n| n as f64))
-    };
-    let lower = [0, 1].map(|d| number("lower", d).unwrap_or(all[d][0]));
-    let upper = [0, 1].map(|d| number("upper", d).unwrap_or(all[d][1]));
-    let periodic =
-        [0, 1].map(|d| run.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false));
+    let lower = [0, 1].map(|d| run.corner("lower", d).unwrap_or(all[d][0]));
+    let upper = [0, 1].map(|d| run.corner("upper", d).unwrap_or(all[d][1]));
+    let periodic = [0, 1].map(|d| run.wraps(d));
     let front = run.front();
     Box::new(move |frame| {
         let along =

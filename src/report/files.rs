@@ -87,6 +87,17 @@ impl RunFiles {
         rest.iter().try_fold(self.study.get(*first)?, |table, key| table.get(key))
     }
 
+    /// A coordinate of a corner of the domain, `lower` or `upper`.
+    pub fn corner(&self, which: &str, d: usize) -> Option<f64> {
+        let value = self.setting(&["domain", which])?.get(d)?;
+        value.as_float().or(value.as_integer().map(|n| n as f64))
+    }
+
+    /// Whether an axis is periodic.
+    pub fn wraps(&self, d: usize) -> bool {
+        self.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false)
+    }
+
     /// The mesh line that is the front, of a Stefan problem.
     pub fn front(&self) -> Option<usize> {
         let lower = || self.setting(&["grid", "cells"])?.get(1)?.as_integer();

@@ -8,7 +8,11 @@ use serde_json::Value;
 
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
 const STYLE: &str = include_str!("../../assets/report/style.css");
-const SCRIPT: &str = include_str!("../../assets/report/viewer.js");
+const SCRIPT: &str = concat!(
+    include_str!("../../assets/report/parts.js"),
+    include_str!("../../assets/report/viewer.js"),
+    include_str!("../../assets/report/line.js"),
+);
 /// Pictures above this are left to the directory.
 const LARGE: u64 = 1 << 20;
 

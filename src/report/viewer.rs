@@ -117,20 +117,13 @@ impl Packed {
     }
 
     fn json(&self, run: &RunFiles) -> Value {
-        let pair = |key: &str| -> Option<[f64; 2]> {
-            let values = run.setting(&["domain", key])?.as_array()?;
-            let number = |v: &toml::Value| v.as_float().or(v.as_integer().map(|n| n as f64));
-            Some([number(values.first()?)?, number(values.get(1)?)?])
-        };
-        // a periodic mesh leaves its box, any other fills it
-        let wraps =
-            |d: usize| run.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false);
         let line = self.first.cells[1] == 0;
-        let end = |key: &str| run.setting(&["domain", key])?.get(0)?.as_float();
+        let pair = |key: &str| Some([run.corner(key, 0)?, run.corner(key, 1)?]);
+        // a periodic mesh leaves its box, any other fills it
         let [lower, upper] = match (pair("lower"), pair("upper")) {
             (Some(lower), Some(upper)) => [lower, upper],
             // iterates of a line may leave it
-            _ if line => [end("lower").unwrap_or(0.0), end("upper").unwrap_or(1.0)].map(|x| [x, 0.0]),
+            _ if line => [("lower", 0.0), ("upper", 1.0)].map(|(key, x)| [run.corner(key, 0).unwrap_or(x), 0.0]),
             _ => self.ends,
         };
         let kinds = [&["mesh", "generator"][..], &["compare", "generator"][..]];
@@ -146,7 +139,7 @@ impl Packed {
             let mut json = mesh.json.clone();
             json["name"] = name.into();
             // only around a periodic axis something changes at its beginning
-            let cuts = [0, 1].map(|d| mesh.cuts[d].iter().filter(|&&cut| cut > 0 || wraps(d)).collect::<Vec<_>>());
+            let cuts = [0, 1].map(|d| mesh.cuts[d].iter().filter(|&&cut| cut > 0 || run.wraps(d)).collect::<Vec<_>>());
             json["cuts"] = match run.front() {
                 Some(front) if front <= self.first.cells[1] => json!([[], [(front + self.stride / 2) / self.stride]]),
                 _ => json!(cuts),
@@ -161,7 +154,7 @@ impl Packed {
         json!({
             "cells": self.first.cells, "stride": self.stride,
             "lower": lower, "extent": [upper[0] - lower[0], upper[1] - lower[1]],
-            "periodic": [wraps(0), wraps(1)],
+            "periodic": [run.wraps(0), run.wraps(1)],
             "between": if run.front().is_some() { "front" } else { "subdomains" },
             "line": line,
             "clock": clock(run),

@@ -11,6 +11,7 @@ use crate::report;
 use crate::simulation::{Advance, Checkpoints, Failed, Observer, Parallel, RunDirectory, status};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
+use std::cell::Cell;
 use std::path::Path;
 use std::time::Instant;
 
@@ -198,6 +199,7 @@ const EXACTLY: usize = 100_000;
 /// Places at which the density is looked at, and a share of ∫M that tells of a layer unseen.
 const PLACES: usize = 20_000;
 const NOTICEABLE: f64 = 0.2;
+
 impl EquidistributionStudy {
     /// Solves, or moves the mesh through time.
     ///
@@ -235,7 +237,7 @@ impl EquidistributionStudy {
                     let (next, solves) = line.solve(t, &mesh, old).map_err(during)?;
                     evolution.linear_solves += solves;
                     if self.time.is_some() {
-                        evolution.steps.push(StepRow::new(line, t, &next, solves)?);
+                        evolution.steps.push(StepRow::new(line, t, &next, solves).map_err(during)?);
                     }
                     next
                 }
@@ -325,10 +327,12 @@ impl EquidistributionStudy {
         directory.write("study.toml", study.to_toml().as_bytes())?;
         let (LineCheckpoint { mut evolution, seconds }, refused) = resumed.unwrap_or_default();
         let clock = clock.after([seconds.wall, seconds.cpu]);
-        let solving = Instant::now();
+        // seconds of writing while it solves
+        let (solving, shown) = (Instant::now(), Cell::new(0.0));
         let spent = || {
             let [wall, cpu] = clock.elapsed();
-            LineSeconds { wall, cpu, mesh: seconds.mesh + solving.elapsed().as_secs_f64(), ..seconds }
+            let (mesh, output) = (solving.elapsed().as_secs_f64() - shown.get(), shown.get());
+            LineSeconds { wall, cpu, mesh: seconds.mesh + mesh, output: seconds.output + output }
         };
         let schedule = study.time.map(|time| time.schedule()).transpose()?;
         let (mut written, mut looked) = (0, Instant::now());
@@ -346,7 +350,9 @@ impl EquidistributionStudy {
             }
             // what a report of a run that goes on or is killed can show
             if study.time.is_some() && looked.elapsed().as_secs_f64() > SECONDS_UNSEEN {
+                let output = Instant::now();
                 written = write_series(&study, &line, &directory, evolution, written)?;
+                shown.set(shown.get() + output.elapsed().as_secs_f64());
                 looked = Instant::now();
             }
             if ends { Err(Error::Interrupted(Moment { t, step })) } else { Ok(()) }
