@@ -295,6 +295,19 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// False for what no step is short enough, and for formulas without a value, which a shorter step might only step over.
+    pub(crate) fn is_curable(&self) -> bool {
+        !matches!(
+            self,
+            Self::Formula { .. }
+                | Self::NotPeriodic { .. }
+                | Self::NotUniform { .. }
+                | Self::ManySubsteps { .. }
+                | Self::Subdomains { .. }
+                | Self::WrongLength { .. }
+        )
+    }
+
     /// Short name of the variant, for `summary.json`.
     pub fn name(&self) -> &'static str {
         self.into()

@@ -39,7 +39,7 @@
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
 //! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`equidistribution`], [`laplacian`], [`meshing`] and
-//! [`physics`], then [`stefan`], then [`simulation`], then [`report`], then [`study`].
+//! [`physics`], then [`mover`] and [`stefan`], then [`simulation`], then [`report`], then [`study`].
 
 mod elementary;
 pub mod error;
@@ -62,6 +62,7 @@ pub mod laplacian;
 pub mod meshing;
 pub mod physics;
 
+pub mod mover;
 pub mod stefan;
 
 pub mod simulation;

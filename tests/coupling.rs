@@ -4,6 +4,7 @@ use driftmesh::density::{Arclength, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh};
 use driftmesh::meshing::{Mmpde, Whole};
 use driftmesh::physics::{Burgers, Convection, Motion, Physics};
+use driftmesh::mover::Mover;
 use driftmesh::simulation::{Coupling, Record, Safety, Schedule, Simulation, State};
 use driftmesh::{Failure, Work};
 
@@ -44,8 +45,7 @@ fn simulate(
     let mut simulation = Simulation {
         physics,
         monitor,
-        generator: Box::new(Whole::default()),
-        equation: Mmpde { relaxation: 0.2.into(), ..Mmpde::default() },
+        mover: Mover::by(Box::new(Whole::default()), Mmpde { relaxation: 0.2.into(), ..Mmpde::default() }),
         coupling,
         safety: Safety::default(),
         schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),

@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 10] = [
     &["geometry"],
     &["numerics"],
     &["density", "equidistribution", "laplacian", "meshing", "physics"],
-    &["stefan"],
+    &["mover", "stefan"],
     &["simulation"],
     &["report"],
     &["study"],

@@ -1,4 +1,4 @@
-use super::{Monitor, smoothing::smooth_values};
+use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
 use crate::geometry::Mesh;
 use crate::numerics::{larger, sum};
@@ -25,6 +25,9 @@ pub struct RootGradient {
 
 /// Share of the layer in the density.
 const BETA: f64 = 4.0;
+/// A layer at least this part of a uniform cell's... share: a uniform mesh resolves it.
+const RESOLVED: f64 = 0.1;
+const UNRESOLVED: f64 = 0.4;
 /// Passes of the filter on 41 × 41 nodes.
 const PASSES: f64 = 8.0;
 /// Differences of u below this share of its size are rounding.
@@ -35,6 +38,7 @@ impl Monitor for RootGradient {
         let lattice = mesh.lattice();
         let ([n, m], periodic) = (lattice.cells(), lattice.periodic());
         let (x, values) = (mesh.closed(), lattice.closed(u));
+        let h = [0, 1].map(|d| mesh.extent()[d] / lattice.cells()[d] as f64);
         let mut roots = vec![0.0; n * m];
         let mut areas = vec![0.0; n * m];
         let mut steepest = 0.0;
@@ -44,20 +48,26 @@ impl Monitor for RootGradient {
             let ([px, py], [qx, qy]) = (minus(x[high], x[low]), minus(x[left], x[right]));
             let (p, q) = (values[high] - values[low], values[left] - values[right]);
             let twice = px * qy - py * qx;
-            let (gx, gy) = (p * qy - q * py, q * px - p * qx);
+            let (gx, gy) = (h[0] * (p * qy - q * py), h[1] * (q * px - p * qx));
             let slope = (gx * gx + gy * gy).sqrt() / twice;
             steepest = larger(steepest, slope);
             (*root, *area) = (slope.sqrt(), 0.5 * twice);
         }
         let size = values.iter().fold(0.0, |m, u| larger(m, *u));
-        let mean = sum(roots.iter().zip(&areas).map(|(root, area)| root * area)) / sum(areas.iter().copied());
-        if steepest * mesh.extent()[0].max(mesh.extent()[1]) <= ROUNDING * size {
+        let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
+        let domain = sum(areas.iter().copied());
+        let mean = |of: &dyn Fn(f64) -> f64| sum(roots.iter().zip(&areas).map(|(root, area)| of(*root) * area)) / domain;
+        let background = mean(&|root| root.sqrt().sqrt()).powi(4);
+        let excess = |root: f64| (root - background).max(0.0);
+        let mean = mean(&excess);
+        if mean == 0.0 || steepest * n.max(m) as f64 <= ROUNDING * size {
             return Ok(vec![1.0; lattice.len()]);
         }
-        let mut rho: Vec<f64> = roots.iter().map(|root| 1.0 + BETA * root / mean).collect();
+        let beta = BETA * need(steepest / (high - low));
+        let mut rho: Vec<f64> = roots.iter().map(|root| 1.0 + beta * excess(*root) / mean).collect();
         // from cells to nodes and back is a pass
         let passes = (PASSES * ((n + 1) * (m + 1)) as f64 / (41.0 * 41.0)).round().max(1.0) as usize - 1;
-        smooth_values([n, m], periodic, &mut rho, passes);
+        smooth_widely([n, m], periodic, &mut rho, passes);
         let nodal: Vec<f64> = (0..lattice.len())
             .map(|k| {
                 let node = lattice.node(k);
@@ -81,6 +91,13 @@ impl Monitor for RootGradient {
             }),
         }
     }
+}
+
+/// How much of the density is needed where u changes by this share of its range over a uniform cell at most: nothing below
+/// a tenth, all of it from four tenths on.
+fn need(share: f64) -> f64 {
+    let s = ((share - RESOLVED) / (UNRESOLVED - RESOLVED)).clamp(0.0, 1.0);
+    s * s * (3.0 - 2.0 * s)
 }
 
 fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {

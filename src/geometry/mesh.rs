@@ -134,6 +134,12 @@ impl<const D: usize> Mesh<D> {
         std::array::from_fn(|d| self.upper[d] - self.lower[d])
     }
 
+    /// The longest way of a node from another mesh over the same lattice.
+    pub fn farthest(&self, other: &Self) -> f64 {
+        let way = |(a, b): (&[f64; D], &[f64; D])| (0..D).map(|d| (a[d] - b[d]) * (a[d] - b[d])).sum::<f64>();
+        self.x.iter().zip(&other.x).map(way).fold(0.0, f64::max).sqrt()
+    }
+
     /// Length of the shortest edge between neighbouring nodes.
     pub fn shortest_edge(&self) -> f64 {
         let x = self.closed();

@@ -10,13 +10,54 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(Relaxation::Time(0.5).over(1e-3), 0.5);
 /// assert_eq!(Relaxation::steps(25.0).over(1e-3), 0.025);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "expected a number, or a table such as { steps = 25 }")]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(from = "Written", into = "Written")]
 pub enum Relaxation {
+    /// Chosen from step to step by how the mesh moves, with prediction: see [`Gait`](crate::mover::Gait).
+    #[default]
+    Auto,
     /// In units of time.
     Time(f64),
     /// In units of the time step.
     Steps(Steps),
+}
+
+/// A [`Relaxation`] as a study writes it.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected \"auto\", a number, or a table such as { steps = 25 }")]
+enum Written {
+    /// The mesh chooses τ from step to step by how it moves.
+    Auto(Word),
+    /// τ in units of time.
+    Time(f64),
+    /// τ in units of the time step.
+    Steps(Steps),
+}
+
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum Word {
+    Auto,
+}
+
+impl From<Written> for Relaxation {
+    fn from(written: Written) -> Self {
+        match written {
+            Written::Auto(Word::Auto) => Self::Auto,
+            Written::Time(tau) => Self::Time(tau),
+            Written::Steps(steps) => Self::Steps(steps),
+        }
+    }
+}
+
+impl From<Relaxation> for Written {
+    fn from(relaxation: Relaxation) -> Self {
+        match relaxation {
+            Relaxation::Auto => Self::Auto(Word::Auto),
+            Relaxation::Time(tau) => Self::Time(tau),
+            Relaxation::Steps(steps) => Self::Steps(steps),
+        }
+    }
 }
 
 /// `{ steps = 40, prediction = 0.2 }`: τ is so many time steps, and the mesh is predicted before it relaxes.
@@ -43,6 +84,10 @@ fn is_zero(gain: &f64) -> bool {
     *gain == 0.0
 }
 
+/// τ over Δt at the first step of a mesh that chooses it.
+pub const STEPS_TO_BEGIN_WITH: f64 = 40.0;
+/// γ of a mesh that chooses τ.
+const PREDICTION_BY_ITSELF: f64 = 0.2;
 /// Fewer steps than this and the mesh, whose density stands still during a step, overshoots from one to the next.
 pub const STEPS_WORTH_A_WARNING: f64 = 15.0;
 /// With fewer steps than this it folds on any thin layer.
@@ -65,22 +110,19 @@ impl Relaxation {
     /// γ of the prediction; 0 where there is none.
     pub fn prediction(self) -> f64 {
         match self {
+            Self::Auto => PREDICTION_BY_ITSELF,
             Self::Time(_) => 0.0,
             Self::Steps(Steps { prediction, .. }) => prediction,
         }
     }
 
-    /// τ where the time step is `dt`.
+    /// τ where the time step is `dt`; for [`Auto`](Self::Auto), that of the first step.
     pub fn over(self, dt: f64) -> f64 {
         match self {
+            Self::Auto => STEPS_TO_BEGIN_WITH * dt,
             Self::Time(tau) => tau,
             Self::Steps(Steps { steps, .. }) => steps * dt,
         }
-    }
-
-    /// The same τ in units of time, for a time step of `dt`.
-    pub fn at(self, dt: f64) -> Self {
-        Self::Time(self.over(dt))
     }
 
     /// Refuses settings out of range.
@@ -89,6 +131,7 @@ impl Relaxation {
     /// [`Error::Invalid`] unless τ is positive and finite, and no less than two steps where it is given in steps.
     pub fn check(self) -> Result<()> {
         match self {
+            Self::Auto => Ok(()),
             Self::Time(tau) if tau.is_finite() && tau > 0.0 => Ok(()),
             Self::Time(tau) => Err(Error::invalid("relaxation", tau, "must be a finite number above 0")),
             Self::Steps(Steps { prediction, .. }) if !(0.0..=MOST_PREDICTION).contains(&prediction) => {

@@ -9,6 +9,7 @@ use crate::meshing::{
 use crate::numerics::linear::{Robust, Smoother};
 use crate::physics::{Burgers, Convection};
 use crate::setting::Auto;
+use crate::mover::Mover;
 use crate::simulation::{Coupling, Record, Safety, Schedule, Simulation};
 use crate::work::Work;
 use std::time::Instant;
@@ -53,8 +54,7 @@ impl InterfaceStep {
         let mut simulation = Simulation {
             physics: Box::new(Burgers::new(0.005, Convection::Advective)?),
             monitor: Box::new(monitor),
-            generator: Box::new(Whole::default()),
-            equation: Mmpde::default(),
+            mover: Mover::by(Box::new(Whole::default()), Mmpde::default()),
             coupling: Coupling::default(),
             safety: Safety::default(),
             schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
@@ -395,8 +395,7 @@ fn coupled(options: Options) -> Result<Table> {
         let mut simulation = Simulation {
             physics: Box::new(Burgers::new(0.005, Convection::Conservative)?),
             monitor: Box::new(Arclength::default()),
-            generator,
-            equation: Mmpde::default(),
+            mover: Mover::by(generator, Mmpde::default()),
             coupling: Coupling::default(),
             safety: Safety::default(),
             schedule: Schedule::new(0.25, 0.75, 1e-3, vec![0.75])?,

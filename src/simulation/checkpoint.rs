@@ -5,6 +5,7 @@ use super::report::{remove, sync_directory};
 use super::{Record, Safety, Schedule, State, write_file};
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Field, Mesh, check_unfolded};
+use crate::mover::Gait;
 use crate::kept::{Kept, check_nodal, encoded};
 use crate::physics::Physics;
 use schemars::JsonSchema;
@@ -276,7 +277,7 @@ pub(crate) struct Checkpoint {
     x: Vec<[f64; 2]>,
     u: Vec<f64>,
     rho: Vec<f64>,
-    velocity: Vec<[f64; 2]>,
+    gait: Gait,
     pub record: Record,
     pub course: Course,
     /// What generator and observers carry.
@@ -285,14 +286,14 @@ pub(crate) struct Checkpoint {
 
 impl Checkpoint {
     pub fn of(state: &State, record: Record, course: Course, kept: Kept) -> Self {
-        let State { t, step, mesh, u, rho, velocity } = state;
+        let State { t, step, mesh, u, rho, gait } = state;
         Self {
             t: *t,
             step: *step,
             x: mesh.x().to_vec(),
             u: u.values().to_vec(),
             rho: rho.clone(),
-            velocity: velocity.clone(),
+            gait: gait.clone(),
             record,
             course,
             kept,
@@ -309,11 +310,11 @@ impl Checkpoint {
     ) -> Result<State, Unfit> {
         let damaged = |reason: String| Err(Unfit::Damaged(reason));
         let (nodes, components) = (mesh.lattice().len(), physics.unknowns().len());
-        let Self { t, step, x, u, rho, velocity, course, .. } = self;
+        let Self { t, step, x, u, rho, gait, course, .. } = self;
         check_nodal("mesh", x, nodes)?;
         check_nodal("solution", u.as_chunks::<1>().0, nodes * components)?;
         check_nodal("density", rho.as_chunks::<1>().0, nodes)?;
-        check_nodal("velocity", velocity, nodes)?;
+        gait.check(nodes)?;
         if let Some(k) = rho.iter().position(|rho| *rho <= 0.0) {
             return damaged(format!("its density is {} at node {k}", rho[k]));
         }
@@ -330,7 +331,7 @@ impl Checkpoint {
         let u = Field::of(components, u.clone());
         let sound = check_unfolded(&mesh).and_then(|()| physics.check(*t, &mesh, &u));
         sound.map_err(|failure| Unfit::Damaged(failure.to_string()))?;
-        Ok(State { t: *t, step: *step, mesh, u, rho: rho.clone(), velocity: velocity.clone() })
+        Ok(State { t: *t, step: *step, mesh, u, rho: rho.clone(), gait: gait.clone() })
     }
 }
 

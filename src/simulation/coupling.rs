@@ -1,10 +1,9 @@
-use super::prediction::{Predicted, blend};
-use super::safety::Care;
-use super::{NOISE_WORTH_A_WARNING, Seconds, Simulation, State, timed};
-use crate::density::{Monitor, smooth};
+use super::{Record, Simulation, State, timed};
+use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Field, Mesh, check_unfolded, interpolate};
-use crate::meshing::{Interface, Mmpde};
+use crate::geometry::{Field, Mesh, check_unfolded};
+use crate::meshing::Interface;
+use crate::mover::{Retries, Stride};
 use crate::numerics::larger;
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
@@ -71,69 +70,50 @@ pub(super) struct Stretch {
     pub estimated: bool,
 }
 
-/// Which part of a step failed.
-pub(super) enum Setback {
-    Mesh(Failure),
-    Physics(Failure),
-}
-
-/// One step, tried once: mesh, then physics, as often as the coupling says.
+/// One step: mesh, then physics, as often as the coupling says; `record` adds up tries of the mesh and seconds.
+///
+/// # Errors
+/// What the mesh failed with at first, when all that safety allows was tried, or what the physics failed with.
 pub(super) fn attempt(
     simulation: &mut Simulation,
     state: &State,
     stretch: Stretch,
-    care: Care,
-    seconds: &mut Seconds,
-) -> Result<Advanced, Setback> {
+    record: &mut Record,
+) -> Result<Advanced, Failure> {
     let Stretch { t, dt, scale, estimated } = stretch;
-    let Simulation { physics, monitor, generator, equation, coupling, .. } = simulation;
-    let mesh_steps = coupling.mesh_steps * care.substeps;
+    let Simulation { physics, monitor, mover, coupling, safety, .. } = simulation;
+    mover.care = safety.care();
+    let stride = Stride { dt, scale, parts: coupling.mesh_steps };
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
-    // where steps are short against τ the velocity learns no faster in time
-    let gain = equation.relaxation.prediction() * dt / scale;
-    let equation = Mmpde { relaxation: equation.relaxation.at(scale), ..*equation };
-    let predicted = timed(&mut seconds.mesh, || Predicted::after(state, gain, dt)).map_err(Setback::Mesh)?;
+    let seconds = &mut record.seconds;
+    let followed = monitor.followed(state.t, &state.mesh, &state.u)?;
+    let predicted = timed(&mut seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
     let mut latest = None;
     for _ in 0..coupling.iterations {
-        let mut spent = 0.0;
-        let mesh = timed(&mut seconds.mesh, || {
-            let mut mesh = predicted.mesh.clone();
-            smooth(mesh.lattice(), &mut rho, care.smoothing);
-            for sub in 0..mesh_steps {
-                let carried = if sub == 0 { None } else { Some(interpolate(&predicted.mesh, &rho, &mesh)) };
-                let rho = carried.as_ref().unwrap_or(&rho);
-                let moved = generator.step(&equation, &mesh, rho, dt / mesh_steps as f64)?;
-                let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_WORTH_A_WARNING);
-                check_unfolded(&moved.mesh).map_err(|failure| match failure {
-                    Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
-                    other => other,
-                })?;
-                mesh = moved.mesh;
-                work += moved.work;
-                spent += moved.interface.map_or(0.0, |i| i.seconds);
-                interface = moved.interface;
-            }
-            Ok(mesh)
-        });
-        let mesh = mesh.map_err(Setback::Mesh)?;
+        let mut retries = Retries::default();
+        let mixed = state.gait.mixed(&rho, mover.equation.relaxation);
+        let moved = timed(&mut seconds.mesh, || mover.relax(&predicted, &mixed, stride, &mut retries));
+        record.safety.substeps += retries.substeps;
+        record.safety.smoothed += retries.smoothed;
+        record.work.rejected_steps += retries.substeps + retries.smoothed;
+        let moved = moved?;
+        let spent = moved.interface.map_or(0.0, |i| i.seconds);
         seconds.mesh -= spent;
         seconds.interface += spent;
+        work += moved.work;
+        interface = moved.interface;
+        let mesh = moved.mesh;
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
-        let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))
-            .map_err(Setback::Physics)?;
+        let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))?;
         work += cost;
-        rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))
-            .map_err(Setback::Physics)?;
-        if gain > 0.0 {
-            blend(&state.rho, &mut rho);
-        }
-        latest = Some((mesh, u, errors));
+        rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
+        latest = Some((mesh, u, errors, mixed));
     }
-    let (mesh, u, errors) = latest.expect("a coupling has at least one iteration");
-    let velocity = predicted.corrected(&mesh, gain, dt);
-    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, velocity }, work, interface, errors })
+    let (mesh, u, errors, mixed) = latest.expect("a coupling has at least one iteration");
+    let gait = mover.learn(&state.gait, &predicted, &mesh, [mixed, followed], stride);
+    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, gait }, work, interface, errors })
 }
 
 /// The physics over a step; where its error is asked for in two halves, on the same straight paths of the nodes, beside the

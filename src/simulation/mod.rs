@@ -5,7 +5,6 @@ mod control;
 mod coupling;
 mod observer;
 mod pace;
-mod prediction;
 mod report;
 mod safety;
 mod schedule;
@@ -27,12 +26,12 @@ use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality, quality_and_integral};
 use crate::kept::Kept;
-use crate::meshing::{Interface, MeshGenerator, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Whole};
+use crate::meshing::{Interface, Relaxation, STEPS_WORTH_A_WARNING};
+use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use crate::stopwatch::Stopwatch;
 use crate::work::Work;
 use pace::Pace;
-use prediction::blend;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -49,8 +48,8 @@ pub struct State {
     pub u: Field,
     /// The density that follows from both: what moves the mesh next.
     pub rho: Vec<f64>,
-    /// Velocity with which the mesh is predicted to go on, one a node.
-    pub velocity: Vec<[f64; 2]>,
+    /// How the mesh was going.
+    pub gait: Gait,
 }
 
 /// What a run did so far.
@@ -76,14 +75,13 @@ pub struct Record {
 ///
 /// # Example
 /// ```
-/// use driftmesh::{density::Arclength, geometry::{Lattice, Mesh}, meshing::{Mmpde, Whole}};
+/// use driftmesh::{density::Arclength, geometry::{Lattice, Mesh}, meshing::Whole, mover::Mover};
 /// use driftmesh::{physics::{Burgers, Convection}, simulation::{Coupling, Record, Safety, Schedule, Simulation}};
 ///
 /// let mut simulation = Simulation {
 ///     physics: Box::new(Burgers::new(0.005, Convection::Conservative)?),
 ///     monitor: Box::new(Arclength::default()),
-///     generator: Box::new(Whole::default()),
-///     equation: Mmpde::default(),
+///     mover: Mover::new(Whole::default()),
 ///     coupling: Coupling::default(),
 ///     safety: Safety::default(),
 ///     schedule: Schedule::new(0.25, 0.30, 1e-3, vec![0.30])?,
@@ -101,10 +99,8 @@ pub struct Simulation {
     pub physics: Box<dyn Physics>,
     /// Where the mesh should be fine.
     pub monitor: Box<dyn Monitor>,
-    /// How the mesh equation is solved.
-    pub generator: Box<dyn MeshGenerator>,
-    /// The mesh equation.
-    pub equation: Mmpde,
+    /// How the mesh follows it; how often it tries again is for `safety` to say.
+    pub mover: Mover,
     /// How often mesh and physics alternate in a step.
     pub coupling: Coupling,
     /// How far a step that fails is tried again.
@@ -115,11 +111,6 @@ pub struct Simulation {
 
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
 pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
-/// τ of the mesh at the start, in its steps.
-const STEPS_OF_THE_START: f64 = 30.0;
-const MAX_STEPS_OF_THE_START: usize = 500;
-/// Motion in one step, as a share of the shortest edge, below which the mesh at the start rests.
-const AT_REST: f64 = 4e-3;
 const HASTY: &str = "`mesh.relaxation` is short";
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
@@ -141,8 +132,8 @@ impl Simulation {
             return Err(at_start(Failure::NonFinite { what: "the initial solution", value, node, x }));
         }
         let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
-        let velocity = vec![[0.0; 2]; rho.len()];
-        Ok(State { t, step: 0, mesh, u, rho, velocity })
+        let gait = Gait::at_rest(&mesh);
+        Ok(State { t, step: 0, mesh, u, rho, gait })
     }
 
     /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
@@ -152,31 +143,14 @@ impl Simulation {
     ///
     /// # Errors
     /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer returned.
-    pub fn adapted(&self, mut mesh: Mesh<2>, observers: &mut [&mut dyn Observer]) -> Result<(Mesh<2>, bool)> {
-        let equation = Mmpde { relaxation: Relaxation::steps(STEPS_OF_THE_START), ..self.equation };
-        let given = mesh.clone();
-        let mut whole = Whole::to(0.1 * AT_REST);
-        let mut before: Option<Vec<f64>> = None;
-        for _ in 0..MAX_STEPS_OF_THE_START {
-            let mut state = self.start(mesh)?;
+    pub fn adapted(&self, mesh: Mesh<2>, observers: &mut [&mut dyn Observer]) -> Result<Start> {
+        mover::adapted(mesh, self.mover.equation.form, |mesh| {
+            let state = self.start(mesh.clone())?;
             observers.iter_mut().try_for_each(|observer| observer.adapting(&state))?;
             end_where_asked(observers, &state)?;
-            if let Some(before) = &before {
-                blend(before, &mut state.rho);
-            }
-            let moved =
-                whole.step(&equation, &state.mesh, &state.rho, 1.0).map_err(|failure| self.at_start(failure))?.mesh;
-            if check_unfolded(&moved).is_err() {
-                break;
-            }
-            let at_rest = farthest(&state.mesh, &moved) <= AT_REST * moved.shortest_edge();
-            mesh = moved;
-            before = Some(state.rho);
-            if at_rest {
-                return Ok((mesh, true));
-            }
-        }
-        Ok((given, false))
+            let u = self.monitor.followed(state.t, &state.mesh, &state.u).map_err(|failure| self.at_start(failure))?;
+            Ok((u, state.rho))
+        })
     }
 
     fn at_start(&self, failure: Failure) -> Error {
@@ -237,7 +211,7 @@ impl Simulation {
                 Ok(None) => continue,
                 Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
             };
-            record.travelled += farthest(&state.mesh, &next.state.mesh);
+            record.travelled += next.state.mesh.farthest(&state.mesh);
             *state = next.state;
             record.work.add(next.work);
             record.interface = next.interface;
@@ -285,7 +259,7 @@ impl Simulation {
     ) -> Result<()> {
         let began = Instant::now();
         let mut kept = Kept::default();
-        self.generator.keep(&mut kept);
+        self.mover.generator.keep(&mut kept);
         observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
         checkpoints.write(state.step, &Checkpoint::of(state, clock.counted(record), course, kept))?;
         record.seconds.output += began.elapsed().as_secs_f64();
@@ -294,7 +268,7 @@ impl Simulation {
 
     /// Says once in a run that τ, given in units of time, is too few steps.
     fn warn_of_haste(&self, t: f64, dt: f64, record: &mut Record) {
-        let Relaxation::Time(tau) = self.equation.relaxation else { return };
+        let Relaxation::Time(tau) = self.mover.equation.relaxation else { return };
         if tau < STEPS_WORTH_A_WARNING * dt && !record.warnings.iter().any(|said| said.starts_with(HASTY)) {
             record.warnings.push(format!(
                 "{HASTY}: at t = {t} it is {:.2e} time steps; below {STEPS_WORTH_A_WARNING} the mesh overshoots its density \
@@ -384,11 +358,6 @@ impl Simulation {
         let (quality, error) = self.assess(state);
         Report { t: state.t, error, quality, conserved: Conserved { mass, drift }, interface, comparison: None }
     }
-}
-
-/// The longest way of a node from one mesh to the next.
-pub(crate) fn farthest(from: &Mesh<2>, to: &Mesh<2>) -> f64 {
-    from.x().iter().zip(to.x()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
 }
 
 /// Ends a run where an observer asks for that.

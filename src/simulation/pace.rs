@@ -1,6 +1,6 @@
 use super::control::Control;
-use super::coupling::{Advanced, Stretch};
-use super::safety::{Safety, advance, divided, is_curable};
+use super::coupling::{Advanced, Stretch, attempt};
+use super::safety::{Safety, divided};
 use super::schedule::{Schedule, Steps};
 use super::{Record, Simulation, State};
 use crate::error::{Error, Failure, Moment, Result};
@@ -73,7 +73,7 @@ impl Pace {
             }
             Self::Free(free) => {
                 let stretch = Stretch { t, dt, scale: free.scale, estimated: free.control.is_some() };
-                let next = advance(simulation, state, stretch, record);
+                let next = attempt(simulation, state, stretch, record);
                 free.judge(simulation, state, next, record)
             }
         }
@@ -173,7 +173,7 @@ impl Free {
                 self.failures += 1;
                 if self.failures > simulation.safety.halvings
                     || self.dt < SHORTEST * self.longest
-                    || !is_curable(&failure)
+                    || !failure.is_curable()
                 {
                     return Err(failure);
                 }
@@ -188,6 +188,11 @@ impl Free {
             *largest = largest.max(range(&after.u, c));
         }
         let dt = after.t - before.t;
+        if std::env::var("DBG").is_ok() {
+            let dl = before.rho.iter().zip(&after.rho).map(|(a, b)| (b / a).ln().abs()).fold(0.0, f64::max);
+            let ch = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), self.ranges[0]);
+            eprintln!("t {:.4} dt {:.2e} drho {:.3} change {:.4} steps {:.1} maxrho {:.2}", after.t, dt, dl, ch, after.gait.steps(), after.rho.iter().fold(0.0_f64, |m, r| m.max(*r)) / after.rho.iter().fold(1e9_f64, |m, r| m.min(*r)));
+        }
         // a step that was cut short to meet a report says what a whole one would have done
         let cut = self.dt / dt;
         let (taken, factor) = match (&mut self.control, &step.errors) {

@@ -1,8 +1,9 @@
 //! What is done where a step fails: the mesh in smaller steps, a smoother density, a shorter step.
 
-use super::coupling::{Advanced, Setback, Stretch, attempt};
+use super::coupling::{Advanced, Stretch, attempt};
 use super::{Record, Simulation, State};
 use crate::error::{Error, Failure, Result};
+use crate::mover::Care;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -77,49 +78,9 @@ impl Safety {
         Ok(())
     }
 
-    /// What is tried after this, if anything.
-    fn beyond(self, care: Care) -> Option<Care> {
-        let Care { substeps, smoothing } = care;
-        if smoothing == 0 && substeps < self.substeps {
-            return Some(Care { substeps: (2 * substeps).min(self.substeps), smoothing });
-        }
-        (smoothing < self.smoothing).then(|| Care { substeps, smoothing: (2 * smoothing).max(2).min(self.smoothing) })
-    }
-}
-
-/// The care with which a step of the mesh is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Care {
-    /// Parts of each step of the mesh.
-    pub substeps: usize,
-    /// Further passes over ρ.
-    pub smoothing: usize,
-}
-
-/// One step, its mesh with as much care as it needs. What it fails with is what it failed with at first.
-pub(super) fn advance(
-    simulation: &mut Simulation,
-    state: &State,
-    stretch: Stretch,
-    record: &mut Record,
-) -> Result<Advanced, Failure> {
-    let mut care = Care { substeps: 1, smoothing: 0 };
-    let mut first = None;
-    loop {
-        match attempt(simulation, state, stretch, care, &mut record.seconds) {
-            Ok(advanced) => return Ok(advanced),
-            Err(Setback::Mesh(failure)) if is_curable(&failure) => {
-                let failure = first.get_or_insert(failure);
-                let Some(more) = simulation.safety.beyond(care) else { return Err(failure.clone()) };
-                record.work.rejected_steps += 1;
-                match more.smoothing > 0 {
-                    true => record.safety.smoothed += 1,
-                    false => record.safety.substeps += 1,
-                }
-                care = more;
-            }
-            Err(Setback::Mesh(failure) | Setback::Physics(failure)) => return Err(failure),
-        }
+    /// How far a step of the mesh is tried again.
+    pub(super) fn care(self) -> Care {
+        Care { substeps: self.substeps, smoothing: self.smoothing }
     }
 }
 
@@ -134,9 +95,9 @@ pub(super) fn divided(
     record: &mut Record,
 ) -> Result<(Advanced, usize), Failure> {
     if parts == 0 {
-        match advance(simulation, state, stretch, record) {
+        match attempt(simulation, state, stretch, record) {
             Ok(advanced) => return Ok((advanced, 0)),
-            Err(failure) if done == simulation.safety.halvings || !is_curable(&failure) => return Err(failure),
+            Err(failure) if done == simulation.safety.halvings || !failure.is_curable() => return Err(failure),
             Err(_) => {
                 record.work.rejected_steps += 1;
                 record.safety.shortened += 1;
@@ -153,37 +114,9 @@ pub(super) fn divided(
     Ok((second, 1 + took.max(takes)))
 }
 
-/// False for what no step is short enough, and for formulas without a value, which a shorter step might only step over.
-pub(super) fn is_curable(failure: &Failure) -> bool {
-    !matches!(
-        failure,
-        Failure::Formula { .. }
-            | Failure::NotPeriodic { .. }
-            | Failure::NotUniform { .. }
-            | Failure::ManySubsteps { .. }
-            | Failure::Subdomains { .. }
-            | Failure::WrongLength { .. }
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn ladder(safety: Safety) -> Vec<(usize, usize)> {
-        let first = Some(Care { substeps: 1, smoothing: 0 });
-        let all = std::iter::successors(first, |care| safety.beyond(*care));
-        all.map(|care| (care.substeps, care.smoothing)).collect()
-    }
-
-    /// First the parts, then the passes, each doubled up to its limit and never beyond it.
-    #[test]
-    fn the_ladder_ends_at_its_limits() {
-        assert_eq!(ladder(Safety::default()), [(1, 0), (2, 0), (4, 0), (8, 0), (8, 2), (8, 4), (8, 8)]);
-        assert_eq!(ladder(Safety { substeps: 3, smoothing: 1, halvings: 0 }), [(1, 0), (2, 0), (3, 0), (3, 1)]);
-        assert_eq!(ladder(Safety { substeps: 1, ..Safety::default() }), [(1, 0), (1, 2), (1, 4), (1, 8)]);
-        assert_eq!(ladder(Safety::OFF), [(1, 0)]);
-    }
 
     #[test]
     fn nonsense_is_refused_by_name() {

@@ -4,6 +4,7 @@ use super::StefanStudy;
 use super::any::Begin;
 use super::ending::end;
 use super::stefan::Prepared;
+use crate::mover::Gait;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::geometry::{Field, quality};
 use crate::kept::{Kept, check_nodal};
@@ -417,8 +418,8 @@ fn pictured(front: &Front, state: &FrontState) -> Result<State> {
     let mesh = front.columns.whole(&state.front)?;
     let u = front.columns.joined(&state.u);
     let rho = vec![1.0; u.len()];
-    let velocity = vec![[0.0; 2]; rho.len()];
-    Ok(State { t: state.t, step: state.step, mesh, u: Field::scalar(u), rho, velocity })
+    let gait = Gait::at_rest(&mesh);
+    Ok(State { t: state.t, step: state.step, mesh, u: Field::scalar(u), rho, gait })
 }
 
 type Leave<'a> = dyn FnMut(Event, &Snapshot<'_>, Option<Row>, &FrontState, &StefanSummary) -> Result<()> + 'a;

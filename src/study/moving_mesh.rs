@@ -3,6 +3,7 @@ use crate::density::{Arclength, Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
+use crate::mover::Mover;
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
 use crate::simulation::{
@@ -175,7 +176,7 @@ pub struct MeshTable {
 impl Default for MeshTable {
     fn default() -> Self {
         Self {
-            relaxation: Relaxation::Steps(Steps { steps: 40.0, prediction: 0.2 }),
+            relaxation: Relaxation::Auto,
             form: MeshForm::Conservative,
             start: None,
             generator: GeneratorKind::default(),
@@ -521,12 +522,12 @@ impl MovingMesh {
         record.timed(|record| {
             let mut mesh = self.uniform_mesh()?;
             if self.mesh.start == Some(StartMesh::Adapted) {
-                let (adapted, at_rest) = timed(&mut record.seconds.mesh, || simulation.adapted(mesh, observers))?;
-                mesh = adapted;
-                if !at_rest {
+                let start = timed(&mut record.seconds.mesh, || simulation.adapted(mesh, observers))?;
+                mesh = start.mesh;
+                if !start.at_rest {
                     record.warnings.push(
                         "`mesh.start`: the mesh does not come to rest on the initial solution, which may be too thin for \
-                         grid.cells or not continuous; it starts with equal cells"
+                         grid.cells or not continuous; it starts where it was last"
                             .into(),
                     );
                 }
@@ -554,8 +555,7 @@ impl MovingMesh {
         Ok(Simulation {
             physics,
             monitor,
-            generator: self.mesh.generator.clone().into_generator(),
-            equation: self.equation(),
+            mover: Mover::by(self.mesh.generator.clone().into_generator(), self.equation()),
             coupling: self.mesh.coupling,
             safety: self.safety,
             schedule: self.schedule()?,

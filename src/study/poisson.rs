@@ -1,6 +1,7 @@
 use super::ending::end;
 use super::mapped::{Grading, MappedDomain, Side, mistaken, parse};
 use super::{Header, Output};
+use crate::mover::Gait;
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Program};
 use crate::geometry::{Field, Mesh, node_areas};
@@ -490,8 +491,8 @@ impl Solved {
             fields.push(self.u.iter().zip(exact).map(|(u, e)| u - e).collect());
         }
         let rho = vec![1.0; self.u.len()];
-        let velocity = vec![[0.0; 2]; rho.len()];
-        (names, State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, velocity })
+        let gait = Gait::at_rest(&self.mesh);
+        (names, State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, gait })
     }
 
     /// The mesh over the solution.

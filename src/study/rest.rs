@@ -2,7 +2,7 @@ use super::MovingMesh;
 use crate::density::{MonitorKind, Strength};
 use crate::error::Result;
 use crate::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde, Whole};
-use crate::simulation::{Record, Simulation, State, farthest};
+use crate::simulation::{Record, Simulation, State};
 
 /// A mesh of which no node went so many cells in a whole run does not move.
 const MOVES: f64 = 0.25;
@@ -32,7 +32,7 @@ pub(super) fn at_rest(
     }
     let equation = Mmpde { relaxation: 1.0.into(), form: Form::Conservative };
     let moved = Whole::default().step(&equation, mesh, &state.rho, 1.0)?;
-    let asks = farthest(mesh, &moved.mesh) / cell;
+    let asks = moved.mesh.farthest(mesh) / cell;
     let reason = match spread(&state.rho) {
         _ if asks > ASKS => held_back(study, record),
         spread if spread < FLAT => flattened(study, simulation, state, spread)?,

@@ -191,7 +191,7 @@ impl Underway {
 fn accept(study: &MovingMesh, simulation: &mut Simulation, found: &Checkpoint) -> Result<(State, Meshes), Unfit> {
     let mesh = study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
     let state = found.state(&mesh, simulation.physics.as_ref(), &simulation.schedule, simulation.safety)?;
-    simulation.generator.resume(&mesh, &found.kept)?;
+    simulation.mover.generator.resume(&mesh, &found.kept)?;
     Ok((state, Meshes::resume(study, &mesh, &found.kept)?))
 }
 

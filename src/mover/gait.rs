@@ -1,0 +1,262 @@
+use crate::error::{Failure, Result, Unfit};
+use crate::geometry::{DualCells, Mesh, check_unfolded};
+use crate::kept::check_nodal;
+use crate::meshing::{Relaxation, STEPS_TO_BEGIN_WITH};
+use crate::numerics::difference::{Metrics, derivative};
+use crate::numerics::sum;
+use serde::{Deserialize, Serialize};
+
+/// What a mover carries from step to step: how the mesh was going, and how fast it may follow
+///
+/// The density is frozen at the nodes over a step, so that a mesh that follows too fast overshoots, and turns back in the
+/// next step. How slow is slow enough depends on how thin the layer is in cells, so the mover looks at itself: with
+/// e = xⁿ⁺¹ − x* the correction of a step, and c the cosine between it and the one before,
+///
+/// ```text
+/// c = Σ eⁿ·eⁿ⁻¹ / √(Σ |eⁿ|² Σ |eⁿ⁻¹|²),    c < −0.1:  τ ← 1.3 τ,  v ← √(1 + c) v;    c > 0.5:  τ ← max(0.97 τ, 15 Δt)
+/// ```
+///
+/// Corrections within what the mesh equation is solved to, a hundredth of the shortest edge, change nothing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Gait {
+    velocity: Vec<[f64; 2]>,
+    correction: Vec<[f64; 2]>,
+    steps: f64,
+    /// The density that moved the mesh last: a mean over steps.
+    rho: Vec<f64>,
+    /// The last step; none before the first.
+    last: Option<Last>,
+}
+
+/// A step of a mesh, for what the next one finds of its density.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Last {
+    dt: f64,
+    /// Where each node went.
+    way: Vec<[f64; 2]>,
+    /// What the mesh follows, at its start.
+    u: Vec<f64>,
+}
+
+/// Cosines below this are of a mesh that turns back.
+const TURNS_BACK: f64 = -0.1;
+/// Cosines above this are of a mesh that still has some way to go.
+const GOES_ON: f64 = 0.5;
+/// What τ is multiplied by, with each step that turns back and that goes on.
+const SLOWER: f64 = 1.3;
+const FASTER: f64 = 0.97;
+/// The same with each step that goes where the last one went.
+const MUCH_FASTER: f64 = 0.9;
+const GOES_STRAIGHT_ON: f64 = 0.9;
+/// The fewest and the most time steps in τ.
+const STEPS: [f64; 2] = [15.0, 1e5];
+/// Corrections below this share of the shortest edge are of the solver.
+const SOLVED_TO: f64 = 1e-2;
+/// Share of the newest density in the one that moves the mesh.
+const NEWEST: f64 = 0.7;
+/// The farthest that u and the mesh have come apart in a step, as a share of the box: what differences can tell.
+const FARTHEST: f64 = 0.25;
+/// A determinant, over the square of the trace, that is none.
+const SINGULAR: f64 = 1e-3;
+/// Shares of the velocity that are tried: nodes that were made to run into each other stop.
+const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
+
+impl Gait {
+    /// Of a mesh that has stood still so far.
+    pub fn at_rest(mesh: &Mesh<2>) -> Self {
+        let still = vec![[0.0; 2]; mesh.x().len()];
+        Self { velocity: still.clone(), correction: still, steps: STEPS_TO_BEGIN_WITH, rho: Vec::new(), last: None }
+    }
+
+    /// Velocity with which each node is predicted to go on.
+    pub fn velocity(&self) -> &[[f64; 2]] {
+        &self.velocity
+    }
+
+    /// From the predicted mesh of the last step to the one that it led to, node by node; zeros before the first.
+    pub fn correction(&self) -> &[[f64; 2]] {
+        &self.correction
+    }
+
+    /// τ in time steps, where the mover chooses it.
+    pub fn steps(&self) -> f64 {
+        self.steps
+    }
+
+    /// The density that is to move the mesh: where it is predicted, mixed with the one that moved it last. On the flanks of
+    /// thin layers mesh and density would otherwise take turns from step to step.
+    pub(crate) fn mixed(&self, rho: &[f64], relaxation: Relaxation) -> Vec<f64> {
+        if relaxation.prediction() == 0.0 || self.rho.len() != rho.len() {
+            return rho.to_vec();
+        }
+        rho.iter().zip(&self.rho).map(|(newest, last)| NEWEST * newest + (1.0 - NEWEST) * last).collect()
+    }
+
+    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ over this step, and `chooses` is true
+    /// where τ is the mover's own.
+    pub(super) fn after(
+        &self,
+        predicted: &Predicted,
+        mesh: &Mesh<2>,
+        [rho, u]: [Vec<f64>; 2],
+        gain: f64,
+        dt: f64,
+        chooses: bool,
+    ) -> Self {
+        let pairs = mesh.x().iter().zip(predicted.mesh.x());
+        let correction: Vec<[f64; 2]> = pairs.map(|(x, from)| [0, 1].map(|d| x[d] - from[d])).collect();
+        let mut velocity = predicted.velocity.clone();
+        for (v, e) in velocity.iter_mut().zip(&correction) {
+            (0..2).for_each(|d| v[d] += gain * e[d] / dt);
+        }
+        let mut steps = self.steps;
+        let most = correction.iter().map(|e| e[0].hypot(e[1])).fold(0.0, f64::max);
+        if chooses && most > SOLVED_TO * mesh.shortest_edge() {
+            let c = cosine(&correction, &self.correction);
+            if c < TURNS_BACK {
+                steps = (SLOWER * steps).min(STEPS[1]);
+                let left = (1.0 + c).max(0.0).sqrt();
+                velocity.iter_mut().flatten().for_each(|v| *v *= left);
+            } else if c > GOES_ON {
+                let faster = if c > GOES_STRAIGHT_ON { MUCH_FASTER } else { FASTER };
+                steps = (faster * steps).max(STEPS[0]);
+            }
+        }
+        let ways = predicted.velocity.iter().zip(&correction);
+        let way = ways.map(|(v, e)| [0, 1].map(|d| dt * v[d] + e[d])).collect();
+        Self { velocity, correction, steps, rho, last: Some(Last { dt, way, u }) }
+    }
+
+    /// The velocity with which u, what the mesh follows, moves as a whole along periodic axes, 0 along others
+    ///
+    /// Where u is carried along at c, what a node finds changes by δu = (d − c Δt)·∇u over a step in which it goes by d: c is
+    /// the best fit to the last step. Nothing else decides on a rigid shift of a periodic mesh, which leaves any density as
+    /// equidistributed as it was.
+    fn drift(&self, mesh: &Mesh<2>, u: &[f64]) -> [f64; 2] {
+        let periodic = mesh.lattice().periodic();
+        let Some(Last { dt, way, u: before }) = self.last.as_ref().filter(|last| last.u.len() == u.len()) else {
+            return [0.0; 2];
+        };
+        let middle: Vec<f64> = u.iter().zip(before).map(|(a, b)| 0.5 * (a + b)).collect();
+        let gradient = Metrics::new(mesh).gradient(&middle);
+        let cells = DualCells::new(mesh);
+        // normal equations of Σ A (g·s − (d·g − δu))²
+        let (mut matrix, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
+        for (k, (g, area)) in gradient.iter().zip(cells.areas()).enumerate() {
+            let found = way[k][0] * g[0] + way[k][1] * g[1] - (u[k] - before[k]);
+            for d in (0..2).filter(|&d| periodic[d]) {
+                right[d] += area * g[d] * found;
+                (0..2).for_each(|e| matrix[d][e] += area * g[d] * g[e]);
+            }
+        }
+        let [[a, b], [c, d]] = matrix;
+        let shift = match periodic {
+            [true, true] if a * d - b * c > SINGULAR * (a + d) * (a + d) => {
+                let determinant = a * d - b * c;
+                [(d * right[0] - b * right[1]) / determinant, (a * right[1] - c * right[0]) / determinant]
+            }
+            // along one axis, or, where u hardly changes along some direction, across it
+            [true, true] if a + d > 0.0 => right.map(|r| r / (a + d)),
+            [true, false] if a > 0.0 => [right[0] / a, 0.0],
+            [false, true] if d > 0.0 => [0.0, right[1] / d],
+            _ => [0.0; 2],
+        };
+        let extent = mesh.extent();
+        [0, 1].map(|d| {
+            let mean = sum(way.iter().map(|way| way[d])) / way.len() as f64;
+            match periodic[d] {
+                true => shift[d].clamp(mean - FARTHEST * extent[d], mean + FARTHEST * extent[d]) / dt,
+                false => 0.0,
+            }
+        })
+    }
+
+    /// Refuses what is none of a mesh with so many nodes.
+    ///
+    /// # Errors
+    /// [`Unfit::Damaged`].
+    pub(crate) fn check(&self, nodes: usize) -> Result<(), Unfit> {
+        check_nodal("velocity", &self.velocity, nodes)?;
+        check_nodal("correction", &self.correction, nodes)?;
+        if !self.rho.is_empty() {
+            check_nodal("last density", self.rho.as_chunks::<1>().0, nodes)?;
+        }
+        if let Some(Last { dt, way, u }) = &self.last {
+            check_nodal("last way", way, nodes)?;
+            check_nodal("solution before", u.as_chunks::<1>().0, nodes)?;
+            if !(dt.is_finite() && *dt > 0.0) {
+                return Err(Unfit::Damaged(format!("its last mesh step is {dt} long")));
+            }
+        }
+        match self.rho.iter().all(|rho| *rho > 0.0) && self.steps.is_finite() && self.steps > 0.0 {
+            true => Ok(()),
+            false => Err(Unfit::Damaged("its mesh cannot have gone so".into())),
+        }
+    }
+}
+
+/// The cosine between two fields of vectors; 0 where one of them is zero.
+fn cosine(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+    let product = |a: &[[f64; 2]], b: &[[f64; 2]]| sum(a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]));
+    // lengths may be of any unit
+    let norm = |a: &[[f64; 2]]| product(a, a).sqrt();
+    let size = norm(a) * norm(b);
+    if size > 0.0 { product(a, b) / size } else { 0.0 }
+}
+
+/// On periodic axes the velocity of the mesh as a whole is that of what it follows, `drift`
+///
+/// The nodes of a periodic mesh may run through what they follow for ever, v = x_ξ δ, and stay equidistributed: nothing
+/// brings them back, and a prediction that learns from them would make them run ever faster. The part of v − drift along
+/// x_ξ, by its mean over the nodes, is taken out.
+fn go_along(mesh: &Mesh<2>, velocity: &mut [[f64; 2]], drift: [f64; 2]) {
+    let (lattice, extent) = (mesh.lattice(), mesh.extent());
+    for d in (0..2).filter(|&d| lattice.periodic()[d]) {
+        let mut jump = [0.0; 2];
+        jump[d] = extent[d];
+        let along = derivative(lattice, mesh.x(), d, jump);
+        let pairs = velocity.iter().zip(&along);
+        let shares = pairs.map(|(v, a)| {
+            let relative = [v[0] - drift[0], v[1] - drift[1]];
+            (relative[0] * a[0] + relative[1] * a[1]) / (a[0] * a[0] + a[1] * a[1])
+        });
+        let mean = sum(shares) / velocity.len() as f64;
+        velocity.iter_mut().zip(&along).for_each(|(v, a)| (0..2).for_each(|d| v[d] -= mean * a[d]));
+    }
+}
+
+/// The mesh as it would go on by itself, from which the mesh equation then starts.
+#[derive(Debug, Clone)]
+pub(crate) struct Predicted {
+    pub mesh: Mesh<2>,
+    velocity: Vec<[f64; 2]>,
+    /// Of the gait.
+    steps: f64,
+}
+
+impl Predicted {
+    /// Where a mesh is after `dt`; the same mesh where the gain is 0.
+    pub(super) fn after(mesh: &Mesh<2>, gait: &Gait, u: &[f64], gain: f64, dt: f64) -> Result<Self, Failure> {
+        let mut going = gait.velocity.clone();
+        if gain > 0.0 && mesh.lattice().periodic().contains(&true) {
+            go_along(mesh, &mut going, gait.drift(mesh, u));
+        }
+        for share in SHARES.into_iter().filter(|_| gain > 0.0) {
+            let velocity: Vec<[f64; 2]> = going.iter().map(|v| v.map(|v| share * v)).collect();
+            let moved = mesh.x().iter().zip(&velocity).map(|(x, v)| [0, 1].map(|d| x[d] + dt * v[d]));
+            let mesh = mesh.moved(moved.collect())?;
+            if check_unfolded(&mesh).is_ok() {
+                return Ok(Self { mesh, velocity, steps: gait.steps });
+            }
+        }
+        Ok(Self { mesh: mesh.clone(), velocity: vec![[0.0; 2]; gait.velocity.len()], steps: gait.steps })
+    }
+
+    /// τ where it is measured in time steps of `scale`.
+    pub(super) fn tau(&self, relaxation: Relaxation, scale: f64) -> f64 {
+        match relaxation {
+            Relaxation::Auto => self.steps * scale,
+            given => given.over(scale),
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! From densities to meshes that follow them: one mover for studies, Rust and Python.
+
+mod gait;
+mod retries;
+mod start;
+
+pub use gait::Gait;
+pub use retries::{Care, Retries};
+pub use start::{Start, adapted};
+
+use crate::error::{Failure, Result};
+use crate::geometry::{Mesh, check_unfolded};
+use crate::meshing::{Form, Interface, MeshGenerator, Mmpde, Moved, Relaxation};
+use crate::work::Work;
+use gait::Predicted;
+
+/// Moves a mesh from step to step
+///
+/// A step predicts the mesh, x* = xⁿ + Δt v, and does a step of the mesh equation from there, with the mean of the density
+/// of xⁿ and of the one that moved the mesh last; the velocity v of the nodes learns from the correction
+/// e = xⁿ⁺¹ − x* ([`Steps`](crate::meshing::Steps)). With [`Relaxation::Auto`] the mover chooses τ, too ([`Gait`]). A step that
+/// would fold the mesh, or whose equation cannot be solved, is tried again with more [`Care`].
+///
+/// # Example
+/// ```
+/// use driftmesh::density::{Monitor, RootGradient};
+/// use driftmesh::geometry::{Lattice, Mesh};
+/// use driftmesh::meshing::Whole;
+/// use driftmesh::mover::{Followed, Gait, Mover};
+///
+/// let mut mover = Mover::new(Whole::default());
+/// let mut mesh = Mesh::uniform(Lattice::bounded([20, 20])?, [0.0, 0.0], [1.0, 1.0])?;
+/// let mut gait = Gait::at_rest(&mesh);
+/// for _ in 0..100 {
+///     let u: Vec<f64> = mesh.x().iter().map(|x| (40.0 * (x[0] - 0.5)).tanh()).collect();
+///     let rho = RootGradient::default().density(&mesh, &u, None)?;
+///     let step = mover.step(&mesh, &gait, Followed { u: &u, rho: &rho }, 1.0)?;
+///     (mesh, gait) = (step.moved.mesh, step.gait);
+/// }
+/// // the layer has its cells, and the mesh stands still
+/// assert!(mesh.shortest_edge() < 0.5 / 20.0);
+/// assert!(gait.correction().iter().all(|e| e[0].hypot(e[1]) < 1e-3 / 20.0));
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+pub struct Mover {
+    /// How the mesh equation is solved.
+    pub generator: Box<dyn MeshGenerator>,
+    /// The mesh equation, with its τ.
+    pub equation: Mmpde,
+    /// How far a step that fails is tried again.
+    pub care: Care,
+}
+
+/// What a mesh follows: nodal values on it, in lattice order.
+#[derive(Debug, Clone, Copy)]
+pub struct Followed<'a> {
+    /// What the density was made of: how it moves as a whole is how a mesh on periodic axes goes along. The density itself
+    /// where there is nothing else.
+    pub u: &'a [f64],
+    /// The density.
+    pub rho: &'a [f64],
+}
+
+/// A step of a [`Mover`].
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// The mesh, and what it cost.
+    pub moved: Moved,
+    /// What the next step goes on from.
+    pub gait: Gait,
+    /// Tries that failed.
+    pub retries: Retries,
+}
+
+/// Standard error of interface values, as a share of the shortest edge, above which it may have folded a mesh.
+const NOISE_THAT_FOLDS: f64 = 0.05;
+
+/// How a step of the mesh goes: its length, and what τ is measured in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stride {
+    /// Length of the step.
+    pub dt: f64,
+    /// The time step that τ is a multiple of, where it is given in steps or chosen by the mover.
+    pub scale: f64,
+    /// Parts of the step, ρ carried from each to the next.
+    pub parts: usize,
+}
+
+impl Mover {
+    /// The recipe that needs no number: the conservative form, τ and prediction by the mover itself.
+    pub fn new(generator: impl MeshGenerator + 'static) -> Self {
+        Self::by(Box::new(generator), Mmpde { relaxation: Relaxation::Auto, form: Form::Conservative })
+    }
+
+    /// Moves by this generator and equation.
+    pub fn by(generator: Box<dyn MeshGenerator>, equation: Mmpde) -> Self {
+        Self { generator, equation, care: Care::default() }
+    }
+
+    /// The mesh at t + `dt` from the mesh at t and what it follows there.
+    ///
+    /// # Errors
+    /// A [`Failure`]: the mesh is folded, or would be whatever is tried, or its equation is not solved.
+    pub fn step(&mut self, mesh: &Mesh<2>, gait: &Gait, followed: Followed<'_>, dt: f64) -> Result<Step, Failure> {
+        let Followed { u, rho } = followed;
+        check_unfolded(mesh)?;
+        let mut retries = Retries::default();
+        let stride = Stride { dt, scale: dt, parts: 1 };
+        let predicted = self.predict(mesh, gait, u, stride)?;
+        let mixed = gait.mixed(rho, self.equation.relaxation);
+        let moved = self.relax(&predicted, &mixed, stride, &mut retries)?;
+        let gait = self.learn(gait, &predicted, &moved.mesh, [mixed, u.to_vec()], stride);
+        Ok(Step { moved, gait, retries })
+    }
+
+    /// Where the mesh goes by itself.
+    pub(crate) fn predict(&self, mesh: &Mesh<2>, gait: &Gait, u: &[f64], stride: Stride) -> Result<Predicted, Failure> {
+        Predicted::after(mesh, gait, u, self.equation.relaxation.prediction() * stride.dt / stride.scale, stride.dt)
+    }
+
+    /// A step of the mesh equation from the predicted mesh, with as much care as it needs. What it fails with is what it
+    /// failed with at first.
+    pub(crate) fn relax(
+        &mut self,
+        predicted: &Predicted,
+        rho: &[f64],
+        stride: Stride,
+        retries: &mut Retries,
+    ) -> Result<Moved, Failure> {
+        let tau = predicted.tau(self.equation.relaxation, stride.scale);
+        let equation = Mmpde { relaxation: Relaxation::Time(tau), ..self.equation };
+        let generator = self.generator.as_mut();
+        self.care.persist(retries, |substeps, smoothing| {
+            let parts = stride.parts * substeps;
+            relaxed(generator, &equation, &predicted.mesh, &retries::smoother(&predicted.mesh, rho, smoothing), stride.dt, parts)
+        })
+    }
+
+    /// What the next step goes on from; `made` are the density that moved the mesh, and the u that it was made of.
+    pub(crate) fn learn(&self, gait: &Gait, predicted: &Predicted, mesh: &Mesh<2>, made: [Vec<f64>; 2], stride: Stride) -> Gait {
+        let gain = self.equation.relaxation.prediction() * stride.dt / stride.scale;
+        let chooses = self.equation.relaxation == Relaxation::Auto;
+        gait.after(predicted, mesh, made, gain, stride.dt, chooses)
+    }
+}
+
+/// `parts` equal parts of a step of the mesh equation, ρ carried onto the mesh of each by interpolation.
+fn relaxed(
+    generator: &mut dyn MeshGenerator,
+    equation: &Mmpde,
+    start: &Mesh<2>,
+    rho: &[f64],
+    dt: f64,
+    parts: usize,
+) -> Result<Moved, Failure> {
+    let mut work = Work::default();
+    let mut seconds = 0.0;
+    let mut last: Option<Moved> = None;
+    for part in 0..parts {
+        let mesh = last.as_ref().map_or(start, |moved| &moved.mesh);
+        let carried = if part == 0 { None } else { Some(crate::geometry::interpolate(start, rho, mesh)) };
+        let moved = generator.step(equation, mesh, carried.as_deref().unwrap_or(rho), dt / parts as f64)?;
+        let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_THAT_FOLDS);
+        check_unfolded(&moved.mesh).map_err(|failure| match failure {
+            Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
+            other => other,
+        })?;
+        work += moved.work;
+        seconds += moved.interface.map_or(0.0, |i| i.seconds);
+        last = Some(moved);
+    }
+    let moved = last.expect("a step has at least one part");
+    let interface = moved.interface.map(|interface| Interface { seconds, ..interface });
+    Ok(Moved { work, interface, ..moved })
+}
