@@ -37,7 +37,8 @@ impl Monitor for Following {
 
     fn followed(&self, t: f64, mesh: &Mesh<2>, unknowns: &Field) -> Result<Vec<f64>, Failure> {
         let nodes = unknowns.values().chunks(unknowns.components());
-        let points = mesh.x().iter().zip(nodes).map(|(x, u)| {
+        let images = mesh.images();
+        let points = images.iter().zip(nodes).map(|(x, u)| {
             let mut point = [t; PLACES];
             point[..2].copy_from_slice(x);
             point.iter_mut().skip(2).zip(&u[..self.unknowns.min(u.len())]).for_each(|(to, u)| *to = *u);

@@ -26,8 +26,8 @@ pub struct RootGradient {
 /// Share of the layer in the density.
 const BETA: f64 = 4.0;
 /// A layer at least this part of a uniform cell's... share: a uniform mesh resolves it.
-const RESOLVED: f64 = 0.1;
-const UNRESOLVED: f64 = 0.4;
+const RESOLVED: f64 = 0.2;
+const UNRESOLVED: f64 = 0.5;
 /// Passes of the filter on 41 × 41 nodes.
 const PASSES: f64 = 8.0;
 /// Differences of u below this share of its size are rounding.

@@ -3,8 +3,9 @@ use super::Mesh;
 /// Carries a nodal field from one mesh to the nodes of another over the same lattice and box
 ///
 /// Every cell is two triangles, cut along its diagonal from (i, j) to (i+1, j+1), and the field is linear on each. A
-/// node is searched from its own cell outwards, so meshes that differ by one time step cost a few tests a node. Points
-/// outside a bounded box take the value of the nearest point of the cell where the search ends.
+/// node is searched from its own cell outwards, so meshes that differ by one time step cost a few tests a node; on periodic
+/// axes the image next to that cell is searched for, so that meshes may have drifted by any number of periods. Points outside
+/// a bounded box take the value of the nearest point of the cell where the search ends.
 ///
 /// # Example
 /// ```
@@ -60,8 +61,19 @@ impl Cells<'_> {
         let exists = |cell: [isize; 2]| (0..2).all(|d| periodic[d] || (0..cells[d]).contains(&cell[d]));
         let mut cell: [isize; 2] =
             std::array::from_fn(|d| if periodic[d] { start[d] } else { start[d].min(cells[d] - 1) });
-        // Convex cells are crossed at most once each; the bound only guards against a mesh that is not valid.
-        for _ in 0..2 * (cells[0] + cells[1]) {
+        let (near, extent) = (self.corner(cell).1, self.mesh.extent());
+        let point: [f64; 2] = std::array::from_fn(|d| match periodic[d] {
+            true => point[d] - extent[d] * ((point[d] - near[d]) / extent[d]).round(),
+            false => point[d],
+        });
+        // each cell is crossed at most once, and the image is at most a period away: more means that the walk is caught
+        // between cells that are not convex, and all of them are looked at
+        let mut left = 4 * (cells[0] + cells[1]);
+        loop {
+            if left == 0 {
+                return self.nearest(point);
+            }
+            left -= 1;
             let [a, b, c, d] = self.corners(cell).map(|c| c.1);
             let [i, j] = cell;
             let across = [(a, b, [i, j - 1]), (b, c, [i + 1, j]), (c, d, [i, j + 1]), (d, a, [i - 1, j])];
@@ -77,6 +89,28 @@ impl Cells<'_> {
             }
         }
         self.triangle(point, cell)
+    }
+
+    /// The triangle that holds a point, or is nearest to it, of all.
+    fn nearest(&self, point: [f64; 2]) -> Triangle {
+        let (cells, extent) = (self.mesh.lattice().cells().map(|n| n as isize), self.mesh.extent());
+        let periodic = self.mesh.lattice().periodic();
+        let mut best = (f64::INFINITY, self.triangle(point, [0, 0]));
+        for cell in (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| [i, j])) {
+            let near = self.corner(cell).1;
+            let about = |d: usize| match periodic[d] {
+                true => point[d] - extent[d] * ((point[d] - near[d]) / extent[d]).round(),
+                false => point[d],
+            };
+            let point = [about(0), about(1)];
+            let [a, b, c, d] = self.corners(cell).map(|c| c.1);
+            let edges = [(a, b), (b, c), (c, d), (d, a)];
+            let off = edges.into_iter().map(|(p, q)| outside(point, p, q)).fold(0.0, f64::max);
+            if off < best.0 {
+                best = (off, self.triangle(point, cell));
+            }
+        }
+        best.1
     }
 
     fn corners(&self, [i, j]: [isize; 2]) -> [(usize, [f64; 2]); 4] {

@@ -105,6 +105,35 @@ impl<const D: usize> Mesh<D> {
         &self.x
     }
 
+    /// The image of a point that lies in the box, on periodic axes; the point itself along others.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::geometry::{Lattice, Mesh};
+    /// let mesh = Mesh::uniform(Lattice::new([4, 4], [true, false])?, [1.0, 0.0], [3.0, 2.0])?;
+    /// assert_eq!(mesh.image([7.5, 2.5]), [1.5, 2.5]);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn image(&self, x: [f64; D]) -> [f64; D] {
+        std::array::from_fn(|d| {
+            let (lower, upper) = (self.lower[d], self.upper[d]);
+            if !self.lattice.periodic()[d] || (lower..upper).contains(&x[d]) {
+                return x[d];
+            }
+            let inside = x[d] - (upper - lower) * ((x[d] - lower) / (upper - lower)).floor();
+            // round-off may leave it on the upper side, which is the lower one
+            if inside < upper { inside.max(lower) } else { lower }
+        })
+    }
+
+    /// The [images](Self::image) of all nodes: where formulas of x and y are evaluated.
+    pub fn images(&self) -> Cow<'_, [[f64; D]]> {
+        match self.lattice.periodic().contains(&true) {
+            false => Cow::Borrowed(&self.x),
+            true => Cow::Owned(self.x.iter().map(|x| self.image(*x)).collect()),
+        }
+    }
+
     /// Positions with the closing nodes of periodic axes appended, shape cells + 1: what is drawn and written.
     pub fn closed(&self) -> Cow<'_, [[f64; D]]> {
         let nodes = self.lattice.nodes();

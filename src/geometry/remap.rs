@@ -10,7 +10,8 @@ use crate::error::Failure;
 /// Σ A u ([`DualCells::areas`]) is kept to round-off, constants exactly. u_f is the value upwind with van Leer's limited
 /// slope, of second order in the mean where u is smooth (of first at nodes on sides and at extrema), and no value leaves the
 /// range of its neighbours. Nodes go from one mesh to the other in straight lines, in as many steps as keep what the faces of a
-/// dual cell sweep below half of it: one for meshes that differ by a time step.
+/// dual cell sweep below half of it: one for meshes that differ by a time step. On periodic axes they begin at the nodes,
+/// counted from another one, that lie nearest in the mean: meshes may have drifted by any number of periods.
 ///
 /// # Errors
 /// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where values
@@ -38,6 +39,8 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
     assert_eq!(values.len(), from.lattice().len(), "one value a node");
     check_unfolded(from)?;
     check_unfolded(to)?;
+    let (begin, values) = counted_from_near(from, values, to)?;
+    let (from, values) = (&begin, values.as_slice());
     let (mut cells, last) = (DualCells::new(from), DualCells::new(to));
     let steps = (largest_share(&cells, &last) / SHARE).ceil().max(1.0);
     // differences of the largest numbers are not finite
@@ -58,6 +61,34 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
             Err(Failure::NonFinite { what, value, node, x })
         }
     }
+}
+
+/// The same mesh and values with the nodes along periodic axes counted from where those of `to` begin, to the nearest cell
+/// in the mean.
+fn counted_from_near(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<(Mesh<2>, Vec<f64>), Failure> {
+    let (lattice, extent) = (from.lattice(), from.extent());
+    let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
+    // how many nodes further the new first one stands
+    let first = [0, 1].map(|d| {
+        let ways = from.x().iter().zip(to.x()).map(|(a, b)| b[d] - a[d]);
+        let cells = ways.sum::<f64>() / (from.x().len() as f64) / extent[d] * nodes[d] as f64;
+        if periodic[d] { cells.round() as i64 } else { 0 }
+    });
+    if first == [0, 0] {
+        return Ok((from.clone(), values.to_vec()));
+    }
+    let (mut x, mut u) = (Vec::with_capacity(values.len()), Vec::with_capacity(values.len()));
+    for k in 0..values.len() {
+        let node = lattice.node(k);
+        let [(i, right), (j, up)] = [0, 1].map(|d| {
+            let (place, n) = (node[d] as i64 + first[d], nodes[d] as i64);
+            (place.rem_euclid(n) as usize, place.div_euclid(n) as f64)
+        });
+        let k = lattice.index([i, j]);
+        x.push([from.x()[k][0] + right * extent[0], from.x()[k][1] + up * extent[1]]);
+        u.push(values[k]);
+    }
+    Ok((from.moved(x)?, u))
 }
 
 /// Values above this are carried in units of it: a power of two, so that they keep their bits.

@@ -333,7 +333,7 @@ impl Physics for Burgers {
         let mut solution = u.clone();
         for k in lattice.sides() {
             // a side without a formula keeps its values
-            solution.values_mut()[k] = self.side_value(t + dt, new.x()[k]).unwrap_or(u.values()[k]);
+            solution.values_mut()[k] = self.side_value(t + dt, new.image(new.x()[k])).unwrap_or(u.values()[k]);
         }
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 

@@ -7,6 +7,7 @@ use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport};
 use crate::parallel;
 use crate::work::Work;
+use std::borrow::Cow;
 
 /// What B unknowns conserve: u_t + ∇·F(u) = ∇·(D(u)∇u) + S(u, x, t)
 ///
@@ -118,6 +119,8 @@ impl<const B: usize> FiniteVolumes<B> {
         let swept = old_cells.swept(&cells);
         let [width, height] = new.extent();
         let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), [[width, 0.0], [0.0, height]]));
+        // formulas are of the box: what stands beyond a periodic side is an image
+        let [seen_old, seen_new] = [(old, &x_old), (new, &x_new)].map(|(mesh, x)| inside(mesh, x));
         let patch = *cells.patch();
         let n = patch.pencil_len();
         let places = |p: usize| (p * n..(p + 1) * n).zip(patch.pencil(p)..);
@@ -126,7 +129,7 @@ impl<const B: usize> FiniteVolumes<B> {
         let mut known = vec![[0.0; B]; patch.len()];
         {
             let half = Half { dt, t, cells: &old_cells, x: &x_old, swept: &swept };
-            let nodes = law.nodes(t, half.x, &u);
+            let nodes = law.nodes(t, &seen_old, &u);
             law.check(old, &u, &nodes)?;
             let faces = half.faces(law, &nodes, &u);
             parallel::for_each_row(&mut known, n, |p, known| {
@@ -142,7 +145,7 @@ impl<const B: usize> FiniteVolumes<B> {
         let s = patch.padded_strides()[0];
         let sides: Vec<Side<B>> = lattice
             .sides()
-            .map(|i| Side { i, k: (i / n + 1) * s + i % n + 1, given: law.side(t + dt, new.x()[i]) })
+            .map(|i| Side { i, k: (i / n + 1) * s + i % n + 1, given: law.side(t + dt, new.image(new.x()[i])) })
             .collect();
         for side in &sides {
             for (u, given) in u[side.k].iter_mut().zip(side.given) {
@@ -165,7 +168,7 @@ impl<const B: usize> FiniteVolumes<B> {
         let (mut round_off, tolerance) = (16.0 * f64::EPSILON, L::TOLERANCE);
         let mut at_first = f64::INFINITY;
         let stalled = loop {
-            let nodes = law.nodes(half.t, half.x, &u);
+            let nodes = law.nodes(half.t, &seen_new, &u);
             law.check(new, &u, &nodes)?;
             let faces = half.faces(law, &nodes, &u);
             parallel::for_each_row(&mut residual, n, |p, residual| {
@@ -241,6 +244,14 @@ impl<const B: usize> FiniteVolumes<B> {
         check_finite(law.names(), new, &values)?;
         self.newest = Some((new.clone(), cells));
         stalled.map_or(Ok((values, work)), Err)
+    }
+}
+
+/// Positions in the box: those beyond a periodic side as images.
+fn inside<'a>(mesh: &Mesh<2>, x: &'a [[f64; 2]]) -> Cow<'a, [[f64; 2]]> {
+    match mesh.lattice().periodic() {
+        [false, false] => Cow::Borrowed(x),
+        _ => Cow::Owned(x.iter().map(|x| mesh.image(*x)).collect()),
     }
 }
 

@@ -110,7 +110,7 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
     /// Refuses boundary values that are not finite.
     fn check_sides(&self, t: f64, mesh: &Mesh<2>) -> Result<(), Failure> {
         for k in mesh.lattice().sides() {
-            for (c, value) in self.side(t, mesh.x()[k]).into_iter().enumerate() {
+            for (c, value) in self.side(t, mesh.image(mesh.x()[k])).into_iter().enumerate() {
                 if let Some(value) = value.filter(|value| !value.is_finite()) {
                     return Err(self.failure(format!("`pde.boundary.{}`", self.names[c]), value, mesh, k, None));
                 }
@@ -215,7 +215,7 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
         }
         self.check_sides(t, mesh)?;
         self.check_exact(t, mesh)?;
-        for (k, node) in self.nodes(t, mesh.x(), values).iter().enumerate() {
+        for (k, node) in self.nodes(t, &mesh.images(), values).iter().enumerate() {
             if let Some(worst) = node.iter().position(|v| !v.is_finite()) {
                 return Err(self.failure(self.what(worst), node[worst], mesh, k, Some(&values[k])));
             }

@@ -69,10 +69,10 @@ impl PrescribedField {
     }
 }
 
-/// Formulas of x, y and t at all nodes of a mesh.
+/// Formulas of x, y and t at all nodes of a mesh, or at their images in the box.
 pub(super) fn evaluate<const K: usize>(program: &Program<2, K>, t: f64, mesh: &Mesh<2>) -> Vec<[f64; K]> {
     let mut out = vec![[0.0; K]; mesh.x().len()];
-    program.eval_each(mesh.x(), &[t], &mut out);
+    program.eval_each(&mesh.images(), &[t], &mut out);
     out
 }
 
