@@ -92,14 +92,15 @@ impl Gait {
         rho.iter().zip(&self.rho).map(|(newest, last)| NEWEST * newest + (1.0 - NEWEST) * last).collect()
     }
 
-    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ over this step, and `chooses` is true
+    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ over this step, `share` how much of the velocity is
+    /// kept, and `chooses` is true
     /// where τ is the mover's own.
     pub(super) fn after(
         &self,
         predicted: &Predicted,
         mesh: &Mesh<2>,
         [rho, u]: [Vec<f64>; 2],
-        gain: f64,
+        [gain, share]: [f64; 2],
         dt: f64,
         chooses: bool,
     ) -> Self {
@@ -107,7 +108,7 @@ impl Gait {
         let correction: Vec<[f64; 2]> = pairs.map(|(x, from)| [0, 1].map(|d| x[d] - from[d])).collect();
         let mut velocity = predicted.velocity.clone();
         for (v, e) in velocity.iter_mut().zip(&correction) {
-            (0..2).for_each(|d| v[d] += gain * e[d] / dt);
+            (0..2).for_each(|d| v[d] = share * (v[d] + gain * e[d] / dt));
         }
         let mut steps = self.steps;
         let most = correction.iter().map(|e| e[0].hypot(e[1])).fold(0.0, f64::max);

@@ -12,7 +12,7 @@ use crate::error::{Failure, Result};
 use crate::geometry::{Mesh, check_unfolded};
 use crate::meshing::{Form, Interface, MeshGenerator, Mmpde, Moved, Relaxation};
 use crate::work::Work;
-use gait::Predicted;
+pub(crate) use gait::Predicted;
 
 /// Moves a mesh from step to step
 ///
@@ -84,6 +84,8 @@ pub(crate) struct Stride {
     pub scale: f64,
     /// Parts of the step, ρ carried from each to the next.
     pub parts: usize,
+    /// How much of the correction was done: a mesh that is held back learns no velocity from what it would do.
+    pub share: f64,
 }
 
 impl Mover {
@@ -105,7 +107,7 @@ impl Mover {
         let Followed { u, rho } = followed;
         check_unfolded(mesh)?;
         let mut retries = Retries::default();
-        let stride = Stride { dt, scale: dt, parts: 1 };
+        let stride = Stride { dt, scale: dt, parts: 1, share: 1.0 };
         let predicted = self.predict(mesh, gait, u, stride)?;
         let mixed = gait.mixed(rho, self.equation.relaxation);
         let moved = self.relax(&predicted, &mixed, stride, &mut retries)?;
@@ -138,9 +140,9 @@ impl Mover {
 
     /// What the next step goes on from; `made` are the density that moved the mesh, and the u that it was made of.
     pub(crate) fn learn(&self, gait: &Gait, predicted: &Predicted, mesh: &Mesh<2>, made: [Vec<f64>; 2], stride: Stride) -> Gait {
-        let gain = self.equation.relaxation.prediction() * stride.dt / stride.scale;
+        let gains = [self.equation.relaxation.prediction() * stride.dt / stride.scale, stride.share];
         let chooses = self.equation.relaxation == Relaxation::Auto;
-        gait.after(predicted, mesh, made, gain, stride.dt, chooses)
+        gait.after(predicted, mesh, made, gains, stride.dt, chooses)
     }
 }
 

@@ -49,6 +49,11 @@ pub trait Physics: Send {
     /// A [`Failure`] where the step cannot be solved; [`Failure::NonFinite`] where its result is not finite.
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure>;
 
+    /// True where the solution is given at every place and time: nothing is carried from mesh to mesh.
+    fn is_given(&self) -> bool {
+        false
+    }
+
     /// ∇ of the first unknown at all nodes, where it is known exactly.
     fn gradient(&self, _t: f64, _mesh: &Mesh<2>) -> Option<Vec<[f64; 2]>> {
         None

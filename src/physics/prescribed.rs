@@ -92,6 +92,10 @@ impl Physics for PrescribedField {
         Ok((self.at(motion.t + motion.dt, motion.new), Work::default()))
     }
 
+    fn is_given(&self) -> bool {
+        true
+    }
+
     fn gradient(&self, t: f64, mesh: &Mesh<2>) -> Option<Vec<[f64; 2]>> {
         match self {
             Self::Solution(program) => Some(evaluate(program, t, mesh).into_iter().map(|[_, x, y]| [x, y]).collect()),

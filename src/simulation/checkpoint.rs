@@ -278,6 +278,7 @@ pub(crate) struct Checkpoint {
     u: Vec<f64>,
     rho: Vec<f64>,
     gait: Gait,
+    own_change: f64,
     pub record: Record,
     pub course: Course,
     /// What generator and observers carry.
@@ -286,7 +287,7 @@ pub(crate) struct Checkpoint {
 
 impl Checkpoint {
     pub fn of(state: &State, record: Record, course: Course, kept: Kept) -> Self {
-        let State { t, step, mesh, u, rho, gait } = state;
+        let State { t, step, mesh, u, rho, gait, own_change } = state;
         Self {
             t: *t,
             step: *step,
@@ -294,6 +295,7 @@ impl Checkpoint {
             u: u.values().to_vec(),
             rho: rho.clone(),
             gait: gait.clone(),
+            own_change: *own_change,
             record,
             course,
             kept,
@@ -310,11 +312,14 @@ impl Checkpoint {
     ) -> Result<State, Unfit> {
         let damaged = |reason: String| Err(Unfit::Damaged(reason));
         let (nodes, components) = (mesh.lattice().len(), physics.unknowns().len());
-        let Self { t, step, x, u, rho, gait, course, .. } = self;
+        let Self { t, step, x, u, rho, gait, own_change, course, .. } = self;
         check_nodal("mesh", x, nodes)?;
         check_nodal("solution", u.as_chunks::<1>().0, nodes * components)?;
         check_nodal("density", rho.as_chunks::<1>().0, nodes)?;
         gait.check(nodes)?;
+        if !(*own_change >= 0.0 && own_change.is_finite()) {
+            return damaged(format!("its solution cannot have changed by {own_change}"));
+        }
         if let Some(k) = rho.iter().position(|rho| *rho <= 0.0) {
             return damaged(format!("its density is {} at node {k}", rho[k]));
         }
@@ -331,7 +336,7 @@ impl Checkpoint {
         let u = Field::of(components, u.clone());
         let sound = check_unfolded(&mesh).and_then(|()| physics.check(*t, &mesh, &u));
         sound.map_err(|failure| Unfit::Damaged(failure.to_string()))?;
-        Ok(State { t: *t, step: *step, mesh, u, rho: rho.clone(), gait: gait.clone() })
+        Ok(State { t: *t, step: *step, mesh, u, rho: rho.clone(), gait: gait.clone(), own_change: *own_change })
     }
 }
 

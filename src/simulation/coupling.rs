@@ -1,9 +1,9 @@
-use super::{Record, Simulation, State, timed};
+use super::{Record, Schedule, Simulation, State, journey, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh, check_unfolded};
-use crate::meshing::Interface;
-use crate::mover::{Retries, Stride};
+use crate::meshing::{Interface, Relaxation};
+use crate::mover::{Predicted, Retries, Stride};
 use crate::numerics::larger;
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
@@ -81,15 +81,17 @@ pub(super) fn attempt(
     record: &mut Record,
 ) -> Result<Advanced, Failure> {
     let Stretch { t, dt, scale, estimated } = stretch;
-    let Simulation { physics, monitor, mover, coupling, safety, .. } = simulation;
+    let Simulation { physics, monitor, mover, coupling, safety, schedule } = simulation;
     mover.care = safety.care();
-    let stride = Stride { dt, scale, parts: coupling.mesh_steps };
+    let stride = Stride { dt, scale, parts: coupling.mesh_steps, share: 1.0 };
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
     let seconds = &mut record.seconds;
     let followed = monitor.followed(state.t, &state.mesh, &state.u)?;
     let predicted = timed(&mut seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
+    // a mesh whose way nobody has set goes no faster than is good for the solution
+    let guarded = mover.equation.relaxation == Relaxation::Auto && !physics.is_given();
     let mut latest = None;
     for _ in 0..coupling.iterations {
         let mut retries = Retries::default();
@@ -104,16 +106,35 @@ pub(super) fn attempt(
         seconds.interface += spent;
         work += moved.work;
         interface = moved.interface;
-        let mesh = moved.mesh;
+        let (mesh, share) = match guarded {
+            true => held_back(state, &predicted, moved.mesh, dt, schedule),
+            false => (moved.mesh, 1.0),
+        };
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
         let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))?;
         work += cost;
         rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
-        latest = Some((mesh, u, errors, mixed));
+        latest = Some((mesh, u, errors, mixed, share));
     }
-    let (mesh, u, errors, mixed) = latest.expect("a coupling has at least one iteration");
-    let gait = mover.learn(&state.gait, &predicted, &mesh, [mixed, followed], stride);
-    Ok(Advanced { state: State { t, step: state.step + 1, mesh, u, rho, gait }, work, interface, errors })
+    let (mesh, u, errors, mixed, share) = latest.expect("a coupling has at least one iteration");
+    let gait = mover.learn(&state.gait, &predicted, &mesh, [mixed, followed], Stride { share, ..stride });
+    let own_change = if guarded { journey::own_change(state, &mesh, &u, dt) } else { 0.0 };
+    let state = State { t, step: state.step + 1, mesh, u, rho, gait, own_change };
+    Ok(Advanced { state, work, interface, errors })
+}
+
+/// The mesh as far on its way as is good for the solution, and which share of the way that is.
+fn held_back(state: &State, predicted: &Predicted, mesh: Mesh<2>, dt: f64, schedule: &Schedule) -> (Mesh<2>, f64) {
+    let from = &predicted.mesh;
+    let share = journey::allowed(state, from, &mesh, dt, schedule.end() - schedule.start());
+    if share == 1.0 {
+        return (mesh, 1.0);
+    }
+    let between = from.x().iter().zip(mesh.x()).map(|(a, b)| [0, 1].map(|d| a[d] + share * (b[d] - a[d])));
+    match from.moved(between.collect()) {
+        Ok(held) if check_unfolded(&held).is_ok() => (held, share),
+        _ => (from.clone(), 0.0),
+    }
 }
 
 /// The physics over a step; where its error is asked for in two halves, on the same straight paths of the nodes, beside the

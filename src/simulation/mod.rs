@@ -3,6 +3,7 @@
 mod checkpoint;
 mod control;
 mod coupling;
+mod journey;
 mod observer;
 mod pace;
 mod report;
@@ -50,6 +51,9 @@ pub struct State {
     pub rho: Vec<f64>,
     /// How the mesh was going.
     pub gait: Gait,
+    /// How fast the solution changes by itself: the largest change at a fixed place in the last step, as a share of its
+    /// range, over the time that it took; 0 before the first step.
+    pub own_change: f64,
 }
 
 /// What a run did so far.
@@ -133,7 +137,7 @@ impl Simulation {
         }
         let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
         let gait = Gait::at_rest(&mesh);
-        Ok(State { t, step: 0, mesh, u, rho, gait })
+        Ok(State { t, step: 0, mesh, u, rho, gait, own_change: 0.0 })
     }
 
     /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest

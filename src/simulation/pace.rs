@@ -1,10 +1,11 @@
 use super::control::Control;
+use super::journey::{change_in_place, range};
 use super::coupling::{Advanced, Stretch, attempt};
 use super::safety::{Safety, divided};
 use super::schedule::{Schedule, Steps};
 use super::{Record, Simulation, State};
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{DualCells, Field, Lattice, padded};
+use crate::geometry::{Field, Lattice};
 use crate::numerics::larger;
 use crate::physics::Motion;
 use serde::{Deserialize, Serialize};
@@ -188,11 +189,6 @@ impl Free {
             *largest = largest.max(range(&after.u, c));
         }
         let dt = after.t - before.t;
-        if std::env::var("DBG").is_ok() {
-            let dl = before.rho.iter().zip(&after.rho).map(|(a, b)| (b / a).ln().abs()).fold(0.0, f64::max);
-            let ch = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), self.ranges[0]);
-            eprintln!("t {:.4} dt {:.2e} drho {:.3} change {:.4} steps {:.1} maxrho {:.2}", after.t, dt, dl, ch, after.gait.steps(), after.rho.iter().fold(0.0_f64, |m, r| m.max(*r)) / after.rho.iter().fold(1e9_f64, |m, r| m.min(*r)));
-        }
         // a step that was cut short to meet a report says what a whole one would have done
         let cut = self.dt / dt;
         let (taken, factor) = match (&mut self.control, &step.errors) {
@@ -216,7 +212,7 @@ impl Free {
         // faster: it keeps to the time in which the solution changes as much at a fixed place
         let mut scale = self.dt;
         if scale < self.scale {
-            let mut in_place = dt * CHANGE / share(change_in_place(before, after), self.ranges[0]);
+            let mut in_place = dt * CHANGE / share(change_in_place(before, after, 0), self.ranges[0]);
             if in_place < DOUBTED * self.scale {
                 // that counts what the mesh makes of the values, too, and a τ that is shortened by it sweeps the more
                 in_place = in_place.max(self.dt * CHANGE / self.share_at_rest(simulation, after));
@@ -248,34 +244,6 @@ fn change_at_nodes(lattice: &Lattice<2>, before: &Field, after: &Field) -> f64 {
     let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
     let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; 2]);
     inside.fold(0.0, |m, (_, change)| larger(m, change))
-}
-
-/// The largest change of the first unknown at a fixed place, past which the nodes move.
-fn change_in_place(before: &State, after: &State) -> f64 {
-    let (from, to) = (DualCells::new(&before.mesh), DualCells::new(&after.mesh));
-    let swept = from.swept(&to);
-    let strides = to.patch().padded_strides();
-    let [old, new] = [&before.u, &after.u].map(|u| {
-        let first: Vec<[f64; 1]> = u.component(0).map(|u| [u]).collect();
-        padded(after.mesh.lattice(), &first, [[0.0]; 2])
-    });
-    let middle = |k: usize, n: usize| 0.25 * ((old[k][0] + old[n][0]) + (new[k][0] + new[n][0]));
-    let changes = to.patch().places().enumerate().map(|(i, k)| {
-        // what the moving mesh alone would have made of the old values
-        let mut carried = from.areas()[i] * old[k][0];
-        for (d, s) in strides.into_iter().enumerate() {
-            carried += swept[k][d] * middle(k, k + s) - swept[k - s][d] * middle(k - s, k);
-        }
-        new[k][0] - carried / to.areas()[i]
-    });
-    changes.fold(0.0, larger)
-}
-
-/// The range of an unknown; 0 where it is of rounding.
-fn range(u: &Field, c: usize) -> f64 {
-    let extremes = (f64::INFINITY, f64::NEG_INFINITY);
-    let (low, high) = u.component(c).fold(extremes, |(low, high), u| (low.min(u), high.max(u)));
-    if high - low > 1e-12 * low.abs().max(high.abs()) { high - low } else { 0.0 }
 }
 
 /// A change as a share of a range; 0 for constants.

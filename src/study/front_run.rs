@@ -419,7 +419,7 @@ fn pictured(front: &Front, state: &FrontState) -> Result<State> {
     let u = front.columns.joined(&state.u);
     let rho = vec![1.0; u.len()];
     let gait = Gait::at_rest(&mesh);
-    Ok(State { t: state.t, step: state.step, mesh, u: Field::scalar(u), rho, gait })
+    Ok(State { t: state.t, step: state.step, mesh, u: Field::scalar(u), rho, gait, own_change: 0.0 })
 }
 
 type Leave<'a> = dyn FnMut(Event, &Snapshot<'_>, Option<Row>, &FrontState, &StefanSummary) -> Result<()> + 'a;

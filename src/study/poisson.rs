@@ -492,7 +492,7 @@ impl Solved {
         }
         let rho = vec![1.0; self.u.len()];
         let gait = Gait::at_rest(&self.mesh);
-        (names, State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, gait })
+        (names, State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, gait, own_change: 0.0 })
     }
 
     /// The mesh over the solution.

@@ -1,0 +1,104 @@
+//! What a mesh may do to the solution on its way.
+
+use super::State;
+use crate::geometry::{DualCells, Field, Mesh, padded};
+use crate::numerics::difference::Metrics;
+use crate::numerics::larger;
+
+/// What moving the nodes through a solution may add to its error over a whole run, as a share of its range: at most this,
+const MOST: f64 = 3e-3;
+/// and at most so much of the error with which equal cells interpolate it.
+const OF_UNIFORM: f64 = 0.25;
+/// Likewise in each step, as a share of what the solution changes by itself.
+const OF_CHANGE: f64 = 0.2;
+/// Linear interpolation of a layer that changes by the share g of its range over a cell is off by this times g².
+const INTERPOLATION: f64 = 0.2;
+
+/// How far the mesh may go on the way from where it is predicted to where the mesh equation takes it: 1 for all of it
+///
+/// A face that sweeps the area s over the solution brings in s (u_i + u_k)/2, and is off by s e with
+///
+/// ```text
+/// e = (δ²u_i + δ²u_k)/16,   δ² the second difference along the lattice
+/// ```
+///
+/// Where the solution stands still nothing heals what that adds up to, so a mesh that starts far from where it wants to be
+/// takes its time: over a run it adds no more than a share of the error that equal cells have. Where the solution changes by
+/// itself, a mesh that follows may add a share of that change.
+pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span: f64) -> f64 {
+    let (begin, end) = (DualCells::new(from), DualCells::new(to));
+    let swept = begin.swept(&end);
+    let patch = *begin.patch();
+    let strides = patch.padded_strides();
+    let metrics = Metrics::new(&state.mesh);
+    let lattice = state.mesh.lattice();
+    let h = [0, 1].map(|d| state.mesh.extent()[d] / lattice.cells()[d] as f64);
+    let mut share = 1.0_f64;
+    for c in 0..state.u.components() {
+        let range = range(&state.u, c);
+        if range == 0.0 {
+            continue;
+        }
+        let values: Vec<f64> = state.u.component(c).collect();
+        let u: Vec<f64> = padded(lattice, values.as_chunks::<1>().0, [[0.0]; 2]).into_flattened();
+        let mut second = vec![[0.0; 2]; u.len()];
+        for k in patch.places() {
+            second[k] = strides.map(|s| u[k - s] - 2.0 * u[k] + u[k + s]);
+        }
+        patch.wrap(&mut second);
+        let off = |k: usize, d: usize| swept[k][d] * (second[k][d] + second[k + strides[d]][d]) / 16.0;
+        let harms = patch.places().zip(end.areas()).map(|(k, area)| {
+            (0..2).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area
+        });
+        let harm = harms.fold(0.0, larger) / range;
+        let slopes = metrics.gradient(&values).into_iter().map(|g| (g[0] * h[0]).hypot(g[1] * h[1]));
+        let over_cell = slopes.fold(0.0, larger) / range;
+        let uniform = INTERPOLATION * over_cell * over_cell;
+        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + OF_CHANGE * state.own_change * dt;
+        if harm > budget {
+            share = share.min(budget / harm);
+        }
+    }
+    share
+}
+
+/// The largest change of an unknown at a fixed place in a step, as a share of its range, over the time that it took.
+pub(super) fn own_change(before: &State, mesh: &Mesh<2>, u: &Field, dt: f64) -> f64 {
+    let share = |c: usize| {
+        let range = range(u, c).max(range(&before.u, c));
+        if range > 0.0 { change(before, mesh, u, c) / range } else { 0.0 }
+    };
+    (0..u.components()).map(share).fold(0.0, f64::max) / dt
+}
+
+/// The largest change of an unknown at a fixed place, past which the nodes move.
+pub(super) fn change_in_place(before: &State, after: &State, c: usize) -> f64 {
+    change(before, &after.mesh, &after.u, c)
+}
+
+fn change(before: &State, mesh: &Mesh<2>, u: &Field, c: usize) -> f64 {
+    let (from, to) = (DualCells::new(&before.mesh), DualCells::new(mesh));
+    let swept = from.swept(&to);
+    let strides = to.patch().padded_strides();
+    let [old, new] = [&before.u, u].map(|u| {
+        let values: Vec<[f64; 1]> = u.component(c).map(|u| [u]).collect();
+        padded(mesh.lattice(), &values, [[0.0]; 2])
+    });
+    let middle = |k: usize, n: usize| 0.25 * ((old[k][0] + old[n][0]) + (new[k][0] + new[n][0]));
+    let changes = to.patch().places().enumerate().map(|(i, k)| {
+        // what the moving mesh alone would have made of the old values
+        let mut carried = from.areas()[i] * old[k][0];
+        for (d, s) in strides.into_iter().enumerate() {
+            carried += swept[k][d] * middle(k, k + s) - swept[k - s][d] * middle(k - s, k);
+        }
+        new[k][0] - carried / to.areas()[i]
+    });
+    changes.fold(0.0, larger)
+}
+
+/// The range of an unknown; 0 where it is of rounding.
+pub(super) fn range(u: &Field, c: usize) -> f64 {
+    let extremes = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = u.component(c).fold(extremes, |(low, high), u| (low.min(u), high.max(u)));
+    if high - low > 1e-12 * low.abs().max(high.abs()) { high - low } else { 0.0 }
+}
