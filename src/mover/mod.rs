@@ -6,7 +6,7 @@ mod start;
 
 pub use gait::Gait;
 pub use retries::{Care, Retries};
-pub use start::{Start, adapted};
+pub use start::{Ending, Start, adapted};
 
 use crate::error::{Failure, Result};
 use crate::geometry::{Mesh, check_unfolded};

@@ -9,17 +9,32 @@ pub struct Start {
     /// The mesh.
     pub mesh: Mesh<2>,
     /// Whether it stands still.
-    pub at_rest: bool,
+    pub end: Ending,
+}
+
+/// How an adapted start ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The mesh stands still.
+    AtRest,
+    /// It is as fine as it gets around a jump, which no mesh resolves.
+    Jump,
+    /// It went on moving.
+    Restless,
 }
 
 const MOST_STEPS: usize = 500;
+/// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there.
+const HALF: f64 = 0.5;
+const THIN: f64 = 1e-3;
 /// Motion in one step, as a share of the shortest edge, below which a mesh stands still.
 const AT_REST: f64 = 4e-3;
 
 /// The mesh that rests on a density, from a given mesh
 ///
 /// Steps of a [`Mover`], each with the density at the nodes that the last one led to, until no node moves by more than a
-/// small share of the shortest edge.
+/// small share of the shortest edge, or until one edge, a thousandth of a uniform cell, still holds half of all that u
+/// changes: data that jump would draw all nodes together without end.
 ///
 /// # Errors
 /// What `followed` returns, which gives u and the density of a mesh. 
@@ -38,10 +53,30 @@ pub fn adapted(
         let moved = step.moved.mesh;
         let farthest = moved.farthest(&mesh);
         let at_rest = farthest <= AT_REST * moved.shortest_edge();
+        let jumps = jumps(&mesh, &u);
+        if jumps {
+            return Ok(Start { mesh, end: Ending::Jump });
+        }
         (mesh, gait) = (moved, step.gait);
         if at_rest {
-            return Ok(Start { mesh, at_rest });
+            return Ok(Start { mesh, end: Ending::AtRest });
         }
     }
-    Ok(Start { mesh, at_rest: false })
+    Ok(Start { mesh, end: Ending::Restless })
+}
+
+/// True where an edge that is much shorter than a uniform cell holds half of the range of u.
+fn jumps(mesh: &Mesh<2>, u: &[f64]) -> bool {
+    let lattice = mesh.lattice();
+    let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());
+    let size = mesh.extent().iter().zip(cells).map(|(extent, n)| extent / n as f64).collect::<Vec<_>>();
+    let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
+    let strides = [cells[1] + 1, 1];
+    (0..2).any(|d| {
+        let rows = (0..x.len()).filter(|k| if d == 0 { k / strides[0] < cells[0] } else { k % strides[0] < cells[1] });
+        rows.map(|k| (k, k + strides[d])).any(|(a, b)| {
+            let way = (0..2).map(|c| ((x[b][c] - x[a][c]) / size[c]).powi(2)).sum::<f64>().sqrt();
+            (u[b] - u[a]).abs() > HALF * (high - low) && way < THIN
+        })
+    })
 }

@@ -3,7 +3,7 @@ use crate::density::{Arclength, Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
-use crate::mover::Mover;
+use crate::mover::{Ending, Mover};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
 use crate::simulation::{
@@ -524,13 +524,12 @@ impl MovingMesh {
             if self.mesh.start == Some(StartMesh::Adapted) {
                 let start = timed(&mut record.seconds.mesh, || simulation.adapted(mesh, observers))?;
                 mesh = start.mesh;
-                if !start.at_rest {
-                    record.warnings.push(
-                        "`mesh.start`: the mesh does not come to rest on the initial solution, which may be too thin for \
-                         grid.cells or not continuous; it starts where it was last"
-                            .into(),
-                    );
-                }
+                let why = match start.end {
+                    Ending::AtRest => None,
+                    Ending::Jump => Some("the initial solution jumps, and no mesh resolves a jump; it starts with a thousandth of a uniform cell there"),
+                    Ending::Restless => Some("the mesh does not come to rest on the initial solution, which may be too thin for grid.cells or noisy; it starts where it was last"),
+                };
+                record.warnings.extend(why.map(|why| format!("`mesh.start`: {why}")));
             }
             simulation.start(mesh)
         })
