@@ -256,14 +256,19 @@ class MeshGenerator:
             itself, an array of shape (nx + 1, ny + 1) that may be set anew between steps; or a function of mesh and u that
             returns it. A density is positive, only its ratios matter.
         method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`.
-        relaxation: τ, in units of time: how long the mesh takes to follow. Or ``{"steps": 25}``, so many time steps.
+        relaxation: ``"auto"``: the mesh rests where the density rests and follows where it moves, with nothing to set. Or τ,
+            in units of time: how long the mesh takes to follow. Or ``{"steps": 25}``, so many time steps, and
+            ``{"steps": 40, "prediction": 0.2}``, with nodes that learn where they are going.
         form: ``"conservative"``, stable for any density, or ``"gradient"``, as published.
 
     Raises:
         ValueError: Settings out of range.
 
-    A generator remembers its last step (to start the next solve near its end) and counts steps (for the random numbers of
-    :class:`Stochastic`); use one for each run. A copy and an unpickled one begin anew.
+    A step that would fold the mesh is done again in 2, 4, 8 parts, then with a smoother density; ``last`` counts them.
+
+    A generator remembers its last step (how the mesh was going, as long as the next step starts from the mesh that it led to)
+    and counts steps (for the random numbers of :class:`Stochastic`); use one for each run. A copy and an unpickled one begin
+    anew. ``monitor`` may be set anew between steps; ``method``, ``relaxation`` and ``form`` can be read.
 
     >>> import numpy as np
     >>> from driftmesh import Arclength, Mesh, MeshGenerator
@@ -279,7 +284,7 @@ class MeshGenerator:
         self,
         monitor: Monitor | None = None,
         method: Whole | Stochastic | Schwarz | Fixed | None = None,
-        relaxation: float | Mapping[str, float] = 1.0,
+        relaxation: float | Mapping[str, float] | Literal["auto"] = "auto",
         form: Literal["conservative", "gradient"] = "conservative",
     ) -> None:
         method = Whole() if method is None else method
@@ -289,11 +294,30 @@ class MeshGenerator:
             raise ValueError(
                 f"`monitor` is {monitor!r}, but must be Arclength(…), RootGradient(), Given(), an array or a function"
             )
-        if isinstance(relaxation, Mapping) and "prediction" in relaxation:
-            raise ValueError("a prediction of the mesh belongs to studies; give relaxation={'steps': …} alone")
         self.monitor: Monitor = RootGradient() if monitor is None else monitor
         self._method, self._relaxation, self._form = method, relaxation, form
         self._begin()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name != "monitor" and not name.startswith("_"):
+            kept = "can only be read" if name in ("method", "relaxation", "form", "last") else "is no attribute"
+            raise AttributeError(f"`{name}` {kept}; make a new MeshGenerator with other settings, or set `monitor`")
+        super().__setattr__(name, value)
+
+    @property
+    def method(self) -> Whole | Stochastic | Schwarz | Fixed:
+        """How the mesh equation is solved."""
+        return self._method
+
+    @property
+    def relaxation(self) -> float | Mapping[str, float] | Literal["auto"]:
+        """How long the mesh takes to follow, as it was given."""
+        return self._relaxation
+
+    @property
+    def form(self) -> Literal["conservative", "gradient"]:
+        """Form of the mesh equation."""
+        return self._form
 
     def _begin(self) -> None:
         monitor = self.monitor if isinstance(self.monitor, _Kind) else Given()
@@ -344,8 +368,9 @@ class MeshGenerator:
 
     @property
     def last(self) -> dict[str, Any]:
-        """What the last step cost (``work``), and how well its subdomains fit together (``interface``), as in a study's
-        ``summary.json``; empty before the first."""
+        """What the last step cost (``work``), how well its subdomains fit together (``interface``), as in a study's
+        ``summary.json``, how often it was tried again (``retries``) and τ in time steps where the generator chooses it
+        (``relaxation_steps``); empty before the first."""
         told: dict[str, Any] = json.loads(self._told)
         return told
 

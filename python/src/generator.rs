@@ -3,8 +3,9 @@ use crate::mesh::{Given, nodal, nodes};
 use crate::threads::compute;
 use driftmesh::Failure;
 use driftmesh::density::{Monitor, MonitorKind};
-use driftmesh::geometry::{Mesh, check_unfolded};
-use driftmesh::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde, Moved};
+use driftmesh::geometry::Mesh;
+use driftmesh::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
+use driftmesh::mover::{Followed, Gait, Mover, Step};
 use driftmesh::study::{MeshForm, MeshTable, Source};
 use numpy::{PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyRuntimeError;
@@ -20,24 +21,37 @@ struct Settings {
     mesh: MeshTable,
 }
 
-/// What a step cost, and how well its subdomains fit together.
+/// What a step cost, how well its subdomains fit together, and how the mesh was moved.
 #[derive(Serialize)]
 struct Told {
     work: driftmesh::Work,
     interface: Option<driftmesh::meshing::Interface>,
+    /// τ in time steps, where the mover chooses it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relaxation_steps: Option<f64>,
+    /// Tries that failed.
+    retries: Retries,
 }
 
-/// A mesh generator with its monitor and what it remembers from step to step.
+#[derive(Serialize)]
+struct Retries {
+    substeps: usize,
+    smoothed: usize,
+}
+
+/// A mover with its monitor and what it remembers from step to step.
 #[pyclass(frozen, module = "driftmesh._driftmesh")]
 pub struct Generator {
-    equation: Mmpde,
     kind: GeneratorKind,
+    chooses: bool,
     parts: Arc<Mutex<Parts>>,
 }
 
 struct Parts {
     monitor: Box<dyn Monitor>,
-    generator: Box<dyn MeshGenerator>,
+    mover: Mover,
+    /// The mesh that the last step led to, and how it was going: forgotten where the next step starts from another mesh.
+    last: Option<(Mesh<2>, Gait)>,
 }
 
 #[pymethods]
@@ -55,9 +69,11 @@ impl Generator {
         equation.check().map_err(|error| raise(error.within("mesh")))?;
         let parts = Parts {
             monitor: monitor.into_monitor(&[]).map_err(raise)?,
-            generator: mesh.generator.clone().into_generator(),
+            mover: Mover::by(mesh.generator.clone().into_generator(), equation),
+            last: None,
         };
-        Ok(Self { equation, kind: mesh.generator, parts: Arc::new(Mutex::new(parts)) })
+        let chooses = equation.relaxation == Relaxation::Auto;
+        Ok(Self { kind: mesh.generator, chooses, parts: Arc::new(Mutex::new(parts)) })
     }
 
     /// The nodes after a step, and what it cost as JSON.
@@ -71,33 +87,40 @@ impl Generator {
         let mesh = mesh.mesh(py)?;
         let u = nodal(&mesh, &u)?;
         self.kind.check(mesh.lattice()).map_err(|error| plain(py, error.within("mesh.generator")))?;
-        let (parts, equation) = (self.parts.clone(), self.equation);
-        let moved = compute(py, move || {
+        let parts = self.parts.clone();
+        let step = compute(py, move || {
             let mut parts = parts.try_lock().map_err(|error| match error {
                 TryLockError::WouldBlock => "this generator is still at work on another step; wait, or use two",
                 TryLockError::Poisoned(_) => "this generator broke in an earlier step; make a new one",
             })?;
-            let Parts { monitor, generator } = &mut *parts;
-            Ok::<_, &str>(step(&mesh, &u, monitor.as_ref(), generator.as_mut(), &equation, dt))
+            Ok::<_, &str>(parts.step(&mesh, &u, dt))
         })?;
-        let moved = moved.map_err(PyRuntimeError::new_err)?.map_err(|failure| plain(py, failure))?;
-        let told = Told { work: moved.work, interface: moved.interface };
+        let Step { moved, gait, retries } =
+            step.map_err(PyRuntimeError::new_err)?.map_err(|failure| plain(py, failure))?;
+        let told = Told {
+            work: moved.work,
+            interface: moved.interface,
+            relaxation_steps: self.chooses.then(|| gait.steps()),
+            retries: Retries { substeps: retries.substeps, smoothed: retries.smoothed },
+        };
         let told = serde_json::to_string(&told).map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
         Ok((nodes(py, &moved.mesh)?, told))
     }
 }
 
-fn step(
-    mesh: &Mesh<2>,
-    u: &[f64],
-    monitor: &dyn Monitor,
-    generator: &mut dyn MeshGenerator,
-    equation: &Mmpde,
-    dt: f64,
-) -> Result<Moved, Failure> {
-    check_unfolded(mesh)?;
-    let rho = monitor.density(mesh, u, None)?;
-    let moved = generator.step(equation, mesh, &rho, dt)?;
-    check_unfolded(&moved.mesh)?;
-    Ok(moved)
+impl Parts {
+    fn step(&mut self, mesh: &Mesh<2>, u: &[f64], dt: f64) -> Result<Step, Failure> {
+        let gait = match self.last.take() {
+            Some((last, gait)) if last == *mesh => gait,
+            _ => Gait::at_rest(mesh),
+        };
+        let rho = self.monitor.density(mesh, u, None)?;
+        let step = self.mover.step(mesh, &gait, Followed { u, rho: &rho }, dt);
+        // a step that failed may be tried again with other values
+        self.last = Some(match &step {
+            Ok(step) => (step.moved.mesh.clone(), step.gait.clone()),
+            Err(_) => (mesh.clone(), gait),
+        });
+        step
+    }
 }

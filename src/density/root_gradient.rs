@@ -28,6 +28,8 @@ const BETA: f64 = 4.0;
 /// A layer at least this part of a uniform cell's... share: a uniform mesh resolves it.
 const RESOLVED: f64 = 0.2;
 const UNRESOLVED: f64 = 0.5;
+/// The largest ρ over the smallest, before it is smoothed.
+const CONTRAST: f64 = 1e6;
 /// Passes of the filter on 41 × 41 nodes.
 const PASSES: f64 = 8.0;
 /// Differences of u below this share of its size are rounding.
@@ -38,6 +40,9 @@ impl Monitor for RootGradient {
         let lattice = mesh.lattice();
         let ([n, m], periodic) = (lattice.cells(), lattice.periodic());
         let (x, values) = (mesh.closed(), lattice.closed(u));
+        let size = values.iter().fold(0.0, |m, u| larger(m, *u));
+        let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
+        let range = high - low;
         let h = [0, 1].map(|d| mesh.extent()[d] / lattice.cells()[d] as f64);
         let mut roots = vec![0.0; n * m];
         let mut areas = vec![0.0; n * m];
@@ -53,20 +58,19 @@ impl Monitor for RootGradient {
             steepest = larger(steepest, slope);
             (*root, *area) = (slope.sqrt(), 0.5 * twice);
         }
-        let size = values.iter().fold(0.0, |m, u| larger(m, *u));
-        let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
         let domain = sum(areas.iter().copied());
         let mean = |of: &dyn Fn(f64) -> f64| sum(roots.iter().zip(&areas).map(|(root, area)| of(*root) * area)) / domain;
         let background = mean(&|root| root.sqrt().sqrt()).powi(4);
         let excess = |root: f64| (root - background).max(0.0);
-        let mean = mean(&excess);
+        // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
+        let mean = mean(&excess).max(BETA * excess(steepest.sqrt()) / CONTRAST);
         if mean == 0.0 || steepest * n.max(m) as f64 <= ROUNDING * size {
             return Ok(vec![1.0; lattice.len()]);
         }
-        let beta = BETA * need(steepest / (high - low));
+        let beta = BETA * need(steepest / range);
         let mut rho: Vec<f64> = roots.iter().map(|root| 1.0 + beta * excess(*root) / mean).collect();
         // from cells to nodes and back is a pass
-        let passes = (PASSES * ((n + 1) * (m + 1)) as f64 / (41.0 * 41.0)).round().max(1.0) as usize - 1;
+        let passes = [n, m].map(|n| ((PASSES * ((n + 1) as f64 / 41.0).powi(2)).round() - 1.0).max(0.0));
         smooth_widely([n, m], periodic, &mut rho, passes);
         let nodal: Vec<f64> = (0..lattice.len())
             .map(|k| {

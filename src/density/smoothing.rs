@@ -20,8 +20,8 @@ pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: 
     }
 }
 
-/// As many passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does not
-/// depend on their number
+/// So many passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does not
+/// depend on their number, which need not be whole
 ///
 /// A pass adds ½ to the variance of the filter, in cells². More than [`MOST_PASSES`] are done on a grid of half as many
 /// cells: a pass, the means of neighbours, the passes that are left there, their values back on the finer cells, and a pass
@@ -30,11 +30,11 @@ pub(super) fn smooth_widely<const D: usize>(
     size: [usize; D],
     periodic: [bool; D],
     values: &mut Vec<f64>,
-    passes: usize,
+    passes: [f64; D],
 ) {
     let mut source = Vec::with_capacity(values.len());
     for axis in 0..D {
-        Pencils::of(size, axis, periodic[axis]).spread(values, &mut source, passes as f64);
+        Pencils::of(size, axis, periodic[axis]).spread(values, &mut source, passes[axis]);
     }
 }
 
@@ -133,7 +133,7 @@ mod tests {
             }).collect();
             let wide = |data: &[f64]| {
                 let mut values = data.to_vec();
-                smooth_widely([n, m], [wraps, false], &mut values, passes);
+                smooth_widely([n, m], [wraps, false], &mut values, [passes as f64; 2]);
                 values
             };
             let values = wide(&data);
@@ -157,7 +157,7 @@ mod tests {
             direct[n / 2 - 3] = 1.0;
             let mut wide = direct.clone();
             smooth(&Lattice::bounded([n - 1]).unwrap(), &mut direct, passes);
-            smooth_widely([n], [false], &mut wide, passes);
+            smooth_widely([n], [false], &mut wide, [passes as f64]);
             let most = direct.iter().copied().fold(0.0, f64::max);
             let off = direct.iter().zip(&wide).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             assert!(off < 0.06 * most, "{n} cells, {passes} passes: off by {off} of {most}");

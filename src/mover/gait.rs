@@ -56,7 +56,7 @@ const SOLVED_TO: f64 = 1e-2;
 const NEWEST: f64 = 0.7;
 /// The farthest that u and the mesh have come apart in a step, as a share of the box: what differences can tell.
 const FARTHEST: f64 = 0.25;
-/// A determinant, over the square of the trace, that is none.
+/// Share of the squared gradient, and of its determinant, below which it is of rounding.
 const SINGULAR: f64 = 1e-3;
 /// Shares of the velocity that are tried: nodes that were made to run into each other stop.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
@@ -141,27 +141,32 @@ impl Gait {
         let middle: Vec<f64> = u.iter().zip(before).map(|(a, b)| 0.5 * (a + b)).collect();
         let gradient = Metrics::new(mesh).gradient(&middle);
         let cells = DualCells::new(mesh);
-        // normal equations of Σ A (g·s − (d·g − δu))²
+        // normal equations of Σ A (g·s − (d·g − δu))², lengths in uniform cells
+        let h = [0, 1].map(|d| mesh.extent()[d] / mesh.lattice().cells()[d] as f64);
         let (mut matrix, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
         for (k, (g, area)) in gradient.iter().zip(cells.areas()).enumerate() {
             let found = way[k][0] * g[0] + way[k][1] * g[1] - (u[k] - before[k]);
-            for d in (0..2).filter(|&d| periodic[d]) {
+            let g = [g[0] * h[0], g[1] * h[1]];
+            for d in 0..2 {
                 right[d] += area * g[d] * found;
                 (0..2).for_each(|e| matrix[d][e] += area * g[d] * g[e]);
             }
         }
-        let [[a, b], [c, d]] = matrix;
-        let shift = match periodic {
-            [true, true] if a * d - b * c > SINGULAR * (a + d) * (a + d) => {
-                let determinant = a * d - b * c;
-                [(d * right[0] - b * right[1]) / determinant, (a * right[1] - c * right[0]) / determinant]
+        let [[a, b], [_, d]] = matrix;
+        let determinant = a * d - b * b;
+        // u that hardly changes along an axis tells nothing of a shift there
+        let told = [a, d].map(|own| own > SINGULAR * (a + d));
+        let shift = match [periodic[0] && told[0], periodic[1] && told[1]] {
+            [true, true] if determinant > SINGULAR * (a + d) * (a + d) => {
+                [(d * right[0] - b * right[1]) / determinant, (a * right[1] - b * right[0]) / determinant]
             }
-            // along one axis, or, where u hardly changes along some direction, across it
-            [true, true] if a + d > 0.0 => right.map(|r| r / (a + d)),
-            [true, false] if a > 0.0 => [right[0] / a, 0.0],
-            [false, true] if d > 0.0 => [0.0, right[1] / d],
-            _ => [0.0; 2],
+            // nor does u that hardly changes along a line, but across it
+            [true, true] => right.map(|r| r / (a + d)),
+            [true, false] => [right[0] / a, 0.0],
+            [false, true] => [0.0, right[1] / d],
+            [false, false] => [0.0; 2],
         };
+        let shift = [shift[0] * h[0], shift[1] * h[1]];
         let extent = mesh.extent();
         [0, 1].map(|d| {
             let mean = sum(way.iter().map(|way| way[d])) / way.len() as f64;
