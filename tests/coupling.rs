@@ -3,8 +3,8 @@
 use driftmesh::density::{Arclength, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh};
 use driftmesh::meshing::{Mmpde, Whole};
-use driftmesh::physics::{Burgers, Convection, Motion, Physics};
 use driftmesh::mover::Mover;
+use driftmesh::physics::{Burgers, Convection, Motion, Physics};
 use driftmesh::simulation::{Coupling, Record, Safety, Schedule, Simulation, State};
 use driftmesh::{Failure, Work};
 

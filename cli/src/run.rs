@@ -144,6 +144,14 @@ fn table(summary: &Summary) -> String {
         }
         text.push('\n');
     }
+    if let Some((t, benefit)) = summary.reports.last().and_then(|report| Some((report.t, report.benefit?))) {
+        text += &format!(
+            "benefit  interpolation error about {:.1e} on this mesh, {:.1e} on as many equal cells (t = {})\n",
+            benefit.mesh,
+            benefit.uniform,
+            terminal::moment(t)
+        );
+    }
     let last = summary.reports.last().and_then(|report| Some((report.t, report.interface?)));
     if let Some((t, interface)) = last.filter(|(_, interface)| interface.points > 0) {
         text += &interfaces(t, &interface);

@@ -8,12 +8,19 @@ use serde::{Deserialize, Serialize};
 /// The root of the slope, over its mean: no number to set
 ///
 /// ```text
-/// ρ = 1 + 4 √|∇u| / ⟨√|∇u|⟩,   ⟨·⟩ the mean over the domain
+/// ρ = 1 + 4 s r / ⟨r⟩,   r = max(√|∇u| − b, 0),   b = ⟨|∇u|^⅛⟩⁴,   ⟨·⟩ the mean over the domain
 /// ```
 ///
-/// with ∇u in each mesh cell, then round(8 (N/41²)) passes of the (1 2 1)⊗(1 2 1)/16 filter over cells, at least one, N
-/// the number of nodes. A layer of any width then gets the same share of the nodes, about half of them: the mean of the
-/// root falls with the width as fast as its largest value grows. Where u is constant, ρ = 1.
+/// with ∇u in each mesh cell, per uniform cell along each axis: |∇u|² = (h_x u_x)² + (h_y u_y)², so that a box of any shape is
+/// treated alike. A layer of any width gets the same share of the nodes, about half of them: the mean of the root falls with
+/// the width as fast as its largest value grows. The background b is 0 where u is flat outside its layers, and takes out the
+/// slopes between the shocks of a saw tooth, which would share the nodes otherwise.
+///
+/// The need s is 0 where u changes by less than a fifth of its range over a uniform cell everywhere: equal cells resolve it.
+/// It is 1 where u changes by more than half of its range over one somewhere. The largest ρ over the smallest is at most 10⁶.
+///
+/// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a twentieth of
+/// the domain. Their cost does not depend on their number. Where u is constant, ρ = 1.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RootGradient {
@@ -25,7 +32,8 @@ pub struct RootGradient {
 
 /// Share of the layer in the density.
 const BETA: f64 = 4.0;
-/// A layer at least this part of a uniform cell's... share: a uniform mesh resolves it.
+/// Changes of u over a uniform cell, as shares of its range, that equal cells resolve at most, and that take the whole
+/// density at least: a layer of tanh is interpolated to 0.8 % of its range at the first and to 5 % at the second.
 const RESOLVED: f64 = 0.2;
 const UNRESOLVED: f64 = 0.5;
 /// The largest ρ over the smallest, before it is smoothed.
@@ -59,7 +67,8 @@ impl Monitor for RootGradient {
             (*root, *area) = (slope.sqrt(), 0.5 * twice);
         }
         let domain = sum(areas.iter().copied());
-        let mean = |of: &dyn Fn(f64) -> f64| sum(roots.iter().zip(&areas).map(|(root, area)| of(*root) * area)) / domain;
+        let mean =
+            |of: &dyn Fn(f64) -> f64| sum(roots.iter().zip(&areas).map(|(root, area)| of(*root) * area)) / domain;
         let background = mean(&|root| root.sqrt().sqrt()).powi(4);
         let excess = |root: f64| (root - background).max(0.0);
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
@@ -97,8 +106,7 @@ impl Monitor for RootGradient {
     }
 }
 
-/// How much of the density is needed where u changes by this share of its range over a uniform cell at most: nothing below
-/// a tenth, all of it from four tenths on.
+/// s where u changes by this share of its range over a uniform cell at most.
 fn need(share: f64) -> f64 {
     let s = ((share - RESOLVED) / (UNRESOLVED - RESOLVED)).clamp(0.0, 1.0);
     s * s * (3.0 - 2.0 * s)

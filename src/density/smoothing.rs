@@ -161,7 +161,8 @@ mod tests {
             let most = direct.iter().copied().fold(0.0, f64::max);
             let off = direct.iter().zip(&wide).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             assert!(off < 0.06 * most, "{n} cells, {passes} passes: off by {off} of {most}");
-            let moment = |v: &[f64], p: i32, c: f64| v.iter().enumerate().map(|(i, v)| v * (i as f64 - c).powi(p)).sum::<f64>();
+            let moment =
+                |v: &[f64], p: i32, c: f64| v.iter().enumerate().map(|(i, v)| v * (i as f64 - c).powi(p)).sum::<f64>();
             let variance = |v: &[f64]| moment(v, 2, moment(v, 1, 0.0));
             let ratio = variance(&wide) / variance(&direct);
             assert!((ratio - 1.0).abs() < 0.03, "{n} cells, {passes} passes: variances differ by {ratio}");

@@ -134,12 +134,26 @@ impl Mover {
         let generator = self.generator.as_mut();
         self.care.persist(retries, |substeps, smoothing| {
             let parts = stride.parts * substeps;
-            relaxed(generator, &equation, &predicted.mesh, &retries::smoother(&predicted.mesh, rho, smoothing), stride.dt, parts)
+            relaxed(
+                generator,
+                &equation,
+                &predicted.mesh,
+                &retries::smoother(&predicted.mesh, rho, smoothing),
+                stride.dt,
+                parts,
+            )
         })
     }
 
     /// What the next step goes on from; `made` are the density that moved the mesh, and the u that it was made of.
-    pub(crate) fn learn(&self, gait: &Gait, predicted: &Predicted, mesh: &Mesh<2>, made: [Vec<f64>; 2], stride: Stride) -> Gait {
+    pub(crate) fn learn(
+        &self,
+        gait: &Gait,
+        predicted: &Predicted,
+        mesh: &Mesh<2>,
+        made: [Vec<f64>; 2],
+        stride: Stride,
+    ) -> Gait {
         let gains = [self.equation.relaxation.prediction() * stride.dt / stride.scale, stride.share];
         let chooses = self.equation.relaxation == Relaxation::Auto;
         gait.after(predicted, mesh, made, gains, stride.dt, chooses)

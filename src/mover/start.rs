@@ -37,7 +37,7 @@ const AT_REST: f64 = 4e-3;
 /// changes: data that jump would draw all nodes together without end.
 ///
 /// # Errors
-/// What `followed` returns, which gives u and the density of a mesh. 
+/// What `followed` returns, which gives u and the density of a mesh.
 pub fn adapted(
     mesh: Mesh<2>,
     form: Form,

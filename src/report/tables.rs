@@ -28,7 +28,7 @@ const MANY: usize = 8;
 const SHOWN: usize = 250;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 49] = [
+const NAMES: [(&str, &str, &str); 51] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -46,6 +46,12 @@ const NAMES: [(&str, &str, &str); 49] = [
     ("quality.error_linf", "distance from the continuous mesh", "largest, of up to a thousand nodes"),
     ("conserved.mass", "integral of the first unknown", ""),
     ("conserved.drift", "change of the integral", "since the start, over its size there"),
+    (
+        "benefit.mesh",
+        "interpolation error of this mesh",
+        "largest, of what the mesh follows: estimated from every other node",
+    ),
+    ("benefit.uniform", "interpolation error of equal cells", "the same for as many equal cells"),
     ("interface.points", "points between subdomains", ""),
     ("interface.standard_error", "standard error of these points", "root mean square over both coordinates"),
     ("interface.noise", "… over the shortest edge", ""),

@@ -6,10 +6,10 @@ use crate::meshing::{
     Decomposition, Estimator, EstimatorKind, GridWalk, Interpolation, MeshGenerator, MeshOperator, Mmpde, MonteCarlo,
     Moved, Placement, Problem, ResidualWalk, Stochastic, Whole, move_sides,
 };
+use crate::mover::Mover;
 use crate::numerics::linear::{Robust, Smoother};
 use crate::physics::{Burgers, Convection};
 use crate::setting::Auto;
-use crate::mover::Mover;
 use crate::simulation::{Coupling, Record, Safety, Schedule, Simulation};
 use crate::work::Work;
 use std::time::Instant;

@@ -47,9 +47,10 @@ pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span
         }
         patch.wrap(&mut second);
         let off = |k: usize, d: usize| swept[k][d] * (second[k][d] + second[k + strides[d]][d]) / 16.0;
-        let harms = patch.places().zip(end.areas()).map(|(k, area)| {
-            (0..2).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area
-        });
+        let harms = patch
+            .places()
+            .zip(end.areas())
+            .map(|(k, area)| (0..2).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
         let slopes = metrics.gradient(&values).into_iter().map(|g| (g[0] * h[0]).hypot(g[1] * h[1]));
         let over_cell = slopes.fold(0.0, larger) / range;

@@ -1,5 +1,6 @@
 //! The time loop: mesh, then physics, then whoever watches.
 
+mod benefit;
 mod checkpoint;
 mod control;
 mod coupling;
@@ -10,6 +11,7 @@ mod report;
 mod safety;
 mod schedule;
 
+pub use benefit::Benefit;
 pub use checkpoint::CheckpointsAt;
 pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
 pub use coupling::Coupling;
@@ -360,7 +362,17 @@ impl Simulation {
         let size = if mass_at_start.abs() > rounding { mass_at_start.abs() } else { 1.0 };
         let drift = (mass - mass_at_start) / size;
         let (quality, error) = self.assess(state);
-        Report { t: state.t, error, quality, conserved: Conserved { mass, drift }, interface, comparison: None }
+        let followed = self.monitor.followed(state.t, &state.mesh, &state.u).ok();
+        let benefit = followed.and_then(|u| Benefit::of(&state.mesh, &u).ok());
+        Report {
+            t: state.t,
+            error,
+            quality,
+            conserved: Conserved { mass, drift },
+            interface,
+            comparison: None,
+            benefit,
+        }
     }
 }
 

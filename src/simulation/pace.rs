@@ -1,6 +1,6 @@
 use super::control::Control;
-use super::journey::{change_in_place, range};
 use super::coupling::{Advanced, Stretch, attempt};
+use super::journey::{change_in_place, range};
 use super::safety::{Safety, divided};
 use super::schedule::{Schedule, Steps};
 use super::{Record, Simulation, State};
@@ -111,7 +111,7 @@ const GROWTH: [f64; 2] = [0.5, 1.2];
 /// A share of the longest step below which the run would take millions of steps, and how many such steps there may be in a
 /// row: what jumps at the start, or from one moment to the next, takes some.
 const SHORT: f64 = 1e-5;
-const MOST_SHORT: usize = 300;
+const MOST_SHORT: usize = 1000;
 /// A share of the longest step that is lost in rounding.
 const SHORTEST: f64 = 1e-12;
 /// Steps in a run in which nothing changes.
@@ -127,8 +127,15 @@ const OF_ROUNDING: f64 = 1e-9;
 impl Free {
     fn new(simulation: &mut Simulation, state: &State, control: Option<Control>, first: Option<f64>) -> Result<Self> {
         let ranges: Vec<f64> = (0..state.u.components()).map(|c| range(&state.u, c)).collect();
-        let free =
-            |dt: f64, longest: f64| Self { dt, longest, scale: dt, ranges: ranges.clone(), control, failures: 0, short: 0 };
+        let free = |dt: f64, longest: f64| Self {
+            dt,
+            longest,
+            scale: dt,
+            ranges: ranges.clone(),
+            control,
+            failures: 0,
+            short: 0,
+        };
         if let Some(first) = first {
             return Ok(free(first, first));
         }
@@ -195,11 +202,6 @@ impl Free {
             *largest = largest.max(range(&after.u, c));
         }
         let dt = after.t - before.t;
-        if std::env::var("DBG").is_ok() {
-            let dl = before.rho.iter().zip(&after.rho).map(|(a, b)| (b / a).ln().abs()).fold(0.0, f64::max);
-            let ch = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), self.ranges[0]);
-            eprintln!("t {:.4e} dt {:.2e} drho {:.3} change {:.4} steps {:.1} maxrho {:.2} edge {:.1e} own {:.2e}", after.t, dt, dl, ch, after.gait.steps(), after.rho.iter().fold(0.0_f64, |m, r| m.max(*r)) / after.rho.iter().fold(1e9_f64, |m, r| m.min(*r)), after.mesh.shortest_edge(), after.own_change*dt);
-        }
         // a step that was cut short to meet a report says what a whole one would have done
         let cut = self.dt / dt;
         let (taken, factor) = match (&mut self.control, &step.errors) {

@@ -4,10 +4,10 @@ use super::StefanStudy;
 use super::any::Begin;
 use super::ending::end;
 use super::stefan::Prepared;
-use crate::mover::Gait;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::geometry::{Field, quality};
 use crate::kept::{Kept, check_nodal};
+use crate::mover::Gait;
 use crate::report;
 use crate::simulation::{
     Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, Rows, RunDirectory, Schedule, Snapshot, State,

@@ -431,7 +431,7 @@ impl MovingMesh {
             && steps < STEPS_WORTH_A_WARNING
         {
             warnings.push(format!(
-                "`mesh.relaxation` is {steps} steps: below {STEPS_WORTH_A_WARNING} the mesh overshoots its density from step to step"
+                "`mesh.relaxation` is {steps} steps: below {STEPS_WORTH_A_WARNING} the mesh overshoots its density from step to step; \"auto\" finds how many it takes"
             ));
         }
         for [(at_start, initial), (on_sides, boundary)] in self.pde.starts_and_sides() {

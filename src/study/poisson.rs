@@ -1,11 +1,11 @@
 use super::ending::end;
 use super::mapped::{Grading, MappedDomain, Side, mistaken, parse};
 use super::{Header, Output};
-use crate::mover::Gait;
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Program};
 use crate::geometry::{Field, Mesh, node_areas};
 use crate::laplacian::{Laplacian, Poisson, Polynomials, Scaling, Stencils, outward, unchecked};
+use crate::mover::Gait;
 use crate::numerics::{larger, sum};
 use crate::report;
 use crate::setting::pair;
@@ -492,7 +492,10 @@ impl Solved {
         }
         let rho = vec![1.0; self.u.len()];
         let gait = Gait::at_rest(&self.mesh);
-        (names, State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, gait, own_change: 0.0 })
+        (
+            names,
+            State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, gait, own_change: 0.0 },
+        )
     }
 
     /// The mesh over the solution.

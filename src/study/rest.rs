@@ -35,6 +35,14 @@ pub(super) fn at_rest(
     let asks = moved.mesh.farthest(mesh) / cell;
     let reason = match spread(&state.rho) {
         _ if asks > ASKS => held_back(study, record),
+        // equal cells are enough
+        spread
+            if spread < FLAT
+                && matches!(study.monitor(), MonitorKind::RootGradient(_))
+                && varies(simulation, state)? =>
+        {
+            return Ok(None);
+        }
         spread if spread < FLAT => flattened(study, simulation, state, spread)?,
         _ => return Ok(None),
     };
@@ -47,6 +55,13 @@ pub(super) fn at_rest(
 fn spread(values: &[f64]) -> f64 {
     let ends = values.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(*v), high.max(*v)));
     ends.1 / ends.0
+}
+
+/// True where what the mesh follows is not constant.
+fn varies(simulation: &Simulation, state: &State) -> Result<bool> {
+    let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u)?;
+    let ends = followed.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    Ok(ends.1 - ends.0 > 1e-12 * ends.0.abs().max(ends.1.abs()))
 }
 
 fn held_back(study: &MovingMesh, record: &Record) -> String {
@@ -62,7 +77,6 @@ fn held_back(study: &MovingMesh, record: &Record) -> String {
 
 fn flattened(study: &MovingMesh, simulation: &Simulation, state: &State, spread: f64) -> Result<String> {
     let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u)?;
-    let ends = followed.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     let mut bare = study.monitor();
     let smoothing = match &mut bare {
         MonitorKind::RootGradient(_) => 0,
@@ -78,7 +92,7 @@ fn flattened(study: &MovingMesh, simulation: &Simulation, state: &State, spread:
     if none {
         return Ok("its density is constant: `monitor.strength` is 0".into());
     }
-    if ends.1 - ends.0 <= 1e-12 * ends.0.abs().max(ends.1.abs()) {
+    if !varies(simulation, state)? {
         let followed = study.monitor().of().unwrap_or("the first unknown").to_string();
         return Ok(format!(
             "its density is constant, since what it follows is: {followed}; name another in `monitor.of`"

@@ -1,7 +1,7 @@
 use crate::error::{Error, Failure};
 use crate::geometry::{Comparison, Quality};
 use crate::meshing::Interface;
-use crate::simulation::Retries;
+use crate::simulation::{Benefit, Retries};
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
@@ -141,6 +141,9 @@ pub struct Report {
     /// Where the study compares with another generator.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub comparison: Option<Comparison>,
+    /// What adaptation brought.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub benefit: Option<Benefit>,
 }
 
 /// Error against the exact solution.
