@@ -110,6 +110,23 @@ fn a_moving_front_is_followed_with_nothing_set() {
     assert!(errors[errors.len() / 2] <= 0.06, "median {}", errors[errors.len() / 2]);
 }
 
+/// A layer takes the same share of the nodes whatever its width, and whatever changes outside it.
+#[test]
+fn a_layer_has_the_same_share_of_the_nodes_whatever_its_width() {
+    let share = |w: f64, slope: f64| {
+        let mut inside = 0;
+        let u = |[x, _]: [f64; 2], _| (w * (x - 0.5)).tanh() - slope * (x - 0.5);
+        follow(Lattice::bounded([60, 4]).unwrap(), [1.0, 0.1], 300, u, |n, mesh, _| {
+            if n == 299 {
+                inside = mesh.x().iter().filter(|x| (x[0] - 0.5).abs() < 4.0 / w).count();
+            }
+        });
+        inside as f64 / (61.0 * 5.0)
+    };
+    let shares = [share(60.0, 0.0), share(240.0, 0.0), share(960.0, 0.0), share(240.0, 2.0)];
+    assert!(shares.iter().all(|share| (0.4..0.7).contains(share)), "{shares:?}");
+}
+
 /// Noise, single hot nodes and steps, with contrasts up to 10⁶, on lattices and boxes of any shape: no step folds.
 #[test]
 fn no_data_folds_a_mesh() {

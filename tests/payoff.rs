@@ -126,7 +126,7 @@ fn a_jump_on_the_sides_is_named() {
     let jump = "pde={kind=\"burgers\",viscosity=0.01,initial=\"if(x<0.3,0,1)\",boundary=\"if(x<0.3,0,1)\"}";
     let study = front(0.01, 20, 1.0, &[jump]);
     let (record, failure) = compute(&study).unwrap();
-    assert!(record.warnings[0].contains("the mesh does not come to rest"), "{:?}", record.warnings);
+    assert!(record.warnings[0].contains("the initial solution jumps"), "{:?}", record.warnings);
     let failure = failure.unwrap();
     assert!(failure.to_string().contains("automatic time steps shrank"), "{failure}");
     assert!(
@@ -136,12 +136,12 @@ fn a_jump_on_the_sides_is_named() {
     );
 }
 
-/// A jump at the start alone is smoothed out: a warning, and the run completes. Steps that failed are counted.
+/// A jump at the start alone is smoothed out: a warning, and the run completes.
 #[test]
 fn a_jump_at_the_start_is_smoothed_out() {
     let jump = "pde={kind=\"burgers\",viscosity=0.01,initial=\"if(abs(x-0.4)+abs(y-0.4)<0.2,1,0.2)\",boundary=\"0.2\"}";
     let (record, failure) = compute(&front(0.01, 20, 0.5, &[jump])).unwrap();
     assert!(failure.is_none(), "{failure:?}");
-    assert!(record.warnings[0].contains("the mesh does not come to rest"), "{:?}", record.warnings);
-    assert!(record.work.rejected_steps > 0 && record.work.steps < 300, "{:?}", record.work);
+    assert!(record.warnings[0].contains("the initial solution jumps"), "{:?}", record.warnings);
+    assert!(record.work.steps < 300, "{:?}", record.work);
 }

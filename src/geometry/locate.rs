@@ -160,9 +160,11 @@ mod tests {
         let lattice = Lattice::new([16, 8], [true, false]).unwrap();
         let mesh = Mesh::uniform(lattice, [0.0, 0.0], [1.0, 1.0]).unwrap();
         let values: Vec<f64> = mesh.x().iter().map(|[x, _]| (2.0 * std::f64::consts::PI * x).cos()).collect();
-        let shifted = mesh.moved(mesh.x().iter().map(|&[x, y]| [x - 0.25, y]).collect()).unwrap();
-        for (found, [x, _]) in interpolate(&mesh, &values, &shifted).iter().zip(shifted.x()) {
-            assert!((found - (2.0 * std::f64::consts::PI * x).cos()).abs() < 1e-12);
+        for shift in [-0.25, 0.5, 3.0, -7.0625, 100.5] {
+            let shifted = mesh.moved(mesh.x().iter().map(|&[x, y]| [x + shift, y]).collect()).unwrap();
+            for (found, [x, _]) in interpolate(&mesh, &values, &shifted).iter().zip(shifted.x()) {
+                assert!((found - (2.0 * std::f64::consts::PI * x).cos()).abs() < 1e-12, "after {shift}");
+            }
         }
     }
 }

@@ -223,6 +223,24 @@ mod tests {
         assert!(carried.iter().all(|u| u / f64::MAX > 1.0 - 1e-14));
     }
 
+    /// A periodic mesh that went around any number of times, and by whole cells, has the very values of the nodes that it
+    /// meets.
+    #[test]
+    fn meshes_that_drifted_by_periods_are_carried_to() {
+        let mesh = bent(16, true, 0.0);
+        let wave = |mesh: &Mesh<2>| -> Vec<f64> {
+            mesh.x().iter().map(|[x, y]| (2.0 * PI * x).sin() + (2.0 * PI * y).cos()).collect()
+        };
+        for shift in [[0.3125, 0.0], [0.5, 0.0625], [1.0, -0.75], [4.25, 2.5], [-7.6875, 0.0]] {
+            let drifted = mesh.moved(mesh.x().iter().map(|x| [x[0] + shift[0], x[1] + shift[1]]).collect()).unwrap();
+            for (from, to) in [(&mesh, &drifted), (&drifted, &mesh)] {
+                let carried = remap(from, &wave(from), to).unwrap();
+                let off = carried.iter().zip(wave(to)).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+                assert!(off < 1e-12, "off by {off:e} after {shift:?}");
+            }
+        }
+    }
+
     /// Meshes that are no meshes are named instead of being carried to.
     #[test]
     fn a_folded_mesh_is_refused() {

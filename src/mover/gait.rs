@@ -31,7 +31,7 @@ pub struct Gait {
 /// A step of a mesh, for what the next one finds of its density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Last {
-    dt: f64,
+    took: f64,
     /// Where each node went.
     way: Vec<[f64; 2]>,
     /// What the mesh follows, at its start.
@@ -125,7 +125,7 @@ impl Gait {
         }
         let ways = predicted.velocity.iter().zip(&correction);
         let way = ways.map(|(v, e)| [0, 1].map(|d| dt * v[d] + e[d])).collect();
-        Self { velocity, correction, steps, rho, last: Some(Last { dt, way, u }) }
+        Self { velocity, correction, steps, rho, last: Some(Last { took: dt, way, u }) }
     }
 
     /// The velocity with which u, what the mesh follows, moves as a whole along periodic axes, 0 along others
@@ -135,7 +135,7 @@ impl Gait {
     /// equidistributed as it was.
     fn drift(&self, mesh: &Mesh<2>, u: &[f64]) -> [f64; 2] {
         let periodic = mesh.lattice().periodic();
-        let Some(Last { dt, way, u: before }) = self.last.as_ref().filter(|last| last.u.len() == u.len()) else {
+        let Some(Last { took, way, u: before }) = self.last.as_ref().filter(|last| last.u.len() == u.len()) else {
             return [0.0; 2];
         };
         let middle: Vec<f64> = u.iter().zip(before).map(|(a, b)| 0.5 * (a + b)).collect();
@@ -171,7 +171,7 @@ impl Gait {
         [0, 1].map(|d| {
             let mean = sum(way.iter().map(|way| way[d])) / way.len() as f64;
             match periodic[d] {
-                true => shift[d].clamp(mean - FARTHEST * extent[d], mean + FARTHEST * extent[d]) / dt,
+                true => shift[d].clamp(mean - FARTHEST * extent[d], mean + FARTHEST * extent[d]) / took,
                 false => 0.0,
             }
         })
@@ -187,11 +187,11 @@ impl Gait {
         if !self.rho.is_empty() {
             check_nodal("last density", self.rho.as_chunks::<1>().0, nodes)?;
         }
-        if let Some(Last { dt, way, u }) = &self.last {
+        if let Some(Last { took, way, u }) = &self.last {
             check_nodal("last way", way, nodes)?;
             check_nodal("solution before", u.as_chunks::<1>().0, nodes)?;
-            if !(dt.is_finite() && *dt > 0.0) {
-                return Err(Unfit::Damaged(format!("its last mesh step is {dt} long")));
+            if !(took.is_finite() && *took > 0.0) {
+                return Err(Unfit::Damaged(format!("its last mesh step is {took} long")));
             }
         }
         match self.rho.iter().all(|rho| *rho > 0.0) && self.steps.is_finite() && self.steps > 0.0 {
