@@ -3,7 +3,7 @@ use crate::mesh::{Given, nodal, nodes};
 use crate::threads::compute;
 use driftmesh::Failure;
 use driftmesh::density::{Monitor, MonitorKind};
-use driftmesh::geometry::Mesh;
+use driftmesh::geometry::{Mesh, check_unfolded};
 use driftmesh::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
 use driftmesh::mover::{Followed, Gait, Mover, Step};
 use driftmesh::study::{MeshForm, MeshTable, Source};
@@ -110,6 +110,7 @@ impl Generator {
 
 impl Parts {
     fn step(&mut self, mesh: &Mesh<2>, u: &[f64], dt: f64) -> Result<Step, Failure> {
+        check_unfolded(mesh)?;
         let gait = match self.last.take() {
             Some((last, gait)) if last == *mesh => gait,
             _ => Gait::at_rest(mesh),

@@ -82,7 +82,7 @@ def test_monitors_by_name_by_array_and_by_function_are_the_same():
 )
 def test_subdomains_give_the_mesh_of_the_whole_domain(method):
     """Within six standard errors; paths are continuous in time and have a bias besides."""
-    whole, divided, again = (MeshGenerator(Arclength(), m, form="gradient") for m in (Whole(), method, method))
+    whole, divided, again = (MeshGenerator(Arclength(), m, 1.0, "gradient") for m in (Whole(), method, method))
     mesh = follow(divided, steps=1, dt=1e-3)
     interface = divided.last["interface"]
     bias = 1e-3 if isinstance(getattr(method, "estimator", None), MonteCarlo) else 1e-9
@@ -97,7 +97,7 @@ def test_a_mesh_may_stay():
 
 def test_periodic_meshes_stay_closed():
     mesh = Mesh.uniform(cells=(16, 12), lower=(-1, 0), periodic=(True, True))
-    generator = MeshGenerator(relaxation=0.1)
+    generator = MeshGenerator(Arclength(), relaxation=0.1)
     for step in range(5):
         mesh = generator.step(mesh, np.sin(np.pi * (mesh.x - 0.1 * step)) + np.sin(2 * np.pi * mesh.y), 0.02)
     np.testing.assert_array_equal(mesh.x[-1], mesh.x[0] + 2)
