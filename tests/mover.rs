@@ -384,3 +384,16 @@ fn formulas_see_the_image_of_a_node() {
     let given = 0.1 * 3.0 * 0.1 * PI.sqrt();
     assert!((content / given - 1.0).abs() < 2e-2, "{content} of {given}");
 }
+
+/// A mesh that is fixed stays, on periodic axes too, where others go along with what they follow.
+#[test]
+fn a_fixed_mesh_stays() {
+    let wave = problem("a wave", TORUS, [0.0, 0.2], AROUND, "sin(2*pi*(x - T))");
+    let study = wave.study(&["mesh.generator.kind=fixed"]);
+    let mut simulation = study.simulation().unwrap();
+    let mut record = Record::default();
+    let mut state = study.start(&simulation, &mut record, &mut []).unwrap();
+    let mesh = state.mesh.clone();
+    simulation.run(&mut state, &mut record, &mut []).unwrap();
+    assert_eq!(state.mesh, mesh);
+}

@@ -14,4 +14,8 @@ impl MeshGenerator for Fixed {
     fn step(&mut self, _: &Mmpde, mesh: &Mesh<2>, _rho: &[f64], _dt: f64) -> Result<Moved, Failure> {
         Ok(Moved { mesh: mesh.clone(), work: Work::default(), interface: None })
     }
+
+    fn moves(&self) -> bool {
+        false
+    }
 }

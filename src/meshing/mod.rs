@@ -39,6 +39,11 @@ pub trait MeshGenerator: Send {
     /// A [`Failure`] where a system cannot be solved or the arrays do not fit.
     fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure>;
 
+    /// False for a mesh that stays, which nothing predicts either.
+    fn moves(&self) -> bool {
+        true
+    }
+
     /// Puts what it carries from step to step into a checkpoint; nothing where steps depend on their arguments alone.
     fn keep(&self, _kept: &mut Kept) {}
 

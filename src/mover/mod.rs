@@ -117,7 +117,8 @@ impl Mover {
 
     /// Where the mesh goes by itself.
     pub(crate) fn predict(&self, mesh: &Mesh<2>, gait: &Gait, u: &[f64], stride: Stride) -> Result<Predicted, Failure> {
-        Predicted::after(mesh, gait, u, self.equation.relaxation.prediction() * stride.dt / stride.scale, stride.dt)
+        let prediction = if self.generator.moves() { self.equation.relaxation.prediction() } else { 0.0 };
+        Predicted::after(mesh, gait, u, prediction * stride.dt / stride.scale, stride.dt)
     }
 
     /// A step of the mesh equation from the predicted mesh, with as much care as it needs. What it fails with is what it
