@@ -24,7 +24,8 @@ impl Check {
             }
         };
         study.warnings()?.iter().for_each(|warning| warn(warning));
-        if let Err(error) = study.start(&study.simulation()?, &mut driftmesh::simulation::Record::default(), &mut []) {
+        // on equal cells: adapting the mesh is part of the run
+        if let Err(error) = study.simulation()?.start(study.uniform_mesh()?) {
             return Ok(complain(&error, study.remedy(&error).or_else(|| error.help()), None));
         }
         Ok(valid(&study.to_toml(), study.memory()))

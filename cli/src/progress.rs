@@ -2,17 +2,24 @@ use crate::terminal;
 use driftmesh::simulation::{Advance, Event, Observer, Snapshot, State};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write, stderr};
+use std::time::{Duration, Instant};
 
-/// A live bar on a terminal, ten plain lines elsewhere: time, step, rate, smallest corner Jacobian, time that remains.
+/// A live bar on a terminal, ten plain lines elsewhere: time, step, rate, smallest corner Jacobian, time that remains
+///
+/// Before, while the mesh adapts to the initial solution, its steps are told of every few seconds.
 pub struct Progress {
     bar: Option<ProgressBar>,
     /// Pieces of the run that were told of.
     told: usize,
+    /// Steps in which the mesh adapted, and when they were told of.
+    adapting: (usize, Instant),
 }
 
 /// Pieces of a run: of the bar, and as lines.
 const OF_THE_BAR: usize = 500;
 const LINES: usize = 10;
+/// Between two lines about a mesh that adapts.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 impl Progress {
     pub fn new() -> Self {
@@ -21,7 +28,7 @@ impl Progress {
                 ProgressStyle::with_template("{percent:>3} %  {msg}  {wide_bar}").expect("the template is valid");
             ProgressBar::new(0).with_style(style)
         });
-        Self { bar, told: 0 }
+        Self { bar, told: 0, adapting: (0, Instant::now()) }
     }
 
     /// Clears the bar, so that what follows begins on a clean line.
@@ -59,6 +66,21 @@ impl Observer for Progress {
         let (State { t, step, .. }, quality) = (snapshot.state, snapshot.quality);
         let Snapshot { steps, share, seconds, .. } = *snapshot;
         self.show(event, &Advance { t: *t, step: *step, steps, share, smallest: quality.min_scaled_jacobian, seconds });
+        Ok(())
+    }
+
+    fn adapting(&mut self, _state: &State) -> driftmesh::Result<()> {
+        let (steps, told) = &mut self.adapting;
+        *steps += 1;
+        let words = || format!("adapting the mesh to the initial solution: step {steps}");
+        match &self.bar {
+            Some(bar) => bar.set_message(words()),
+            None if told.elapsed() > PATIENCE => {
+                let _ = writeln!(stderr(), "{}", words());
+                *told = Instant::now();
+            }
+            None => {}
+        }
         Ok(())
     }
 

@@ -48,52 +48,59 @@ impl Monitor for RootGradient {
         let lattice = mesh.lattice();
         let ([n, m], periodic) = (lattice.cells(), lattice.periodic());
         let (x, values) = (mesh.closed(), lattice.closed(u));
-        let size = values.iter().fold(0.0, |m, u| larger(m, *u));
         let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
-        let range = high - low;
+        let (range, size) = (high - low, high.max(-low));
         let h = [0, 1].map(|d| mesh.extent()[d] / lattice.cells()[d] as f64);
-        let mut roots = vec![0.0; n * m];
-        let mut areas = vec![0.0; n * m];
+        let cells = || (0..n).flat_map(|i| i * (m + 1)..i * (m + 1) + m);
+        // the four corners of a cell and its diagonals
+        let corners = |k: usize| [k, k + m + 2, k + 1, k + m + 1];
+        let diagonals = |[a, c, b, d]: [usize; 4]| (minus(x[c], x[a]), minus(x[b], x[d]));
+        let twice_area = |([px, py], [qx, qy]): ([f64; 2], [f64; 2])| px * qy - py * qx;
+        let mut rho = Vec::with_capacity(n * m);
         let mut steepest = 0.0;
-        let cells = (0..n).flat_map(|i| i * (m + 1)..i * (m + 1) + m);
-        for (k, (root, area)) in cells.zip(roots.iter_mut().zip(&mut areas)) {
-            let [low, high, left, right] = [k, k + m + 2, k + 1, k + m + 1];
-            let ([px, py], [qx, qy]) = (minus(x[high], x[low]), minus(x[left], x[right]));
-            let (p, q) = (values[high] - values[low], values[left] - values[right]);
-            let twice = px * qy - py * qx;
+        let domain = mesh.extent()[0] * mesh.extent()[1];
+        let background = sum(cells().map(|k| {
+            let corners @ [a, c, b, d] = corners(k);
+            let diagonals = diagonals(corners);
+            let ([px, py], [qx, qy]) = diagonals;
+            let (p, q) = (values[c] - values[a], values[b] - values[d]);
+            let twice = twice_area(diagonals);
             let (gx, gy) = (h[0] * (p * qy - q * py), h[1] * (q * px - p * qx));
             let slope = (gx * gx + gy * gy).sqrt() / twice;
             steepest = larger(steepest, slope);
-            (*root, *area) = (slope.sqrt(), 0.5 * twice);
-        }
-        let domain = sum(areas.iter().copied());
-        let mean =
-            |of: &dyn Fn(f64) -> f64| sum(roots.iter().zip(&areas).map(|(root, area)| of(*root) * area)) / domain;
-        let background = mean(&|root| root.sqrt().sqrt()).powi(4);
+            let root = slope.sqrt();
+            rho.push(root);
+            0.5 * twice * root.sqrt().sqrt()
+        }));
+        let background = (background / domain).powi(4);
         let excess = |root: f64| (root - background).max(0.0);
+        let areas = cells().map(|k| 0.5 * twice_area(diagonals(corners(k))));
+        let mean = sum(rho.iter().zip(areas).map(|(root, area)| excess(*root) * area)) / domain;
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
-        let mean = mean(&excess).max(BETA * excess(steepest.sqrt()) / CONTRAST);
+        let mean = mean.max(BETA * excess(steepest.sqrt()) / CONTRAST);
         if mean <= ROUNDING * background || steepest * n.max(m) as f64 <= ROUNDING * size {
             return Ok(vec![1.0; lattice.len()]);
         }
         let beta = BETA * need(steepest / range);
-        let mut rho: Vec<f64> = roots.iter().map(|root| 1.0 + beta * excess(*root) / mean).collect();
+        rho.iter_mut().for_each(|root| *root = 1.0 + beta * excess(*root) / mean);
         // from cells to nodes and back is a pass
         let passes = [n, m].map(|n| ((PASSES * ((n + 1) as f64 / 41.0).powi(2)).round() - 1.0).max(0.0));
         smooth_widely([n, m], periodic, &mut rho, passes);
-        let nodal: Vec<f64> = (0..lattice.len())
-            .map(|k| {
-                let node = lattice.node(k);
-                let beside = |d: usize, cells: usize| match (periodic[d], node[d]) {
-                    (true, 0) => [cells - 1, 0],
-                    (false, 0) => [0, 0],
-                    (false, i) if i == cells => [cells - 1, cells - 1],
-                    (_, i) => [i - 1, i],
-                };
-                let ([a, b], [c, d]) = (beside(0, n), beside(1, m));
-                0.25 * ((rho[a * m + c] + rho[b * m + d]) + (rho[a * m + d] + rho[b * m + c]))
-            })
-            .collect();
+        // the cells on both sides of node i along an axis of n cells
+        let beside = |i: usize, n: usize, wraps: bool| match i {
+            0 if wraps => [n - 1, 0],
+            0 => [0, 0],
+            i if i == n => [n - 1, n - 1],
+            i => [i - 1, i],
+        };
+        let [rows, columns] = lattice.nodes();
+        let columns: Vec<[usize; 2]> = (0..columns).map(|j| beside(j, m, periodic[1])).collect();
+        let mut nodal = Vec::with_capacity(lattice.len());
+        for i in 0..rows {
+            let [below, above] = beside(i, n, periodic[0]).map(|i| &rho[i * m..(i + 1) * m]);
+            let means = columns.iter().map(|&[c, d]| 0.25 * ((below[c] + above[d]) + (below[d] + above[c])));
+            nodal.extend(means);
+        }
         match nodal.iter().position(|rho| !rho.is_finite()) {
             None => Ok(nodal),
             Some(k) => Err(Failure::NonFinite {

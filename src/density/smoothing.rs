@@ -13,10 +13,10 @@ use crate::geometry::Lattice;
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: usize) {
-    let mut source = Vec::with_capacity(values.len());
-    for axis in (0..passes).flat_map(|_| 0..D) {
-        let pencils = Pencils::of(lattice.nodes(), axis, lattice.periodic()[axis]);
-        pencils.pass(values, &mut source, 1.0);
+    for axis in 0..D {
+        along(lattice.nodes(), axis, values, |lines| {
+            (0..passes).for_each(|_| pass(lines, lattice.periodic()[axis], 1.0));
+        });
     }
 }
 
@@ -29,12 +29,11 @@ pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: 
 pub(super) fn smooth_widely<const D: usize>(
     size: [usize; D],
     periodic: [bool; D],
-    values: &mut Vec<f64>,
+    values: &mut [f64],
     passes: [f64; D],
 ) {
-    let mut source = Vec::with_capacity(values.len());
     for axis in 0..D {
-        Pencils::of(size, axis, periodic[axis]).spread(values, &mut source, passes[axis]);
+        along(size, axis, values, |lines| spread(lines, periodic[axis], passes[axis]));
     }
 }
 
@@ -42,76 +41,99 @@ pub(super) fn smooth_widely<const D: usize>(
 const MOST_PASSES: f64 = 15.0;
 /// The fewest cells along an axis that are halved.
 const FEWEST_HALVED: usize = 4;
+/// Lines that are filtered side by side: all that is done to them is done within the cache.
+const LANES: usize = 16;
+/// Values of a line that are read at once where they are neighbours in memory: what one fetch brings.
+const PIECE: usize = 8;
 
-/// A grid of values seen along one axis: blocks of `len` rows of `stride` values.
-#[derive(Clone, Copy)]
-struct Pencils {
-    len: usize,
-    stride: usize,
-    wraps: bool,
+/// The values at one place of some lines.
+type Row = [f64; LANES];
+
+/// Filters all lines along an axis of a grid, [`LANES`] at a time.
+fn along<const D: usize>(size: [usize; D], axis: usize, values: &mut [f64], mut filter: impl FnMut(&mut [Row])) {
+    let n = size[axis];
+    let stride: usize = size[axis + 1..].iter().product();
+    // lines that are runs in memory are read and written in pieces, others across
+    let piece = if stride == 1 { PIECE } else { 1 };
+    let count = values.len() / n;
+    let mut lines = vec![[0.0; LANES]; n];
+    for first in (0..count).step_by(LANES) {
+        let lanes = LANES.min(count - first);
+        let starts: [usize; LANES] = std::array::from_fn(|lane| {
+            let line = first + lane;
+            line / stride * stride * n + line % stride
+        });
+        let starts = &starts[..lanes];
+        for (p, rows) in lines.chunks_mut(piece).enumerate() {
+            for (lane, start) in starts.iter().enumerate() {
+                for (i, row) in rows.iter_mut().enumerate() {
+                    row[lane] = values[start + (p * piece + i) * stride];
+                }
+            }
+        }
+        filter(&mut lines);
+        for (p, rows) in lines.chunks(piece).enumerate() {
+            for (lane, start) in starts.iter().enumerate() {
+                for (i, row) in rows.iter().enumerate() {
+                    values[start + (p * piece + i) * stride] = row[lane];
+                }
+            }
+        }
+    }
 }
 
-impl Pencils {
-    fn of<const D: usize>(size: [usize; D], axis: usize, wraps: bool) -> Self {
-        Self { len: size[axis], stride: size[axis + 1..].iter().product(), wraps }
+/// One pass (1 2 1)/4, or the share of it that has so much of its variance.
+fn pass(lines: &mut [Row], wraps: bool, share: f64) {
+    let (own, beside) = (4.0 / share - 2.0, 0.25 * share);
+    let (first, last) = (lines[0], lines[lines.len() - 1]);
+    let mut below = if wraps { last } else { first };
+    for i in 0..lines.len() {
+        let row = lines[i];
+        let above = *lines.get(i + 1).unwrap_or(if wraps { &first } else { &row });
+        lines[i] = std::array::from_fn(|k| beside * (below[k] + own * row[k] + above[k]));
+        below = row;
     }
+}
 
-    /// One pass (1 2 1)/4, or the share of it that has so much of its variance.
-    fn pass(self, values: &mut [f64], source: &mut Vec<f64>, share: f64) {
-        let Self { len: n, stride: s, wraps } = self;
-        source.clear();
-        source.extend_from_slice(values);
-        let (own, beside) = (4.0 / share - 2.0, 0.25 * share);
-        for (f, out) in source.chunks_exact(s * n).zip(values.chunks_exact_mut(s * n)) {
-            let ends = if wraps { [n - 1, 0] } else { [0, n - 1] };
-            let row = |i: usize| &f[i * s..(i + 1) * s];
-            for (i, out) in out.chunks_exact_mut(s).enumerate() {
-                let below = row(if i == 0 { ends[0] } else { i - 1 });
-                let above = row(if i + 1 == n { ends[1] } else { i + 1 });
-                for (((out, f), b), a) in out.iter_mut().zip(row(i)).zip(below).zip(above) {
-                    *out = beside * (b + own * f + a);
-                }
+fn spread(lines: &mut [Row], wraps: bool, passes: f64) {
+    let n = lines.len();
+    if passes < MOST_PASSES || n < FEWEST_HALVED {
+        // after 4 n² passes nothing but the mean is left along the axis
+        let passes = passes.min((4 * n * n) as f64);
+        (0..passes as usize).for_each(|_| pass(lines, wraps, 1.0));
+        if passes.fract() > 0.0 {
+            pass(lines, wraps, passes.fract());
+        }
+        return;
+    }
+    pass(lines, wraps, 1.0);
+    let mut coarse = vec![[0.0; LANES]; n.div_ceil(2)];
+    let ratio = n as f64 / coarse.len() as f64;
+    average(lines, &mut coarse);
+    // two passes here, and the means of `ratio` cells twice, each of variance (ratio² − 1)/12
+    spread(&mut coarse, wraps, (passes - 2.0 - (ratio * ratio - 1.0) / 3.0) / (ratio * ratio));
+    average(&coarse, lines);
+    pass(lines, wraps, 1.0);
+}
+
+/// The mean over each cell of another grid along the same lines, values being constant in cells.
+fn average(from: &[Row], to: &mut [Row]) {
+    let (n, m) = (from.len(), to.len());
+    // in units of 1/(n m) of the axis, cell i is [i m, (i + 1) m] and cell j is [j n, (j + 1) n]
+    let mut i = 0;
+    for (j, to) in to.iter_mut().enumerate() {
+        *to = [0.0; LANES];
+        let (begin, end) = (j * n, (j + 1) * n);
+        loop {
+            let shared = ((i + 1) * m).min(end) - (i * m).max(begin);
+            let weight = shared as f64 / n as f64;
+            to.iter_mut().zip(&from[i]).for_each(|(to, from)| *to += weight * from);
+            let over = (i + 1) * m;
+            i += usize::from(over <= end);
+            if over >= end {
+                break;
             }
         }
-    }
-
-    fn spread(self, values: &mut Vec<f64>, source: &mut Vec<f64>, passes: f64) {
-        let n = self.len;
-        if passes < MOST_PASSES || n < FEWEST_HALVED {
-            // after 4 n² passes nothing but the mean is left along the axis
-            let passes = passes.min((4 * n * n) as f64);
-            (0..passes as usize).for_each(|_| self.pass(values, source, 1.0));
-            if passes.fract() > 0.0 {
-                self.pass(values, source, passes.fract());
-            }
-            return;
-        }
-        self.pass(values, source, 1.0);
-        let half = Self { len: n.div_ceil(2), ..self };
-        let ratio = n as f64 / half.len as f64;
-        let mut coarse = self.onto(half, values);
-        // two passes here, and the means of `ratio` cells twice, each of variance (ratio² − 1)/12
-        let left = (passes - 2.0 - (ratio * ratio - 1.0) / 3.0) / (ratio * ratio);
-        half.spread(&mut coarse, source, left);
-        *values = half.onto(self, &coarse);
-        self.pass(values, source, 1.0);
-    }
-
-    /// The mean over each cell of another grid along this axis, values being constant in cells.
-    fn onto(self, other: Self, values: &[f64]) -> Vec<f64> {
-        let (n, m, s) = (self.len, other.len, self.stride);
-        let mut out = vec![0.0; values.len() / n * m];
-        for (from, to) in values.chunks_exact(n * s).zip(out.chunks_exact_mut(m * s)) {
-            for (j, to) in to.chunks_exact_mut(s).enumerate() {
-                // in units of 1/(n m) of the axis, cell i is [i m, (i + 1) m] and cell j is [j n, (j + 1) n]
-                for i in j * n / m..((j + 1) * n).div_ceil(m) {
-                    let shared = ((i + 1) * m).min((j + 1) * n) - (i * m).max(j * n);
-                    let weight = shared as f64 / n as f64;
-                    to.iter_mut().zip(&from[i * s..(i + 1) * s]).for_each(|(to, from)| *to += weight * from);
-                }
-            }
-        }
-        out
     }
 }
 

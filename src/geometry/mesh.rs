@@ -1,4 +1,4 @@
-use super::Lattice;
+use super::{Lattice, lattice::strides};
 use crate::error::{Error, Failure, Result};
 use std::borrow::Cow;
 
@@ -93,6 +93,38 @@ impl<const D: usize> Mesh<D> {
             n if n == self.lattice.len() => Ok(Self { x, ..*self }),
             found => Err(Failure::WrongLength { what: "the mesh", found, expected: self.lattice.len() }),
         }
+    }
+
+    /// The map from the computational domain to the mesh on a lattice of other `cells`, linear between the nodes of this one
+    /// along each axis.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where `cells` make no lattice.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::geometry::{Lattice, Mesh};
+    /// let mesh = Mesh::mapped(Lattice::bounded([2])?, vec![[0.0], [1.0], [4.0]])?;
+    /// assert_eq!(mesh.resampled([4])?.x(), [[0.0], [0.5], [1.0], [2.5], [4.0]]);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn resampled(&self, cells: [usize; D]) -> Result<Self> {
+        let lattice = Lattice::new(cells, self.lattice.periodic())?;
+        let (x, here) = (self.closed(), self.lattice.cells());
+        let strides = strides(here.map(|n| n + 1));
+        let at = |node: [usize; D]| {
+            // the cell that a node lies in, the last one for the upper end, and how far from its lower end
+            let cell: [usize; D] = std::array::from_fn(|d| (node[d] * here[d] / cells[d]).min(here[d] - 1));
+            let share: [f64; D] =
+                std::array::from_fn(|d| (node[d] * here[d] - cell[d] * cells[d]) as f64 / cells[d] as f64);
+            (0..1 << D).fold([0.0; D], |sum, corner| {
+                let upper: [bool; D] = std::array::from_fn(|d| corner >> d & 1 == 1);
+                let weight: f64 = (0..D).map(|d| if upper[d] { share[d] } else { 1.0 - share[d] }).product();
+                let k: usize = (0..D).map(|d| (cell[d] + usize::from(upper[d])) * strides[d]).sum();
+                std::array::from_fn(|d| sum[d] + weight * x[k][d])
+            })
+        };
+        Ok(Self { lattice, x: (0..lattice.len()).map(|k| at(lattice.node(k))).collect(), ..*self })
     }
 
     /// The lattice under the mesh.

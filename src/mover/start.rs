@@ -1,6 +1,6 @@
 use super::{Followed, Gait, Mover};
 use crate::error::Result;
-use crate::geometry::Mesh;
+use crate::geometry::{Mesh, check_unfolded};
 use crate::meshing::{Form, Mmpde, Relaxation, Whole};
 
 /// A mesh that was adapted to a density at the start.
@@ -24,6 +24,8 @@ pub enum Ending {
 }
 
 const MOST_STEPS: usize = 500;
+/// A mesh with more cells along an axis starts from one with half as many.
+const COARSE: usize = 100;
 /// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there.
 const HALF: f64 = 0.5;
 const THIN: f64 = 1e-3;
@@ -43,6 +45,23 @@ pub fn adapted(
     form: Form,
     mut followed: impl FnMut(&Mesh<2>) -> Result<(Vec<f64>, Vec<f64>)>,
 ) -> Result<Start> {
+    from_coarser(mesh, form, &mut followed)
+}
+
+/// u and ρ on a mesh.
+type FollowedOn<'a> = &'a mut dyn FnMut(&Mesh<2>) -> Result<(Vec<f64>, Vec<f64>)>;
+
+fn from_coarser(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
+    let cells = mesh.lattice().cells();
+    let coarse = cells.map(|n| if n > COARSE { n.div_ceil(2) } else { n });
+    if coarse == cells {
+        return to_rest(mesh, form, followed);
+    }
+    let start = from_coarser(mesh.resampled(coarse)?, form, followed)?.mesh.resampled(cells)?;
+    to_rest(if check_unfolded(&start).is_ok() { start } else { mesh }, form, followed)
+}
+
+fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
     let equation = Mmpde { relaxation: Relaxation::Auto, form };
     let mut mover = Mover::by(Box::new(Whole::to(0.1 * AT_REST)), equation);
     let mut gait = Gait::at_rest(&mesh);

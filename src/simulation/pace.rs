@@ -6,6 +6,7 @@ use super::schedule::{Schedule, Steps};
 use super::{Record, Simulation, State};
 use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{Field, Lattice};
+use crate::meshing::Relaxation;
 use crate::numerics::larger;
 use crate::physics::Motion;
 use serde::{Deserialize, Serialize};
@@ -243,6 +244,15 @@ impl Free {
         let after = simulation.physics.step(motion, u);
         after.map_or(f64::INFINITY, |(after, _)| share(change_at_nodes(mesh.lattice(), u, &after), self.ranges[0]))
     }
+}
+
+/// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic length.
+pub(super) fn rushed(simulation: &Simulation, before: &State, after: &State) -> bool {
+    let follows = simulation.mover.equation.relaxation == Relaxation::Auto && simulation.mover.generator.moves();
+    let range = range(&before.u, 0).max(range(&after.u, 0));
+    follows
+        && !simulation.physics.is_given()
+        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), range) > TOO_MUCH * CHANGE
 }
 
 /// The largest error of all unknowns, each as a share of its range.
