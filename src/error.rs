@@ -106,10 +106,12 @@ pub enum Failure {
         iterations: usize,
     },
     /// Automatic time steps became so short that the run would not end.
-    #[error("automatic time steps shrank to {dt:.1e}: the solution never stops changing by much in a step")]
+    #[error("automatic time steps shrank to {dt:.1e}: {cause}")]
     VanishingStep {
         /// The last step.
         dt: f64,
+        /// What shortened it.
+        cause: Cause,
     },
     /// A linear system was not solved to its tolerance by any solver at hand.
     #[error(
@@ -294,6 +296,43 @@ pub enum Failure {
     },
 }
 
+/// What shortens automatic time steps without end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, strum::Display)]
+pub enum Cause {
+    /// In every step the range of the solution grows by most of what changes.
+    #[strum(to_string = "the solution grows faster than any step can follow")]
+    BlowUp,
+    /// It would change by much less if the mesh rested.
+    #[strum(to_string = "the mesh sweeps its nodes through the solution in every step")]
+    Restless,
+    /// It never got away from the start.
+    #[strum(to_string = "the solution changes by much in any step from the start")]
+    Start,
+    /// None of these.
+    #[default]
+    #[strum(to_string = "the solution never stops changing by much in a step")]
+    Stiff,
+}
+
+impl Cause {
+    fn help(self) -> &'static str {
+        match self {
+            Self::BlowUp => {
+                "refine grid.cells where a layer forms that the mesh does not resolve (pde.flux = \"energy\" keeps Burgers' equation stable meanwhile), or end the run before with time.end where the equation itself blows up"
+            }
+            Self::Restless => {
+                "set mesh.relaxation to \"auto\" or raise it, or raise monitor.smoothing; with a stochastic generator raise its walks or paths"
+            }
+            Self::Start => {
+                "smooth the initial solution where it jumps, also against its sides, or refine grid.cells; time.step as a number goes over it"
+            }
+            Self::Stiff => {
+                "smooth what jumps in time, or give time.step as a number, since fast sources allow longer steps than their changes do"
+            }
+        }
+    }
+}
+
 impl Failure {
     /// False for what no step is short enough, and for formulas without a value, which a shorter step might only step over.
     pub(crate) fn is_curable(&self) -> bool {
@@ -352,9 +391,7 @@ impl Failure {
             Self::NotPeriodic { .. } => "set domain.periodic to [true, true]",
             Self::NotUniform { .. } => "set mesh.generator to { kind = \"fixed\" }, or leave time.stepper out",
             Self::ManySubsteps { .. } => "leave time.stepper out, or lower grid.cells or pde.viscosity",
-            Self::VanishingStep { .. } => {
-                "refine grid.cells where layers form that the mesh does not resolve (pde.flux = \"energy\" keeps Burgers' equation stable meanwhile), smooth what jumps in time or from a side to the initial solution, raise mesh.relaxation if the mesh is restless, or give time.step as a number"
-            }
+            Self::VanishingStep { cause, .. } => cause.help(),
             Self::NewtonStalled { .. } => "lower time.step, refine grid.cells or raise monitor.smoothing",
             Self::LinearStalled { .. } => {
                 "lower time.step or raise mesh.relaxation; set monitor.gradient to \"safe\" where the density is very steep"

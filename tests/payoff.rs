@@ -113,12 +113,6 @@ fn a_constant_rests() {
     assert!((quality.q_max - 1.0).abs() < 1e-12 && (quality.equidistribution - 1.0).abs() < 1e-12, "{quality:?}");
 }
 
-/// A restless mesh is warned of.
-#[test]
-fn a_restless_mesh_is_named() {
-    let study = front(1e-3, 40, 1.25, &["mesh.relaxation={steps=5}"]);
-    assert!(study.warnings().unwrap()[0].contains("5 steps: below 15"), "{:?}", study.warnings());
-}
 
 /// A jump that the sides keep up: a warning, and the run completes without a new extremum.
 #[test]

@@ -2,15 +2,17 @@ use crate::errors::plain;
 use crate::mesh::{Given, nodal, nodes};
 use crate::threads::compute;
 use driftmesh::Failure;
-use driftmesh::density::{Monitor, MonitorKind};
+use driftmesh::density::{Monitor, MonitorKind, NOISE_WORTH_A_WARNING, noise};
 use driftmesh::geometry::{Mesh, check_unfolded};
 use driftmesh::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
 use driftmesh::mover::{Followed, Gait, Mover, Step};
 use driftmesh::study::{MeshForm, MeshTable, Source};
 use numpy::{PyArray3, PyReadonlyArray2};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyRuntimeWarning};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ffi::CString;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, TryLockError};
 
 /// The tables of a study that move a mesh.
@@ -44,6 +46,8 @@ struct Retries {
 pub struct Generator {
     kind: GeneratorKind,
     chooses: bool,
+    /// Whether noise was warned of.
+    warned: AtomicBool,
     parts: Arc<Mutex<Parts>>,
 }
 
@@ -73,7 +77,7 @@ impl Generator {
             last: None,
         };
         let chooses = equation.relaxation == Relaxation::Auto;
-        Ok(Self { kind: mesh.generator, chooses, parts: Arc::new(Mutex::new(parts)) })
+        Ok(Self { kind: mesh.generator, chooses, warned: AtomicBool::new(false), parts: Arc::new(Mutex::new(parts)) })
     }
 
     /// The nodes after a step, and what it cost as JSON.
@@ -87,6 +91,15 @@ impl Generator {
         let mesh = mesh.mesh(py)?;
         let u = nodal(&mesh, &u)?;
         self.kind.check(mesh.lattice()).map_err(|error| plain(py, error.within("mesh.generator")))?;
+        let share = noise(mesh.lattice(), &u);
+        if share > NOISE_WORTH_A_WARNING && !self.warned.swap(true, Ordering::Relaxed) {
+            let text = format!(
+                "noisy-density: {:.0} % of u goes up and down from node to node, so that the mesh follows noise of the size \
+                 of its cells; smooth u, or use more cells",
+                100.0 * share
+            );
+            PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &CString::new(text)?, 2)?;
+        }
         let parts = self.parts.clone();
         let step = compute(py, move || {
             let mut parts = parts.try_lock().map_err(|error| match error {

@@ -5,11 +5,13 @@
 mod arclength;
 mod following;
 mod given;
+mod noise;
 mod root_gradient;
 mod smoothing;
 
 pub use arclength::{Arclength, Strength};
 pub use given::Given;
+pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
 pub use smoothing::smooth;
 

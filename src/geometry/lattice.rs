@@ -27,11 +27,11 @@ impl<const D: usize> Lattice<D> {
     /// A lattice of `cells` cells an axis.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where an axis has fewer than two cells (second-order differences at a side need three
-    /// nodes), or where the number of nodes does not fit the address space.
+    /// [`Error::Invalid`] where a bounded axis has fewer than two cells (second-order differences at a side need three
+    /// nodes) or a periodic one has none, or where the number of nodes does not fit the address space.
     pub fn new(cells: [usize; D], periodic: [bool; D]) -> Result<Self> {
-        let rule = if cells.iter().any(|&n| n < 2) {
-            Some("every axis needs at least 2 cells")
+        let rule = if cells.iter().zip(periodic).any(|(&n, wraps)| n < if wraps { 1 } else { 2 }) {
+            Some("every axis needs at least 2 cells, or 1 where it is periodic")
         } else if cells.iter().try_fold(1_usize, |all, &n| all.checked_mul(n.checked_add(3)?)).is_none() {
             Some("so many nodes cannot be counted; lower it")
         } else {

@@ -12,7 +12,7 @@ mod whole;
 pub use decomposition::{Cut, Decomposition};
 pub use fixed::Fixed;
 pub use mmpde::{Form, MeshOperator, Mmpde};
-pub use relaxation::{Relaxation, STEPS_TO_BEGIN_WITH, STEPS_WORTH_A_WARNING, Steps};
+pub use relaxation::{Relaxation, STEPS_TO_BEGIN_WITH, Steps};
 pub use schwarz::Schwarz;
 pub use sides::move_sides;
 pub use stochastic::{

@@ -88,8 +88,6 @@ fn is_zero(gain: &f64) -> bool {
 pub const STEPS_TO_BEGIN_WITH: f64 = 40.0;
 /// γ of a mesh that chooses τ.
 const PREDICTION_BY_ITSELF: f64 = 0.2;
-/// Fewer steps than this and the mesh, whose density stands still during a step, overshoots from one to the next.
-pub const STEPS_WORTH_A_WARNING: f64 = 15.0;
 /// With fewer steps than this it folds on any thin layer.
 const FEWEST_STEPS: f64 = 2.0;
 /// With more, the mesh swings about its density.
@@ -143,9 +141,7 @@ impl Relaxation {
             }
             Self::Steps(Steps { steps, .. }) if steps.is_finite() && steps >= FEWEST_STEPS => Ok(()),
             Self::Steps(Steps { steps, .. }) => {
-                let rule = format!(
-                    "must be at least {FEWEST_STEPS} steps, and {STEPS_WORTH_A_WARNING} or more for a mesh that does not overshoot"
-                );
+                let rule = format!("must be at least {FEWEST_STEPS} steps; \"auto\" finds how many a mesh takes to rest");
                 Err(Error::invalid("relaxation.steps", steps, rule))
             }
         }

@@ -22,6 +22,8 @@ pub struct Gait {
     velocity: Vec<[f64; 2]>,
     correction: Vec<[f64; 2]>,
     steps: f64,
+    /// How much of the last steps turned back: a mean that forgets.
+    unrest: f64,
     /// The density that moved the mesh last: a mean over steps.
     rho: Vec<f64>,
     /// The last step; none before the first.
@@ -52,6 +54,10 @@ const GOES_STRAIGHT_ON: f64 = 0.9;
 const STEPS: [f64; 2] = [15.0, 1e5];
 /// Corrections below this share of the shortest edge are of the solver.
 const SOLVED_TO: f64 = 1e-2;
+/// Corrections below this share of the shortest edge do no harm.
+const SEEN: f64 = 0.1;
+/// Share of the earlier steps in the mean over the last ones.
+const REMEMBERED: f64 = 0.8;
 /// Share of the newest density in the one that moves the mesh.
 const NEWEST: f64 = 0.7;
 /// The farthest that u and the mesh have come apart in a step, as a share of the box: what differences can tell.
@@ -65,7 +71,8 @@ impl Gait {
     /// Of a mesh that has stood still so far.
     pub fn at_rest(mesh: &Mesh<2>) -> Self {
         let still = vec![[0.0; 2]; mesh.x().len()];
-        Self { velocity: still.clone(), correction: still, steps: STEPS_TO_BEGIN_WITH, rho: Vec::new(), last: None }
+        let steps = STEPS_TO_BEGIN_WITH;
+        Self { velocity: still.clone(), correction: still, steps, unrest: 0.0, rho: Vec::new(), last: None }
     }
 
     /// Velocity with which each node is predicted to go on.
@@ -81,6 +88,11 @@ impl Gait {
     /// τ in time steps, where the mover chooses it.
     pub fn steps(&self) -> f64 {
         self.steps
+    }
+
+    /// True where most of the last steps turned back by more than the mesh equation is solved to.
+    pub fn is_restless(&self) -> bool {
+        self.unrest > 0.5
     }
 
     /// The density that is to move the mesh: where it is predicted, mixed with the one that moved it last. On the flanks of
@@ -112,8 +124,11 @@ impl Gait {
         }
         let mut steps = self.steps;
         let most = correction.iter().map(|e| e[0].hypot(e[1])).fold(0.0, f64::max);
-        if chooses && most > SOLVED_TO * mesh.shortest_edge() {
-            let c = cosine(&correction, &self.correction);
+        let edge = mesh.shortest_edge();
+        let c = if most > SOLVED_TO * edge { cosine(&correction, &self.correction) } else { 0.0 };
+        let turned = c < TURNS_BACK && most > SEEN * edge;
+        let unrest = REMEMBERED * self.unrest + if turned { 1.0 - REMEMBERED } else { 0.0 };
+        if chooses {
             if c < TURNS_BACK {
                 steps = (SLOWER * steps).min(STEPS[1]);
                 let left = (1.0 + c).max(0.0).sqrt();
@@ -125,7 +140,7 @@ impl Gait {
         }
         let ways = predicted.velocity.iter().zip(&correction);
         let way = ways.map(|(v, e)| [0, 1].map(|d| dt * v[d] + e[d])).collect();
-        Self { velocity, correction, steps, rho, last: Some(Last { took: dt, way, u }) }
+        Self { velocity, correction, steps, unrest, rho, last: Some(Last { took: dt, way, u }) }
     }
 
     /// The velocity with which u, what the mesh follows, moves as a whole along periodic axes, 0 along others
@@ -194,7 +209,7 @@ impl Gait {
                 return Err(Unfit::Damaged(format!("its last mesh step is {took} long")));
             }
         }
-        match self.rho.iter().all(|rho| *rho > 0.0) && self.steps.is_finite() && self.steps > 0.0 {
+        match self.rho.iter().all(|rho| *rho > 0.0) && [self.steps, 1.0 + self.unrest].iter().all(|v| v.is_finite() && *v > 0.0) {
             true => Ok(()),
             false => Err(Unfit::Damaged("its mesh cannot have gone so".into())),
         }

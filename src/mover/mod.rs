@@ -13,6 +13,7 @@ use crate::geometry::{Mesh, check_unfolded};
 use crate::meshing::{Form, Interface, MeshGenerator, Mmpde, Moved, Relaxation};
 use crate::work::Work;
 pub(crate) use gait::Predicted;
+pub(crate) use start::to_rest;
 
 /// Moves a mesh from step to step
 ///

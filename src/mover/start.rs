@@ -10,6 +10,8 @@ pub struct Start {
     pub mesh: Mesh<2>,
     /// Whether it stands still.
     pub end: Ending,
+    /// τ over the time step in the end: with fewer it would not have come to rest, or would have taken longer.
+    pub steps: f64,
 }
 
 /// How an adapted start ended.
@@ -49,7 +51,7 @@ pub fn adapted(
 }
 
 /// u and ρ on a mesh.
-type FollowedOn<'a> = &'a mut dyn FnMut(&Mesh<2>) -> Result<(Vec<f64>, Vec<f64>)>;
+pub(crate) type FollowedOn<'a> = &'a mut dyn FnMut(&Mesh<2>) -> Result<(Vec<f64>, Vec<f64>)>;
 
 fn from_coarser(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
     let cells = mesh.lattice().cells();
@@ -61,7 +63,8 @@ fn from_coarser(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<S
     to_rest(if check_unfolded(&start).is_ok() { start } else { mesh }, form, followed)
 }
 
-fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
+/// The same, on this mesh alone.
+pub(crate) fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
     let equation = Mmpde { relaxation: Relaxation::Auto, form };
     let mut mover = Mover::by(Box::new(Whole::to(0.1 * AT_REST)), equation);
     let mut gait = Gait::at_rest(&mesh);
@@ -74,14 +77,14 @@ fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start>
         let at_rest = farthest <= AT_REST * moved.shortest_edge();
         let jumps = jumps(&mesh, &u);
         if jumps {
-            return Ok(Start { mesh, end: Ending::Jump });
+            return Ok(Start { mesh, end: Ending::Jump, steps: gait.steps() });
         }
         (mesh, gait) = (moved, step.gait);
         if at_rest {
-            return Ok(Start { mesh, end: Ending::AtRest });
+            return Ok(Start { mesh, end: Ending::AtRest, steps: gait.steps() });
         }
     }
-    Ok(Start { mesh, end: Ending::Restless })
+    Ok(Start { mesh, end: Ending::Restless, steps: gait.steps() })
 }
 
 /// True where an edge that is much shorter than a uniform cell holds half of the range of u.

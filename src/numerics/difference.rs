@@ -34,15 +34,20 @@ pub fn derivative<const D: usize, const K: usize>(
     let periodic = lattice.periodic()[axis];
     let mut out = vec![[0.0; K]; values.len()];
     for (f, df) in values.chunks_exact(s * n).zip(out.chunks_exact_mut(s * n)) {
-        let inner = df[s..s * (n - 1)].iter_mut();
-        for ((d, below), above) in inner.zip(&f[..s * (n - 2)]).zip(&f[2 * s..]) {
+        let (below, above) = (f, f.get(2 * s..).unwrap_or_default());
+        for ((d, below), above) in df[s..].iter_mut().zip(below).zip(above) {
             *d = std::array::from_fn(|c| (above[c] - below[c]) * scale);
         }
         for k in 0..s {
             let at = |i: usize, c: usize| f[i * s + k][c];
             if periodic {
-                df[k] = std::array::from_fn(|c| (at(1, c) - (at(n - 1, c) - jump[c])) * scale);
-                df[(n - 1) * s + k] = std::array::from_fn(|c| (at(0, c) + jump[c] - at(n - 2, c)) * scale);
+                // a single node is its own neighbour on both sides, one jump away
+                let (second, last) = (1 % n, n - 1);
+                let over = if n == 1 { 1.0 } else { 0.0 };
+                df[k] = std::array::from_fn(|c| (at(second, c) + over * jump[c] - (at(last, c) - jump[c])) * scale);
+                if n > 1 {
+                    df[last * s + k] = std::array::from_fn(|c| (at(0, c) + jump[c] - at(last - 1, c)) * scale);
+                }
             } else {
                 df[k] = std::array::from_fn(|c| (4.0 * at(1, c) - 3.0 * at(0, c) - at(2, c)) * scale);
                 df[(n - 1) * s + k] =

@@ -4,6 +4,7 @@ mod benefit;
 mod checkpoint;
 mod control;
 mod coupling;
+mod doubts;
 mod journey;
 mod observer;
 mod pace;
@@ -27,10 +28,10 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality, quality_and_integral};
+use crate::geometry::{Field, Mesh, Quality, check_unfolded, interpolate, largest, quality, quality_and_integral};
 use crate::kept::Kept;
-use crate::meshing::{Interface, Relaxation, STEPS_WORTH_A_WARNING};
-use crate::mover::{self, Gait, Mover, Start};
+use crate::meshing::{Interface, Relaxation};
+use crate::mover::{self, Ending, Gait, Mover, Start};
 use crate::physics::Physics;
 use crate::stopwatch::Stopwatch;
 use crate::work::Work;
@@ -117,7 +118,10 @@ pub struct Simulation {
 
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
 pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
+/// More time steps in τ than any layer needs: what a mesh moves by then is little more than noise.
+const HARDLY_FOLLOWS: f64 = 2e3;
 const HASTY: &str = "`mesh.relaxation` is short";
+const RESTLESS: &str = "the mesh hardly follows its density any more";
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
@@ -157,6 +161,12 @@ impl Simulation {
             let u = self.monitor.followed(state.t, &state.mesh, &state.u).map_err(|failure| self.at_start(failure))?;
             Ok((u, state.rho))
         })
+    }
+
+    /// What the user should know of a start although nothing failed: a density that is noise at the scale of its cells, and
+    /// unknowns of which the mesh misses something.
+    pub fn doubts(&self, start: &State) -> Vec<String> {
+        doubts::doubts(self, start)
     }
 
     fn at_start(&self, failure: Failure) -> Error {
@@ -211,7 +221,6 @@ impl Simulation {
         self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
         while let Some((t, dt)) = pace.next(&self.schedule, state) {
             let step = state.step + 1;
-            self.warn_of_haste(state.t, dt, record);
             let next = match pace.step(self, state, (t, dt), record) {
                 Ok(Some(next)) => next,
                 Ok(None) => continue,
@@ -222,6 +231,7 @@ impl Simulation {
             record.work.add(next.work);
             record.interface = next.interface;
             self.warn_of_noise(state, record);
+            self.warn_of_unrest(state, dt, record);
             if self.schedule.reports_at(t) {
                 let report = self.report(state, mass_at_start, record.interface);
                 record.reports.push(report);
@@ -272,16 +282,42 @@ impl Simulation {
         Ok(())
     }
 
-    /// Says once in a run that τ, given in units of time, is too few steps.
-    fn warn_of_haste(&self, t: f64, dt: f64, record: &mut Record) {
-        let Relaxation::Time(tau) = self.mover.equation.relaxation else { return };
-        if tau < STEPS_WORTH_A_WARNING * dt && !record.warnings.iter().any(|said| said.starts_with(HASTY)) {
-            record.warnings.push(format!(
-                "{HASTY}: at t = {t} it is {:.2e} time steps; below {STEPS_WORTH_A_WARNING} the mesh overshoots its density \
-                 from step to step, and may fold",
-                tau / dt
-            ));
+    /// Says once in a run that the mesh turns back from step to step, and with which τ it would rest on this solution.
+    fn warn_of_unrest(&self, state: &State, dt: f64, record: &mut Record) {
+        let relaxation = self.mover.equation.relaxation;
+        let hardly_follows = relaxation == Relaxation::Auto && state.gait.steps() > HARDLY_FOLLOWS;
+        if !(hardly_follows || relaxation != Relaxation::Auto && state.gait.is_restless())
+            || record.warnings.iter().any(|said| said.starts_with(RESTLESS) || said.starts_with(HASTY))
+        {
+            return;
         }
+        let t = state.t;
+        if hardly_follows {
+            record.warnings.push(format!(
+                "{RESTLESS}: at t = {t} τ is {:.0} time steps, since the density turns about from step to step; smooth it, or \
+                 follow something that varies less, by monitor.of",
+                state.gait.steps()
+            ));
+            return;
+        }
+        let steps = relaxation.over(dt) / dt;
+        let (lower, upper) = (state.mesh.lower(), state.mesh.upper());
+        let found = self.monitor.followed(t, &state.mesh, &state.u).map_err(Error::from).and_then(|values| {
+            mover::to_rest(Mesh::uniform(*state.mesh.lattice(), lower, upper)?, self.mover.equation.form, &mut |mesh| {
+                let u = interpolate(&state.mesh, &values, mesh);
+                let rho = self.monitor.density(mesh, &u, None)?;
+                Ok((u, rho))
+            })
+        });
+        let limit = match found {
+            Ok(Start { end: Ending::AtRest, steps: limit, .. }) if limit > steps => {
+                format!("on this solution it comes to rest with {limit:.0}, which \"auto\" finds by itself")
+            }
+            _ => "\"auto\" finds how many it takes".into(),
+        };
+        record.warnings.push(format!(
+            "{HASTY}: at t = {t} it is {steps:.1} time steps, and the mesh turns back from step to step; {limit}"
+        ));
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.

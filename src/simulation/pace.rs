@@ -4,7 +4,7 @@ use super::journey::{change_in_place, range};
 use super::safety::{Safety, divided};
 use super::schedule::{Schedule, Steps};
 use super::{Record, Simulation, State};
-use crate::error::{Error, Failure, Moment, Result};
+use crate::error::{Cause, Error, Failure, Moment, Result};
 use crate::geometry::{Field, Lattice};
 use crate::meshing::Relaxation;
 use crate::numerics::larger;
@@ -119,6 +119,10 @@ const SHORTEST: f64 = 1e-12;
 const FEWEST: f64 = 20.0;
 /// A share of the time in which the mesh follows: what would shorten it by more is asked of a mesh that rests.
 const DOUBTED: f64 = 0.5;
+/// Share of the change in a step above which what widens the range is growth.
+const GROWS: f64 = 0.5;
+/// Share of the run that is its start.
+const AT_START: f64 = 1e-3;
 /// The first trial, as a share of the longest step, and how many there may be, each a hundredth of the one before.
 const TRIAL: f64 = 1e-2;
 const TRIALS: usize = 3;
@@ -217,7 +221,8 @@ impl Free {
         self.dt = (self.dt * factor).min(self.longest);
         self.short = if self.dt < SHORT * self.longest { self.short + 1 } else { 0 };
         if self.short > MOST_SHORT || self.dt < SHORTEST * self.longest {
-            return Err(Failure::VanishingStep { dt: self.dt });
+            let cause = self.cause(simulation, before, after, dt);
+            return Err(Failure::VanishingStep { dt: self.dt, cause });
         }
         if !taken {
             record.work.rejected_steps += 1;
@@ -236,6 +241,21 @@ impl Free {
         }
         self.scale = scale;
         Ok(Some(step))
+    }
+
+    /// What makes steps as short as this one.
+    fn cause(&self, simulation: &mut Simulation, before: &State, after: &State, dt: f64) -> Cause {
+        let change = change_at_nodes(after.mesh.lattice(), &before.u, &after.u);
+        let (start, end) = (simulation.schedule.start(), simulation.schedule.end());
+        if range(&after.u, 0) - range(&before.u, 0) > GROWS * change {
+            Cause::BlowUp
+        } else if self.share_at_rest(simulation, before) / self.dt < DOUBTED * share(change, self.ranges[0]) / dt {
+            Cause::Restless
+        } else if after.t - start < AT_START * (end - start) {
+            Cause::Start
+        } else {
+            Cause::Stiff
+        }
     }
 
     /// The change in the next step if the mesh rested; infinite where that fails.

@@ -2,7 +2,7 @@ use super::Source;
 use crate::density::{Arclength, Given, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
-use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation, STEPS_WORTH_A_WARNING, Steps};
+use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
 use crate::mover::{Ending, Mover};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
@@ -427,13 +427,6 @@ impl MovingMesh {
                 }
             }
         }
-        if let Relaxation::Steps(Steps { steps, .. }) = self.mesh.relaxation
-            && steps < STEPS_WORTH_A_WARNING
-        {
-            warnings.push(format!(
-                "`mesh.relaxation` is {steps} steps: below {STEPS_WORTH_A_WARNING} the mesh overshoots its density from step to step; \"auto\" finds how many it takes"
-            ));
-        }
         for [(at_start, initial), (on_sides, boundary)] in self.pde.starts_and_sides() {
             let [initial, boundary] = [formula(&at_start, initial)?, formula(&on_sides, boundary)?];
             let mut worst = (0.0_f64, [0.0; 2]);
@@ -531,7 +524,9 @@ impl MovingMesh {
                 };
                 record.warnings.extend(why.map(|why| format!("`mesh.start`: {why}")));
             }
-            simulation.start(mesh)
+            let state = simulation.start(mesh)?;
+            record.warnings.extend(simulation.doubts(&state));
+            Ok(state)
         })
     }
 
