@@ -2,8 +2,8 @@
 
 use driftmesh::density::{Monitor, RootGradient};
 use driftmesh::geometry::{Lattice, Mesh, check_unfolded};
-use driftmesh::meshing::Whole;
-use driftmesh::mover::{Followed, Gait, Mover};
+use driftmesh::meshing::{Form, Whole};
+use driftmesh::mover::{Ending, Followed, Gait, Mover, adapted};
 use driftmesh::simulation::Record;
 use driftmesh::study::{MovingMesh, Source, compute};
 use std::f64::consts::PI;
@@ -396,4 +396,34 @@ fn a_fixed_mesh_stays() {
     let mesh = state.mesh.clone();
     simulation.run(&mut state, &mut record, &mut []).unwrap();
     assert_eq!(state.mesh, mesh);
+}
+
+/// A fixed, small step is no worse than an automatic one that is five times longer: where the front rounds the corners, it is
+/// done in parts.
+#[test]
+fn a_small_step_is_no_worse_than_a_long_one() {
+    let study = include_str!("../studies/burgers.toml").replace("end = 1.25", "end = 1.25\nstep = 2e-3");
+    let study = MovingMesh::from_source(&Source::new("the study", study)).unwrap();
+    let (summary, failure) = compute(&study).unwrap();
+    assert!(failure.is_none() && summary.work.steps == 500);
+    for report in summary.reports {
+        let error = report.error.unwrap().linf;
+        assert!(error < 1.3e-2, "{error:e} at t = {}", report.t);
+    }
+}
+
+/// A large mesh starts from a coarser one that has come to rest, so that few of its own steps are left.
+#[test]
+fn a_large_mesh_starts_from_a_coarser_one() {
+    let mesh = Mesh::uniform(Lattice::bounded([320, 20]).unwrap(), [0.0; 2], [16.0, 1.0]).unwrap();
+    let (mut on_large, mut on_coarser) = (0, 0);
+    let start = adapted(mesh, Form::Conservative, |mesh| {
+        *(if mesh.lattice().cells()[0] == 320 { &mut on_large } else { &mut on_coarser }) += 1;
+        let u: Vec<f64> = mesh.x().iter().map(|[x, y]| f64::tanh(20.0 * (x + y - 9.0))).collect();
+        let rho = RootGradient::default().density(mesh, &u, None)?;
+        Ok((u, rho))
+    })
+    .unwrap();
+    assert_eq!(start.end, Ending::AtRest);
+    assert!(on_coarser > on_large, "{on_coarser} steps on coarser meshes, {on_large} on the mesh itself");
 }

@@ -113,7 +113,6 @@ fn a_constant_rests() {
     assert!((quality.q_max - 1.0).abs() < 1e-12 && (quality.equidistribution - 1.0).abs() < 1e-12, "{quality:?}");
 }
 
-
 /// A jump that the sides keep up: a warning, and the run completes without a new extremum.
 #[test]
 fn a_jump_on_the_sides_is_kept() {

@@ -10,6 +10,7 @@ import sys
 import textwrap
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from driftmesh import (
     Schwarz,
     Stochastic,
     Whole,
+    transfer,
 )
 from driftmesh.errors import MeshFolded
 
@@ -282,3 +284,25 @@ def test_settings_can_be_read_and_no_other_attribute_is_taken():
     for name, value in [("relaxation", 0.001), ("method", Fixed()), ("tau", 1.0)]:
         with pytest.raises(AttributeError, match=name):
             setattr(generator, name, value)
+
+
+def test_noise_is_warned_of_once():
+    mesh = Mesh.uniform(cells=(30, 30), lower=(0, 0), upper=(1, 1))
+    generator = MeshGenerator()
+    noise = np.random.default_rng(1).random((31, 31))
+    with pytest.warns(RuntimeWarning, match="noisy-density: .* goes up and down from node to node"):
+        mesh = generator.step(mesh, noise, dt=1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        generator.step(mesh, noise, dt=1.0)
+        MeshGenerator().step(mesh, np.tanh(1e3 * (mesh.x - 0.5)), dt=1.0)
+
+
+def test_one_cell_on_a_periodic_axis():
+    mesh = Mesh.uniform(cells=(60, 1), lower=(0, 0), upper=(1, 0.1), periodic=(False, True))
+    generator = MeshGenerator()
+    for _ in range(60):
+        old, mesh = mesh, generator.step(mesh, np.tanh(60 * (mesh.x - 0.37)), dt=1.0)
+    assert np.diff(mesh.x[:, 0]).min() < 0.2 / 60
+    carried = transfer(np.tanh(60 * (old.x - 0.37)), old, mesh)
+    assert np.abs(carried - np.tanh(60 * (mesh.x - 0.37))).max() < 1e-2

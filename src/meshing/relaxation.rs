@@ -141,7 +141,8 @@ impl Relaxation {
             }
             Self::Steps(Steps { steps, .. }) if steps.is_finite() && steps >= FEWEST_STEPS => Ok(()),
             Self::Steps(Steps { steps, .. }) => {
-                let rule = format!("must be at least {FEWEST_STEPS} steps; \"auto\" finds how many a mesh takes to rest");
+                let rule =
+                    format!("must be at least {FEWEST_STEPS} steps; \"auto\" finds how many a mesh takes to rest");
                 Err(Error::invalid("relaxation.steps", steps, rule))
             }
         }

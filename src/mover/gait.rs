@@ -209,7 +209,9 @@ impl Gait {
                 return Err(Unfit::Damaged(format!("its last mesh step is {took} long")));
             }
         }
-        match self.rho.iter().all(|rho| *rho > 0.0) && [self.steps, 1.0 + self.unrest].iter().all(|v| v.is_finite() && *v > 0.0) {
+        match self.rho.iter().all(|rho| *rho > 0.0)
+            && [self.steps, 1.0 + self.unrest].iter().all(|v| v.is_finite() && *v > 0.0)
+        {
             true => Ok(()),
             false => Err(Unfit::Damaged("its mesh cannot have gone so".into())),
         }
