@@ -200,6 +200,35 @@ pub enum Failure {
         residual: f64,
         /// Iterations done.
         iterations: usize,
+        /// What helps where it happened; empty where nothing is known.
+        remedy: &'static str,
+    },
+    /// A layer is so thin, and so many cells lie in it, that neighbouring nodes are the same number.
+    #[error(
+        "node {node} of {cells} cells and the one before it are the same number, x = {x}: the layer there is too thin for so many"
+    )]
+    LineUnresolved {
+        /// The second of them.
+        node: usize,
+        /// Where both are.
+        x: f64,
+        /// Cells of the line.
+        cells: usize,
+    },
+    /// The mesh glued from the subdomains of a line is out of order.
+    #[error(
+        "the subdomains do not agree on an order: after {iterations} iteration{} node {node} is at x = {x}, and the one before it at {left}",
+        if *.iterations == 1 { "" } else { "s" }
+    )]
+    LineFolded {
+        /// The node.
+        node: usize,
+        /// Where it is.
+        x: f64,
+        /// Where the one before it is.
+        left: f64,
+        /// Iterations done.
+        iterations: usize,
     },
     /// An iteration between subdomains of a line did not converge.
     #[error(
@@ -321,7 +350,7 @@ impl Cause {
                 "refine grid.cells where a layer forms that the mesh does not resolve (pde.flux = \"energy\" keeps Burgers' equation stable meanwhile), or end the run before with time.end where the equation itself blows up"
             }
             Self::Restless => {
-                "set mesh.relaxation to \"auto\" or raise it, or raise monitor.smoothing; with a stochastic generator raise its walks or paths"
+                "set mesh.relaxation to \"auto\" where it is a number, follow something smoother by monitor.of, or give time.step as a number; with a stochastic generator raise its walks or paths"
             }
             Self::Start => {
                 "smooth the initial solution where it jumps, also against its sides, or refine grid.cells; time.step as a number goes over it"
@@ -412,8 +441,13 @@ impl Failure {
             Self::LineDensity { .. } => {
                 "mend density.value or density.of; with conditions of Robin's kind M is asked for outside the domain too"
             }
+            Self::LineStalled { remedy, .. } if !remedy.is_empty() => remedy,
             Self::LineStalled { .. } => {
-                "begin nearer: set start.mesh to \"equidistributed\"; or refine grid.cells, smooth a density that jumps or peaks within a cell, or set equidistribution.face_density to \"exact\""
+                "set equidistribution.face_density to \"exact\", or refine grid.cells; with [time] lower time.step; with conditions of Robin's kind set schwarz.robin to \"auto\" or \"lagged\""
+            }
+            Self::LineUnresolved { .. } => "lower grid.cells, or give the density a thicker layer",
+            Self::LineFolded { .. } => {
+                "raise stop.iterations, or give stop.tolerance in its place; where the iteration does not contract, give more overlap or set schwarz.linearized to false"
             }
             Self::NotConverged { remedy, .. } if !remedy.is_empty() => remedy,
             Self::NotConverged { .. } => {

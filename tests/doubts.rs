@@ -60,7 +60,7 @@ fn what_the_mesh_misses_of_an_unknown_is_told() {
         study("start = 0\nend = 0.1", &pde, &format!("[monitor]\nkind = \"auto\"\nof = \"{of}\""))
     };
     let said = doubts(&blob(0.008, "u"));
-    assert!(matches!(&said[..], [said] if said.starts_with("`v`: the mesh at the start holds 0.")), "{said:?}");
+    assert!(matches!(&said[..], [said] if said.starts_with("`v`: the mesh at the start holds 0 %")), "{said:?}");
     assert_eq!(doubts(&blob(0.008, "v")), [""; 0], "the mesh sees what it follows");
     assert_eq!(doubts(&blob(0.15, "u")), [""; 0]);
 }

@@ -82,10 +82,12 @@ fn other_lines() {
     let long = ["domain.lower=[-1e6]", "domain.upper=[1e6]", "density.value=\"((x + 1e6)/2e6)^2 + 1\""];
     let short = ["domain.upper=[1e-6]", "density.value=\"(1e6*x)^2 + 1\""];
     assert!(count(&long).abs_diff(unit) <= 1 && count(&short).abs_diff(unit) <= 1);
+    // a layer that lies between two nodes of equal cells has its share of the nodes all the same
     let (_, summary) = run("boundary-layer", &["density.of=\"tanh(2000*(x - 0.3125))\""]);
-    let warning = summary["warnings"][0].as_str().unwrap();
-    assert!(warning.contains("the cells see another density"), "{warning}");
-    assert!(run("boundary-layer", &[]).1["warnings"].is_null());
+    let mesh = summary["mesh"].as_array().unwrap();
+    let within = mesh.iter().filter(|x| (x.as_f64().unwrap() - 0.3125).abs() < 2e-3).count();
+    assert!(3 * within > mesh.len(), "{within} of {}", mesh.len());
+    assert!(summary["warnings"].is_null() && run("boundary-layer", &[]).1["warnings"].is_null());
 }
 
 /// What is said of an iteration that misses its tolerance is true: one that swings is not said to contract, whenever it ends;
@@ -237,8 +239,6 @@ fn bad_settings_are_refused() {
         (m("(x - 1/3)^2"), &["density.value", "at x = 0.3333", "above 0"]),
         (m("1/(x - 0.3)^2"), &["density.value", "at x = 0.3"]),
         (m("1 + sqrt(x - 0.25)"), &["density.value", "NaN at x = 0"]),
-        (m("1 + sqrt(abs(x - 1/3))"), &["density.value", "dM/dx", "at x = 0.3333", "bounded"]),
-        (m("1 + sqrt(x)"), &["density.value", "dM/dx", "at x = 0"]),
         (m("1 + y"), &["density.value", "unknown name `y`"]),
         ("[density]\nkind = \"arc\"\n".into(), &["unknown name `arc`", "arclength"]),
         (format!("{M}[domain]\nlower = [1.0]\nupper = [1.0]\n"), &["domain.upper", "above domain.lower"]),

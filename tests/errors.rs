@@ -1,7 +1,7 @@
 //! Every variant of the library's errors, triggered once and read.
 
 use driftmesh::density::{Arclength, Given, Monitor};
-use driftmesh::equidistribution::{Coarse, Line, LineDensity, Measure, Method, Stop, Sweep};
+use driftmesh::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Measure, Method, Stop, Sweep};
 use driftmesh::error::Unfit;
 use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
@@ -437,6 +437,21 @@ fn line_stalled() {
     assert_says(error, &["stalled on the line", "residual"], Some("grid.cells"), true);
 }
 
+/// Iterates of the linearised method pass each other, and a layer may be thinner than numbers tell apart.
+#[test]
+fn line_meshes_out_of_order() {
+    let line = Line::new(LineDensity::arclength("tanh(10*(x - 0.3))").unwrap(), 100);
+    let method = Method::Classical { sweep: Sweep::Parallel, linearized: true, coarse: Coarse::None };
+    let stop = Stop { iterations: 50, tolerance: None, measure: Measure::Error };
+    let history = line.iterate(0.0, &[[0, 51], [49, 100]], method, &line.uniform(), None, stop).unwrap();
+    let message = ["the subdomains do not agree on an order: after 50 iterations node"];
+    assert_says(history.missed(method, stop).unwrap(), &message, Some("stop.iterations"), true);
+    let far = LineDensity::arclength("tanh((x - 1000000.3)/1e-8)").unwrap();
+    let thin = Line { face: FaceDensity::Exact, ends: [1e6, 1e6 + 1.0], ..Line::new(far, 1000) };
+    let message = ["of 1000 cells and the one before it are the same number, x = 1000000.3"];
+    assert_says(thin.equidistributed(0.0).unwrap_err(), &message, Some("grid.cells"), true);
+}
+
 #[test]
 fn not_converged() {
     let line = Line::new(LineDensity::formula("x^2 + 1").unwrap(), 20);
@@ -507,6 +522,7 @@ fn every_failure_is_triggered_and_documented() {
         fronts,
         line_density,
         line_stalled,
+        line_meshes_out_of_order,
         not_converged,
     ];
     tests.iter().for_each(|trigger| trigger());

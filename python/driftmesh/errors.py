@@ -126,6 +126,14 @@ class LineStalled(MeshError):
     """Newton's method found no nodes of a line, or of a subdomain of it."""
 
 
+class LineUnresolved(MeshError):
+    """A layer is so thin, and so many cells lie in it, that neighbouring nodes are the same number."""
+
+
+class LineFolded(MeshError):
+    """The mesh glued from the subdomains of a line is out of order."""
+
+
 class NotConverged(MeshError):
     """An iteration between subdomains of a line did not converge."""
 

@@ -27,17 +27,19 @@ def equidistribute(
     *,
     domain: Sequence[float] = (0.0, 1.0),
     face_density: Faces = "exact",
+    points: Sequence[float] | NDArray[Any] | None = None,
 ) -> Floats:
     """The mesh on which every cell has the same share of ∫M.
 
     Args:
         density: M(x) > 0: a function of an array of places; a formula such as ``"x^2 + 1"``; a table such as
             ``{"kind": "arclength", "of": "tanh(20*x)"}``; values at equal distances over the domain, or a pair of arrays
-            (places, values), both taken as piecewise linear.
+            (places, values), both taken as piecewise linear; where M jumps a place comes twice.
         cells: Number of cells, at least 2.
         domain: Ends of the line, in the unit of length.
         face_density: How M is averaged over a cell: ``"exact"`` (∫M), or from few values by ``"trapezoid"`` or
-            ``"midpoint"``, as studies do: faster for functions, and near where M varies little over a cell.
+            ``"midpoint"``, as studies do: near where M varies little over a cell.
+        points: Places where M may have spikes too thin to be found among a few thousand equal parts of the line.
 
     Returns:
         The nodes, shape (cells + 1,), in order from end to end.
@@ -45,7 +47,7 @@ def equidistribute(
     Raises:
         ValueError: Wrong shapes or values; a density that is not finite and positive somewhere
             (:class:`driftmesh.errors.LineDensity`).
-        driftmesh.errors.LineStalled: The nonlinear solve did not converge.
+        driftmesh.errors.LineUnresolved: A layer is so thin that neighbouring nodes would be the same number.
 
     >>> from driftmesh import equidistribute
     >>> x = equidistribute(lambda x: x**2 + 1, 100)
@@ -55,7 +57,7 @@ def equidistribute(
     ends = _ends(domain)
     given = _density(density, ends)
     faces = word("face_density", face_density, get_args(Faces))
-    settings = _toml.document({"equidistribution": {"face_density": faces}})
+    settings = _toml.document({"equidistribution": {"face_density": faces, "points": _points(points)}})
     return _driftmesh.equidistribute(given, _cells(cells), ends, settings)
 
 
@@ -130,6 +132,7 @@ def schwarz(
     start: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
     domain: Sequence[float] = (0.0, 1.0),
     face_density: Faces | None = None,
+    points: Sequence[float] | NDArray[Any] | None = None,
 ) -> SchwarzResult:
     """Equidistributes subdomain by subdomain and iterates until they agree. Words as in a study of kind
     ``equidistribution``.
@@ -156,6 +159,7 @@ def schwarz(
         domain: Ends of the line.
         face_density: As for :func:`equidistribute`; where nothing is said, the exact integral for arrays, which may be rough
             from cell to cell, and the trapezoid of the published method else.
+        points: As for :func:`equidistribute`.
 
     Raises:
         ValueError: Wrong shapes or values, subdomains that do not fit.
@@ -186,13 +190,21 @@ def schwarz(
     given = _density(density, ends)
     rough = not callable(density) and not isinstance(density, (str, Mapping))
     faces = word("face_density", face_density or ("exact" if rough else "trapezoid"), get_args(Faces))
-    settings = _toml.document({"equidistribution": {"face_density": faces}, "schwarz": table, "stop": stop})
+    averages = {"face_density": faces, "points": _points(points)}
+    settings = _toml.document({"equidistribution": averages, "schwarz": table, "stop": stop})
     columns, meshes, rates, missed = _driftmesh.schwarz(given, n, ends, settings, _start(start, n, ends))
     result = SchwarzResult(*meshes, *columns, *rates)
     if missed is not None:
         missed.result = result
         raise missed
     return result
+
+
+def _points(points: Any) -> list[float] | None:
+    if points is None:
+        return None
+    given: list[float] = finite("points", np.atleast_1d(points)).tolist()
+    return given
 
 
 def _cells(cells: int) -> int:
@@ -250,8 +262,10 @@ def _sampled(density: Any, ends: tuple[float, float]) -> tuple[list[float], list
         given, samples = pair("density", density)
         places = finite("places of the density", given)
         values = finite("density", samples, places.shape, "its array of places")
-        if places.ndim != 1 or len(places) < 2 or not (np.diff(places) > 0).all():
-            raise ValueError("the places of the density must be one array of two or more that grow from left to right")
+        grows = places.ndim == 1 and len(places) > 1 and (np.diff(places) >= 0).all()
+        if not grows or (places[2:] == places[:-2]).any() or places[0] == places[1] or places[-2] == places[-1]:
+            rule = "that grow from left to right, twice the same where M jumps inside"
+            raise ValueError(f"the places of the density must be one array of two or more {rule}")
         if places[0] > ends[0] or places[-1] < ends[1]:
             raise ValueError(f"the density is known from {places[0]} to {places[-1]}, but the line goes from {ends[0]} to {ends[1]}")
     else:

@@ -80,7 +80,11 @@ fn remedy(failure: &Failure) -> Option<&'static str> {
             "mend the density; an optimized Schwarz method asks for it outside the domain too"
         }
         Failure::LineStalled { .. } => {
-            "give more cells; where the density jumps or peaks within a cell smooth it, or set `face_density` to \"exact\""
+            "set `face_density` to \"exact\", or give more cells; for the method \"optimized\" set `robin` to \"auto\" or \"lagged\""
+        }
+        Failure::LineUnresolved { .. } => "give fewer cells, or the density a thicker layer",
+        Failure::LineFolded { .. } => {
+            "raise `iterations`, or give a tolerance in its place; where the iteration does not contract, give more overlap"
         }
         Failure::DegenerateStencil { .. } => "make the cells around it less flat",
         Failure::Subdomains { .. } => "give every axis between one subdomain and one a cell",

@@ -1,11 +1,13 @@
 use crate::errors::plain;
 use crate::threads::{BRIEFLY, Caller, Calls, Ended, calls, interruptible};
-use driftmesh::equidistribution::{History, Iterate, Line, LineDensity};
+use driftmesh::equidistribution::{History, Iterate, Line, LineDensity, Settled};
 use driftmesh::study::{Discretization, SchwarzTable, Source, StopTable, check_memory};
 use driftmesh::{Error, Failure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::prelude::*;
 use serde::Deserialize;
+use std::ffi::CString;
 use std::sync::Arc;
 
 /// A density as the package hands it over.
@@ -21,27 +23,16 @@ pub enum Density {
 
 /// Memory for each cell, about.
 const BYTES_PER_CELL: u128 = 1000;
-/// Distance over which the slope of a function is differenced, as a share of the line: Newton's method needs no better.
-const APART: f64 = 1e-6;
 
-fn line_density(density: Density, [a, b]: [f64; 2], caller: &Caller) -> driftmesh::Result<LineDensity> {
+fn line_density(density: Density, ends: [f64; 2], caller: &Caller) -> driftmesh::Result<LineDensity> {
     let function = match density {
         Density::Text(kind, text) if kind == "arclength" => return LineDensity::arclength(&text),
         Density::Text(_, text) => return LineDensity::formula(&text),
         Density::Samples(x, m) => return LineDensity::sampled(x, m),
         Density::Function(function) => Arc::new(function),
     };
-    let (caller, apart) = (caller.clone(), APART * (b - a));
-    Ok(LineDensity::function(move |_, x| {
-        let n = x.len();
-        // a function need not be defined beyond the line
-        let below = |x: f64| if x >= a { (x - apart).max(a) } else { x - apart };
-        let above = |x: f64| if x <= b { (x + apart).min(b) } else { x + apart };
-        let lower = x.iter().map(|x| below(*x));
-        let places: Vec<f64> = x.iter().copied().chain(lower).chain(x.iter().map(|x| above(*x))).collect();
-        let Some(m) = values(&caller, &function, &places) else { return vec![[f64::NAN; 2]; n] };
-        (0..n).map(|k| [m[k], (m[2 * n + k] - m[n + k]) / (places[2 * n + k] - places[n + k])]).collect()
-    }))
+    let caller = caller.clone();
+    Ok(LineDensity::on_line(ends, move |_, x| values(&caller, &function, x).unwrap_or_else(|| vec![f64::NAN; x.len()])))
 }
 
 /// M at some places; nothing where the function raised.
@@ -85,8 +76,9 @@ fn problem(
 ) -> driftmesh::Result<(Line, Settings)> {
     let mut settings: Settings = Source::new("settings", settings).parse()?;
     settings.stop.resolve()?;
+    settings.equidistribution.check(ends).map_err(|error| error.within("equidistribution"))?;
     check_memory(cells as u128 + 1, BYTES_PER_CELL, &[cells])?;
-    let density = line_density(density, ends, caller)?;
+    let density = line_density(density, ends, caller)?.with_spikes(settings.equidistribution.points.clone());
     Ok((Line { density, face: settings.equidistribution.face_density, cells, ends }, settings))
 }
 
@@ -101,7 +93,11 @@ pub fn equidistribute<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let calls = calls();
     let (line, _) = problem(&calls.0, density, cells, ends, settings).map_err(|error| plain(py, error))?;
-    let mesh = compute(py, calls, move || Ok(line.solve(0.0, &line.uniform(), None)?.0))?;
+    let Settled { mesh, stalled, .. } = compute(py, calls, move || Ok(line.settled(0.0)?))?;
+    if let Some(failure) = stalled {
+        let text = format!("`face_density`: {failure}; the nodes are those of \"exact\"");
+        PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &CString::new(text)?, 2)?;
+    }
     Ok(mesh.into_pyarray(py))
 }
 

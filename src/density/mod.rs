@@ -13,6 +13,7 @@ pub use arclength::{Arclength, Strength};
 pub use given::Given;
 pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
+pub(crate) use root_gradient::need;
 pub use smoothing::smooth;
 
 use crate::error::{Failure, Result};

@@ -114,7 +114,7 @@ impl Monitor for RootGradient {
 }
 
 /// s where u changes by this share of its range over a uniform cell at most.
-fn need(share: f64) -> f64 {
+pub(crate) fn need(share: f64) -> f64 {
     let s = ((share - RESOLVED) / (UNRESOLVED - RESOLVED)).clamp(0.0, 1.0);
     s * s * (3.0 - 2.0 * s)
 }

@@ -1,4 +1,5 @@
 use super::LineDensity;
+use super::cumulative::Cumulative;
 use super::path::Path;
 use crate::error::Failure;
 use schemars::JsonSchema;
@@ -61,6 +62,8 @@ pub(super) struct Chain<'a> {
     pub h: f64,
     /// Where the line begins and ends in x.
     pub ends: [f64; 2],
+    /// ∫M over the line, where it is known.
+    pub cumulative: Option<&'a Cumulative>,
 }
 
 const MAX_NEWTON: usize = 200;
@@ -122,6 +125,30 @@ impl Chain<'_> {
         Some((Path::new(self.density, self.t, [a, b]).ok()?, changes))
     }
 
+    /// ∫M from a to b.
+    fn integral(&self, a: f64, b: f64) -> Result<f64, Failure> {
+        let on_line = |x: f64| (self.ends[0]..=self.ends[1]).contains(&x);
+        match self.cumulative {
+            Some(cumulative) if on_line(a) && on_line(b) => Ok(cumulative.up_to(b) - cumulative.up_to(a)),
+            _ => self.density.integral(self.t, a, b),
+        }
+    }
+
+    /// The nodes between two of the line where M is averaged exactly, or a guess of them where it is not.
+    fn divided(&self, count: usize, ends: [End; 2]) -> Option<Vec<f64>> {
+        let ([End::Value(a), End::Value(b)], cumulative) = (ends, self.cumulative?) else { return None };
+        let on_line = |x: f64| (self.ends[0]..=self.ends[1]).contains(&x);
+        if !(on_line(a) && on_line(b)) {
+            return None;
+        }
+        // values that pass each other are those of a mesh that runs backwards
+        let mut x = cumulative.divided([a.min(b), a.max(b)], count);
+        if a > b {
+            x.reverse();
+        }
+        Some(x)
+    }
+
     fn faces(&self, x: &[f64]) -> Result<Vec<Face>, Failure> {
         let cells = x.windows(2);
         match self.face {
@@ -145,7 +172,7 @@ impl Chain<'_> {
                         if width == 0.0 {
                             return Ok(Face { mean: m[0][0], by: [0.5 * m[0][1], 0.5 * m[1][1]] });
                         }
-                        let mean = self.density.integral(self.t, x[0], x[1])? / width;
+                        let mean = self.integral(x[0], x[1])? / width;
                         Ok(Face { mean, by: [(mean - m[0][0]) / width, (m[1][0] - mean) / width] })
                     })
                     .collect()
@@ -205,25 +232,52 @@ impl Chain<'_> {
         Ok((residual, rows))
     }
 
-    /// The nodes of a piece, from a guess: Newton's method, damped so that nodes keep their order. Returns the number of
-    /// linear solves.
+    /// The nodes of a piece, and the number of linear solves: by inversion of ∫M where M is averaged exactly between given
+    /// ends; else by Newton's method from a guess and, where that stalls, from the nodes that exact averages have.
     ///
     /// # Errors
     /// [`Failure::LineDensity`], [`Failure::LineStalled`].
     pub fn solve(&self, guess: &[f64], ends: [End; 2], step: Option<Step<'_>>) -> Result<(Vec<f64>, usize), Failure> {
+        if self.face == FaceDensity::Exact
+            && step.is_none()
+            && let Some(nodes) = self.divided(guess.len() - 1, ends)
+        {
+            return Ok((nodes, 0));
+        }
+        match self.newton(guess, ends, step) {
+            Err(stalled @ Failure::LineStalled { .. }) => match self.divided(guess.len() - 1, ends) {
+                Some(near) if near.is_sorted_by(|a, b| a < b) => self.newton(&near, ends, step).map_err(|_| stalled),
+                _ => Err(stalled),
+            },
+            other => other,
+        }
+    }
+
+    /// Newton's method, damped so that nodes keep their order.
+    pub fn newton(&self, guess: &[f64], ends: [End; 2], step: Option<Step<'_>>) -> Result<(Vec<f64>, usize), Failure> {
         let mut x = stretched(guess, ends);
         let size = x.iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
         let (mut residual, mut rows) = self.linearised(&x, ends, step)?;
         let mut last = f64::INFINITY;
-        for solves in 1..=MAX_NEWTON {
+        // an iterate of conditions on the flux may run backwards, and pass through no order on its way
+        let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
+        let remedy = match (free, step) {
+            (true, _) => {
+                "set schwarz.robin to \"auto\" or \"lagged\", schwarz.method to \"classical\", or refine grid.cells"
+            }
+            (false, Some(_)) => "lower time.step, refine grid.cells, or set equidistribution.face_density to \"exact\"",
+            (false, None) => {
+                "set equidistribution.face_density to \"exact\", or refine grid.cells: a density that jumps or peaks within a cell has no mesh by trapezoids or midpoints"
+            }
+        };
+        let most = if free { MAX_NEWTON / 2 } else { MAX_NEWTON };
+        for solves in 1..=most {
             let change = thomas(&rows, &residual);
             let largest = change.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
             let before = norm(&residual);
             // residuals of nodes that are right to the last bit
             let rounding = 4.0 * f64::EPSILON * size * rows.iter().fold(0.0, |m: f64, row| m.max(row[1].abs()));
             let (mut found, mut path) = (None, None);
-            // an iterate of conditions on the flux may run backwards, and pass through no order on its way
-            let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
             for (ordered, way, share) in ways(free) {
                 let mut tried: Vec<f64> = match way {
                     Way::Straight => x.iter().zip(&change).map(|(x, c)| x - share * c).collect(),
@@ -249,7 +303,7 @@ impl Chain<'_> {
                 }
             }
             let Some((tried, r, m, share)) = found else {
-                return Err(Failure::LineStalled { residual: before, iterations: solves });
+                return Err(Failure::LineStalled { residual: before, iterations: solves, remedy });
             };
             (x, residual, rows) = (tried, r, m);
             // quadratic until rounding: then steps no longer shrink
@@ -261,7 +315,7 @@ impl Chain<'_> {
             }
             last = largest;
         }
-        Err(Failure::LineStalled { residual: norm(&residual), iterations: MAX_NEWTON })
+        Err(Failure::LineStalled { residual: norm(&residual), iterations: most, remedy })
     }
 
     /// One linear solve with the face densities of given nodes frozen.

@@ -10,6 +10,7 @@
 
 mod chain;
 mod coarse;
+mod cumulative;
 mod density;
 mod path;
 pub mod pieces;
@@ -27,6 +28,7 @@ pub use schwarz::{Coarse, Method, Robin, Sweep};
 use crate::error::{Error, Failure, Result};
 use crate::parallel;
 use chain::{Chain, End, Step};
+use cumulative::Cumulative;
 use schemars::JsonSchema;
 use schwarz::{Iteration, Pieces};
 use serde::{Deserialize, Serialize};
@@ -56,6 +58,17 @@ pub struct Line {
 
 /// A mesh before, and τ/Δt of the step from it.
 pub type Before<'a> = Option<(&'a [f64], f64)>;
+
+/// The mesh of a whole line without time.
+#[derive(Debug, Clone)]
+pub struct Settled {
+    /// Its nodes.
+    pub mesh: Vec<f64>,
+    /// What they took.
+    pub linear_solves: usize,
+    /// Why they are those of [`FaceDensity::Exact`] where another average was asked for.
+    pub stalled: Option<Failure>,
+}
 
 /// When an iteration ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,8 +151,18 @@ impl History {
         self.iterates.len() - 1
     }
 
-    /// What to say where the tolerance was missed.
+    /// What to say where the glued mesh is no mesh, or the tolerance was missed.
     pub fn missed(&self, method: Method, stop: Stop) -> Option<Failure> {
+        self.far(method, stop).or_else(|| {
+            let disordered = |i: &usize| self.mesh[*i].is_nan() || self.mesh[*i] <= self.mesh[i - 1];
+            let node = (1..self.mesh.len()).find(disordered)?;
+            let [left, x] = [node - 1, node].map(|i| self.mesh[i]);
+            Some(Failure::LineFolded { node, x, left, iterations: self.count() })
+        })
+    }
+
+    /// What to say where the tolerance was missed.
+    fn far(&self, method: Method, stop: Stop) -> Option<Failure> {
         let length = self.mesh[self.mesh.len() - 1] - self.mesh[0];
         let tolerance = stop.tolerance.filter(|_| !self.converged)? * length;
         let measured: Vec<f64> = self.iterates.iter().map(|iterate| stop.measure.of(iterate)).collect();
@@ -206,9 +229,6 @@ const FEW: usize = 4;
 const ROUNDING: f64 = 1e-11;
 /// Contractions that count for the observed rate.
 const LAST: usize = 10;
-/// More cells than this begin with the mesh of so many times fewer.
-const NESTED: usize = 2000;
-const COARSER: usize = 8;
 /// Parts of a cell between which an interpolant is compared: of all cells, and of the worst.
 const FEW_PARTS: usize = 4;
 const PARTS: usize = 64;
@@ -224,8 +244,12 @@ impl Line {
         Self { density, face: FaceDensity::default(), cells, ends: [0.0, 1.0] }
     }
 
-    fn chain(&self, t: f64) -> Chain<'_> {
-        Chain { density: &self.density, face: self.face, t, h: 1.0 / self.cells as f64, ends: self.ends }
+    fn chain<'a>(&'a self, t: f64, cumulative: Option<&'a Cumulative>) -> Chain<'a> {
+        Chain { density: &self.density, face: self.face, t, h: 1.0 / self.cells as f64, ends: self.ends, cumulative }
+    }
+
+    fn cumulative(&self, t: f64) -> Result<Cumulative, Failure> {
+        Cumulative::new(&self.density, t, self.ends)
     }
 
     /// Equal cells.
@@ -241,55 +265,80 @@ impl Line {
         x
     }
 
-    /// The discrete mesh of the whole line, and the linear solves that it took on this line: many cells begin with the
-    /// mesh of fewer.
+    /// The mesh on which all cells have the same ∫M: its nodes are those of the continuous problem, found by inversion of
+    /// ∫M, which no density hinders that is finite and positive.
     ///
     /// # Errors
-    /// As [`iterate`](Self::iterate).
+    /// [`Failure::LineDensity`]; [`Failure::LineUnresolved`] where a layer is so thin, and so many cells lie in it, that neighbours
+    /// would be the same number.
+    pub fn equidistributed(&self, t: f64) -> Result<Vec<f64>, Failure> {
+        self.in_order(self.cumulative(t)?.divided(self.ends, self.cells))
+    }
+
+    fn in_order(&self, mesh: Vec<f64>) -> Result<Vec<f64>, Failure> {
+        match (1..mesh.len()).find(|&i| mesh[i] <= mesh[i - 1]) {
+            None => Ok(mesh),
+            Some(i) => Err(Failure::LineUnresolved { node: i, x: mesh[i], cells: self.cells }),
+        }
+    }
+
+    /// The discrete mesh of the whole line, and the linear solves that it took: none for [`FaceDensity::Exact`] without time,
+    /// which is [`equidistributed`](Self::equidistributed). The others start there, or at the guess where there is time.
+    ///
+    /// # Errors
+    /// As [`iterate`](Self::iterate), and those of [`equidistributed`](Self::equidistributed).
     pub fn solve(&self, t: f64, guess: &[f64], before: Before<'_>) -> Result<(Vec<f64>, usize)> {
         self.check_mesh("guess", guess)?;
         before.map_or(Ok(()), |(old, _)| self.check_mesh("before", old))?;
-        let step = before.map(|(old, ratio)| Step { old, ratio });
-        if before.is_none() && self.cells > NESTED {
-            let coarse = Self { cells: self.cells / COARSER, ..self.clone() };
-            let near = coarse.solve(t, &interpolated(guess, coarse.cells), None)?.0;
-            return Ok(self.chain(t).solve(&interpolated(&near, self.cells), self.ends.map(End::Value), None)?);
-        }
-        Ok(self.chain(t).solve(guess, self.ends.map(End::Value), step)?)
+        let cumulative = self.cumulative(t)?;
+        Ok(self.solved(t, &cumulative, guess, before)?)
     }
 
-    /// The continuous mesh at some ξ: ∫ M up to x(ξ) is ξ times that over the line.
+    fn solved(
+        &self,
+        t: f64,
+        cumulative: &Cumulative,
+        guess: &[f64],
+        before: Before<'_>,
+    ) -> Result<(Vec<f64>, usize), Failure> {
+        let (chain, ends) = (self.chain(t, Some(cumulative)), self.ends.map(End::Value));
+        if let Some((old, ratio)) = before {
+            return chain.solve(guess, ends, Some(Step { old, ratio }));
+        }
+        let near = self.in_order(cumulative.divided(self.ends, self.cells))?;
+        if self.face == FaceDensity::Exact {
+            return Ok((near, 0));
+        }
+        match chain.newton(&near, ends, None) {
+            Err(Failure::LineStalled { .. }) => chain.newton(guess, ends, None),
+            other => other,
+        }
+    }
+
+    /// The discrete mesh of the whole line, or where Newton's method finds none the one that has the same ∫M in all cells: M
+    /// that jumps or peaks within a cell may have no mesh by trapezoids or midpoints.
     ///
-    /// `between` are places from end to end between which M is integrated, such as the nodes of a mesh: quadrature sees what
-    /// they resolve.
+    /// # Errors
+    /// As [`equidistributed`](Self::equidistributed).
+    pub fn settled(&self, t: f64) -> Result<Settled, Failure> {
+        let cumulative = self.cumulative(t)?;
+        match self.solved(t, &cumulative, &self.uniform(), None) {
+            Ok((mesh, linear_solves)) => Ok(Settled { mesh, linear_solves, stalled: None }),
+            Err(stalled @ Failure::LineStalled { .. }) => {
+                let mesh = self.in_order(cumulative.divided(self.ends, self.cells))?;
+                Ok(Settled { mesh, linear_solves: 0, stalled: Some(stalled) })
+            }
+            Err(other) => Err(other),
+        }
+    }
+
+    /// The continuous mesh at some ξ that grow: ∫ M up to x(ξ) is ξ times that over the line.
     ///
     /// # Errors
     /// [`Failure::LineDensity`].
-    pub fn exact(&self, t: f64, between: &[f64], xi: &[f64]) -> Result<Vec<f64>, Failure> {
-        let mut sum = 0.0;
-        let mut up_to = vec![0.0];
-        for ends in between.windows(2) {
-            sum += self.density.integral(t, ends[0], ends[1])?;
-            up_to.push(sum);
-        }
-        let length = self.ends[1] - self.ends[0];
-        let place = |xi: &f64| {
-            let k = up_to.partition_point(|at| *at <= xi * sum).clamp(1, between.len() - 1) - 1;
-            let (wanted, [mut low, mut high]) = (xi * sum - up_to[k], [between[k], between[k + 1]]);
-            let mut x = low + (high - low) * (wanted / (up_to[k + 1] - up_to[k])).clamp(0.0, 1.0);
-            for _ in 0..200 {
-                let off = self.density.integral(t, between[k], x)? - wanted;
-                *(if off > 0.0 { &mut high } else { &mut low }) = x;
-                let newton = x - off / self.density.at(t, x)?[0];
-                let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-                if (next - x).abs() <= 2.0 * f64::EPSILON * length {
-                    return Ok(next);
-                }
-                x = next;
-            }
-            Ok(x)
-        };
-        xi.iter().map(place).collect()
+    pub fn exact(&self, t: f64, xi: &[f64]) -> Result<Vec<f64>, Failure> {
+        let cumulative = self.cumulative(t)?;
+        Ok(cumulative.inverted(xi.iter().map(|xi| xi * cumulative.whole())))
     }
 
     /// ∫M over each cell of a mesh, in its own way of averaging M over a cell.
@@ -297,7 +346,7 @@ impl Line {
     /// # Errors
     /// [`Failure::LineDensity`].
     pub fn shares(&self, t: f64, mesh: &[f64]) -> Result<Vec<f64>, Failure> {
-        let chain = self.chain(t);
+        let chain = self.chain(t, None);
         Ok(chain.fluxes(mesh)?.into_iter().map(|flux| flux * chain.h).collect())
     }
 
@@ -320,8 +369,11 @@ impl Line {
     ) -> Result<History> {
         pieces::check("ranges", ranges, self.cells, method)?;
         self.check_mesh("start", start)?;
-        let reference = self.solve(t, start, before)?.0;
-        let iteration = Iteration { chain: self.chain(t), ranges, method, old: before, cells: self.cells };
+        before.map_or(Ok(()), |(old, _)| self.check_mesh("before", old))?;
+        let cumulative = self.cumulative(t)?;
+        let reference = self.solved(t, &cumulative, start, before)?.0;
+        let chain = self.chain(t, Some(&cumulative));
+        let iteration = Iteration { chain, ranges, method, old: before, cells: self.cells };
         let exact = iteration.cut(&reference);
         let mut pieces = iteration.cut(start);
         let mut path = Path::default();
@@ -446,18 +498,6 @@ impl Path {
         }
         self.seen += 1;
     }
-}
-
-/// A mesh with another number of cells.
-fn interpolated(mesh: &[f64], cells: usize) -> Vec<f64> {
-    let last = mesh.len() - 1;
-    let at = |i: usize| {
-        let place = i as f64 / cells as f64 * last as f64;
-        let cell = (place as usize).min(last - 1);
-        mesh[cell] + (place - cell as f64) * (mesh[cell + 1] - mesh[cell])
-    };
-    // the end to the last bit
-    (0..cells).map(at).chain([mesh[last]]).collect()
 }
 
 fn distance(a: &Pieces, b: &Pieces) -> f64 {

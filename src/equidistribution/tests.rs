@@ -43,7 +43,7 @@ fn exact_meshes() {
         (square(), [0.13255693, 0.32218535, 0.59607164, 0.81773167, 0.93100813]),
         (layer(), [0.18336210, 0.45840525, 0.88222053, 0.96943518, 0.98988916]),
     ] {
-        let found = Line::new(density, 10).exact(0.0, &[0.0, 1.0], &xi).unwrap();
+        let found = Line::new(density, 10).exact(0.0, &xi).unwrap();
         assert!(found.iter().zip(expected).all(|(x, e)| (x - e).abs() < 1e-8), "{found:?} against {expected:?}");
     }
     assert!((layer().integral(0.0, 0.0, 1.0).unwrap() - 1.83362100753).abs() < 1e-11);
@@ -61,7 +61,7 @@ fn a_density_may_jump() {
         let place = |g: f64| if g < up_to_jump { g / left } else { 0.3 + (g - up_to_jump) / right };
         let mesh = line.solve(0.0, &line.uniform(), None).unwrap().0;
         let xi: Vec<f64> = (0..=100).map(|i| i as f64 / 100.0).collect();
-        for found in [mesh, line.exact(0.0, &[0.0, 1.0], &xi).unwrap()] {
+        for found in [mesh, line.exact(0.0, &xi).unwrap()] {
             let off = found.iter().zip(&xi).map(|(x, xi)| (x - place(xi * whole)).abs()).fold(0.0, f64::max);
             assert!(off < 1e-10, "{left}, {right}: off by {off:e}");
         }
@@ -76,7 +76,7 @@ fn discrete_meshes_converge() {
             let line = line(square(), cells, face);
             let mesh = line.solve(0.0, &line.uniform(), None).unwrap().0;
             let xi: Vec<f64> = (0..=cells).map(|i| i as f64 / cells as f64).collect();
-            let exact = line.exact(0.0, &[0.0, 1.0], &xi).unwrap();
+            let exact = line.exact(0.0, &xi).unwrap();
             mesh.iter().zip(exact).map(|(x, e)| (x - e).abs()).fold(0.0, f64::max)
         };
         let trapezoid = error(FaceDensity::Trapezoid);

@@ -54,6 +54,8 @@ const GOES_STRAIGHT_ON: f64 = 0.9;
 const STEPS: [f64; 2] = [15.0, 1e5];
 /// Corrections below this share of the shortest edge are of the solver.
 const SOLVED_TO: f64 = 1e-2;
+/// A step so many times longer than the last one goes no farther at the velocity that was learnt.
+const LONGER: f64 = 1.5;
 /// Corrections below this share of the shortest edge do no harm.
 const SEEN: f64 = 0.1;
 /// Share of the earlier steps in the mean over the last ones.
@@ -261,6 +263,10 @@ impl Predicted {
     /// Where a mesh is after `dt`; the same mesh where the gain is 0.
     pub(super) fn after(mesh: &Mesh<2>, gait: &Gait, u: &[f64], gain: f64, dt: f64) -> Result<Self, Failure> {
         let mut going = gait.velocity.clone();
+        // corrections are as large in short steps as in long ones: what was learnt from them says nothing of a much longer one
+        if let Some(last) = gait.last.as_ref().filter(|last| dt > LONGER * last.took) {
+            going.iter_mut().flatten().for_each(|v| *v *= LONGER * last.took / dt);
+        }
         if gain > 0.0 && mesh.lattice().periodic().contains(&true) {
             go_along(mesh, &mut going, gait.drift(mesh, u));
         }

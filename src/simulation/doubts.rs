@@ -56,11 +56,12 @@ fn lost(simulation: &Simulation, state: &State) -> Vec<String> {
         let [there, twice, seen] =
             [(&reference.0, &reference.1), (&coarser.0, &coarser.1), (&state.mesh, &state.u)].map(content);
         let off = (there - seen).abs();
-        (off > LOSS * there && there > ROUNDING * size && (there - twice).abs() < 0.25 * off).then(|| {
+        (off > LOSS * there && there > ROUNDING * size && (there - twice).abs() < 0.5 * off).then(|| {
             format!(
-                "`{name}`: the mesh at the start holds {:.1} % of what its initial data hold (∫|{name} − m|, m its median); \
-                 refine `grid.cells`, or let the mesh follow it by `monitor.of`",
-                100.0 * seen / there
+                "`{name}`: the mesh at the start holds {} % of what its initial data hold (∫|{name} − m|, m its median): what \
+                 lies between its nodes is {}; refine `grid.cells`, or let the mesh follow it by `monitor.of`",
+                (1000.0 * seen / there).round() / 10.0,
+                if seen < there { "missed" } else { "taken for more than it is" }
             )
         })
     });

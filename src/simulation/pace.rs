@@ -115,6 +115,8 @@ const SHORT: f64 = 1e-5;
 const MOST_SHORT: usize = 1000;
 /// A share of the longest step that is lost in rounding.
 const SHORTEST: f64 = 1e-12;
+/// The same below which no step is where the solution is given.
+const GIVEN: f64 = 0.02;
 /// Steps in a run in which nothing changes.
 const FEWEST: f64 = 20.0;
 /// A share of the time in which the mesh follows: what would shorten it by more is asked of a mesh that rests.
@@ -154,7 +156,8 @@ impl Free {
                     let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), ranges[0]);
                     // a trial in which too much happens says little
                     if share <= CHANGE || number == TRIALS {
-                        return Ok(free((trial * CHANGE / share).min(longest), longest));
+                        let least = if simulation.physics.is_given() { GIVEN * longest } else { 0.0 };
+                        return Ok(free((trial * CHANGE / share).clamp(least, longest), longest));
                     }
                 }
                 Err(failure) if number == TRIALS => {
@@ -219,12 +222,16 @@ impl Free {
             }
         };
         self.dt = (self.dt * factor).min(self.longest);
+        // of a solution that is given nothing is lost where nodes pass a jump in it
+        if simulation.physics.is_given() {
+            self.dt = self.dt.max(GIVEN * self.longest);
+        }
         self.short = if self.dt < SHORT * self.longest { self.short + 1 } else { 0 };
         if self.short > MOST_SHORT || self.dt < SHORTEST * self.longest {
             let cause = self.cause(simulation, before, after, dt);
             return Err(Failure::VanishingStep { dt: self.dt, cause });
         }
-        if !taken {
+        if !(taken || simulation.physics.is_given() && dt <= 1.01 * GIVEN * self.longest) {
             record.work.rejected_steps += 1;
             return Ok(None);
         }

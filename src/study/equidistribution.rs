@@ -116,11 +116,27 @@ impl LineDensityKind {
 }
 
 /// `[equidistribution]`.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Discretization {
     /// Mean of M over a cell.
     pub face_density: FaceDensity,
+    /// Places where M may have spikes that are too thin to be found among a few thousand equal parts of the line.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<f64>,
+}
+
+impl Discretization {
+    /// Refuses points that are not on the line.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub fn check(&self, [a, b]: [f64; 2]) -> Result<()> {
+        match self.points.iter().find(|x| !(a..=b).contains(x)) {
+            None => Ok(()),
+            Some(x) => Err(Error::invalid("points", x, format!("must lie on the line, from {a} to {b}"))),
+        }
+    }
 }
 
 /// `[schwarz]`: a method with its options, and one way to divide the line.
@@ -291,6 +307,7 @@ impl EquidistributionStudy {
             return Err(Error::invalid("grid.cells", format!("[{cells}]"), "must be 2 or more"));
         }
         super::memory::check_memory(cells as u128 + 1, BYTES_PER_CELL, &self.grid.cells)?;
+        self.equidistribution.check([a, b]).map_err(|error| error.within("equidistribution"))?;
         self.resolve_time()?;
         self.check_density()?;
         if let Some(schwarz) = &mut self.schwarz {
@@ -346,6 +363,7 @@ impl EquidistributionStudy {
 
     fn line(&self, density: LineDensity) -> Line {
         let ends = [self.domain.lower[0], self.domain.upper[0]];
+        let density = density.with_spikes(self.equidistribution.points.clone());
         Line { density, face: self.equidistribution.face_density, cells: self.grid.cells[0], ends }
     }
 
@@ -373,7 +391,7 @@ impl EquidistributionStudy {
     }
 
     /// The first mesh, where it is not a solution.
-    fn given_start(&self) -> Result<Option<Vec<f64>>> {
+    pub(super) fn given_start(&self) -> Result<Option<Vec<f64>>> {
         let line = self.problem()?;
         let Some(FirstMesh::Formula(text)) = &self.start.mesh else {
             return Ok((self.start.mesh != Some(FirstMesh::Equidistributed)).then(|| line.uniform()));
@@ -389,17 +407,6 @@ impl EquidistributionStudy {
         let mesh = line.mapped(|xi| formula.eval(&[xi]));
         line.check_mesh(key, &mesh)?;
         Ok(Some(mesh))
-    }
-
-    /// The first mesh.
-    ///
-    /// # Errors
-    /// As [`Line::solve`].
-    pub fn first(&self, line: &Line) -> Result<Vec<f64>> {
-        match self.given_start()? {
-            Some(mesh) => Ok(mesh),
-            None => Ok(line.solve(self.time.map_or(0.0, |time| time.start), &line.uniform(), None)?.0),
-        }
     }
 
     /// Memory that the run needs, in bytes.

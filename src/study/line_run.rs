@@ -4,7 +4,7 @@ use super::EquidistributionStudy;
 use super::any::Begin;
 use super::ending::end;
 use super::line_files::{keep, thinned, write_series};
-use crate::equidistribution::{FaceDensity, History, Iterate, Line};
+use crate::equidistribution::{FaceDensity, History, Iterate, Line, Settled};
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::check_nodal;
 use crate::report;
@@ -163,6 +163,9 @@ pub struct Evolution {
     pub newest: Vec<f64>,
     /// Linear solves in them.
     pub linear_solves: usize,
+    /// What the user should know although nothing failed.
+    #[serde(default)]
+    pub warnings: Vec<String>,
 }
 
 /// What a run in time goes on from.
@@ -220,7 +223,10 @@ impl EquidistributionStudy {
         let (steps, start) = schedule.as_ref().map_or((1, 0.0), |s| (s.steps().unwrap_or(1), s.time(0)));
         let divided = self.decomposition()?;
         if evolution.newest.is_empty() {
-            evolution.newest = self.first(line)?;
+            evolution.newest = match self.given_start()? {
+                Some(mesh) => mesh,
+                None => evolution.settled(line.settled(start)?).0,
+            };
             evolution.keep(start);
         }
         for step in evolution.done + 1..=steps {
@@ -234,7 +240,10 @@ impl EquidistributionStudy {
             let old = self.time.map(|time| (mesh.as_slice(), time.relaxation / dt));
             let next = match &divided {
                 None => {
-                    let (next, solves) = line.solve(t, &mesh, old).map_err(during)?;
+                    let (next, solves) = match old {
+                        Some(_) => line.solve(t, &mesh, old).map_err(during)?,
+                        None => evolution.settled(line.settled(t)?),
+                    };
                     evolution.linear_solves += solves;
                     if self.time.is_some() {
                         evolution.steps.push(StepRow::new(line, t, &next, solves).map_err(during)?);
@@ -409,6 +418,18 @@ impl EquidistributionStudy {
 }
 
 impl Evolution {
+    /// The mesh of the whole line with its linear solves; a warning where it is not what was asked for.
+    fn settled(&mut self, Settled { mesh, linear_solves, stalled }: Settled) -> (Vec<f64>, usize) {
+        let warn = |failure| {
+            format!(
+                "`equidistribution.face_density`: {failure}; the nodes are those of \"exact\", which a density that jumps or peaks \
+                 within a cell has always"
+            )
+        };
+        self.warnings = stalled.map(warn).into_iter().collect();
+        (mesh, linear_solves)
+    }
+
     /// Keeps the newest mesh, of this time.
     fn keep(&mut self, t: f64) {
         self.times.push(t);
@@ -461,7 +482,11 @@ impl EquidistributionSummary {
             self.tell_iterations(study, evolution, history, tolerance);
         }
         self.quality = Some(LineQuality::of(line, t, &self.mesh, study.time.is_none())?);
-        self.warnings = unseen(line, t, &self.mesh)?.into_iter().collect();
+        self.warnings = evolution.warnings.clone();
+        // averages for which there is no mesh see another density than there is
+        if self.warnings.is_empty() {
+            self.warnings.extend(unseen(line, t, &self.mesh)?);
+        }
         Ok(())
     }
 
@@ -506,8 +531,7 @@ impl LineQuality {
         let compared = |cells: usize| -> Result<f64> {
             let nodes: Vec<usize> = thinned(cells + 1, COMPARED).collect();
             let xi: Vec<f64> = nodes.iter().map(|&i| i as f64 / cells as f64).collect();
-            let between: Vec<f64> = thinned(cells + 1, EXACTLY).map(|i| mesh[i]).collect();
-            let exact = line.exact(t, &between, &xi)?;
+            let exact = line.exact(t, &xi)?;
             Ok(nodes.iter().zip(exact).map(|(&i, exact)| (mesh[i] - exact).abs()).fold(0.0, f64::max))
         };
         Ok(Self {

@@ -1,0 +1,330 @@
+use super::LineDensity;
+use crate::error::Failure;
+use std::f64::consts::PI;
+
+/// G(x) = ∫M from the beginning of a line to x, and its inverse
+///
+/// M is interpolated by polynomials in Chebyshev points on pieces that are halved until their last coefficients are below
+/// 1e-12 of the mean of M on the piece, or do not count beside ∫M over the line. Integrated, they give G in every place; as
+/// M > 0, G grows, and Newton's method held between two bounds inverts it. M is asked for inside the line only, many places at
+/// once.
+///
+/// Where M is the arc length of u, no piece may be shorter than its chord: layers thinner than the distance of the places
+/// are found so. Elsewhere the user names the places of spikes. Where M jumps, pieces are halved down to neighbouring
+/// numbers.
+///
+/// # Source
+/// Trefethen, *Approximation Theory and Approximation Practice* (2013), chapters 3, 4 and 19.
+#[derive(Debug, Clone)]
+pub(super) struct Cumulative {
+    pieces: Vec<Piece>,
+    whole: f64,
+}
+
+/// A piece of the line: G(lower + half (1 + s)) = below + half Σ c_k T_k(s), −1 ≤ s ≤ 1.
+#[derive(Debug, Clone)]
+struct Piece {
+    lower: f64,
+    upper: f64,
+    /// G at its beginning.
+    below: f64,
+    /// Over it.
+    integral: f64,
+    /// Of ∫M ds, zero at s = −1.
+    coefficients: Vec<f64>,
+}
+
+/// Degree of the polynomials.
+const DEGREE: usize = 16;
+const POINTS: usize = DEGREE + 1;
+/// Pieces to begin with, and pieces beyond which M is taken as it is.
+const FIRST: usize = 128;
+const MOST: usize = 1 << 16;
+/// The last coefficients over the mean of M on the piece, and their share in ∫M over the line, that are good enough.
+const RESOLVED: f64 = 1e-12;
+const ROUNDING: f64 = 1e-16;
+/// Share by which a chord may be longer than the arc: rounding of u.
+const CHORD: f64 = 1e-9;
+const MOST_NEWTON: usize = 100;
+
+impl Cumulative {
+    /// Of a density over a line.
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`] at the first place found where M is not finite and positive, or where u jumps.
+    pub fn new(density: &LineDensity, t: f64, [a, b]: [f64; 2]) -> Result<Self, Failure> {
+        if let Some(known) = density.breaks(a, b) {
+            return Self::linear(density, t, known);
+        }
+        let mut ends: Vec<f64> = (0..=FIRST).map(|k| a + (b - a) * (k as f64 / FIRST as f64)).collect();
+        ends[FIRST] = b;
+        ends.extend(density.spikes().iter().filter(|x| (a..b).contains(*x)));
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        let mut unsure: Vec<[f64; 2]> = ends.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+        let transform = transform();
+        let mut pieces: Vec<Piece> = Vec::new();
+        while !unsure.is_empty() {
+            let last = pieces.len() + unsure.len() > MOST;
+            let places: Vec<f64> = unsure.iter().flat_map(points).collect();
+            let values = density.values(t, &places).or_else(|failure| {
+                // the first place along the line is the one to name
+                let mut sorted = places.clone();
+                sorted.sort_by(f64::total_cmp);
+                density.values(t, &sorted).and(Err(failure))
+            })?;
+            let u = density.followed(t, &unsure.concat());
+            let found: Vec<(Piece, f64)> = unsure
+                .iter()
+                .zip(values.chunks_exact(POINTS))
+                .map(|(ends, values)| Piece::through(*ends, values, &transform))
+                .collect();
+            let whole: f64 =
+                pieces.iter().chain(found.iter().map(|(piece, _)| piece)).map(|piece| piece.integral).sum();
+            let mut halves = Vec::new();
+            for (k, (piece, tail)) in found.into_iter().enumerate() {
+                let width = piece.upper - piece.lower;
+                let middle = piece.lower + 0.5 * width;
+                let chord = u.as_ref().map_or(0.0, |u| width.hypot(u[2 * k + 1] - u[2 * k]));
+                let seen = chord <= piece.integral * (1.0 + CHORD) + ROUNDING * whole;
+                let smooth = tail * width <= RESOLVED * piece.integral || tail * width <= ROUNDING * whole;
+                let divides = piece.lower < middle && middle < piece.upper && width > f64::MIN_POSITIVE;
+                if seen && smooth || last || !divides {
+                    if !(seen || divides) && chord > NOTICEABLE * whole {
+                        return Err(Failure::LineDensity { what: "u_x", value: f64::INFINITY, x: piece.lower, t });
+                    }
+                    pieces.push(piece);
+                } else {
+                    halves.extend([[piece.lower, middle], [middle, piece.upper]]);
+                }
+            }
+            unsure = halves;
+        }
+        Ok(Self::of(pieces))
+    }
+
+    /// Where M is linear between known places.
+    fn linear(density: &LineDensity, t: f64, ends: Vec<f64>) -> Result<Self, Failure> {
+        let pieces = ends.windows(2).map(|ends| {
+            // at an end where M jumps, the values beside it on this side
+            let [left, right] = density.between(t, [ends[0], ends[1]])?;
+            let (mean, slope) = (0.5 * (left + right), 0.5 * (right - left));
+            let integral = mean * (ends[1] - ends[0]);
+            let coefficients = vec![mean - 0.25 * slope, mean, 0.25 * slope];
+            Ok(Piece { lower: ends[0], upper: ends[1], below: 0.0, integral, coefficients })
+        });
+        Ok(Self::of(pieces.collect::<Result<_, Failure>>()?))
+    }
+
+    fn of(mut pieces: Vec<Piece>) -> Self {
+        pieces.sort_by(|a, b| a.lower.total_cmp(&b.lower));
+        // compensated: of many pieces each counts
+        let (mut sum, mut lost) = (0.0_f64, 0.0);
+        for piece in &mut pieces {
+            piece.below = sum + lost;
+            let next = sum + piece.integral;
+            lost += if sum >= piece.integral { (sum - next) + piece.integral } else { (piece.integral - next) + sum };
+            sum = next;
+        }
+        Self { pieces, whole: sum + lost }
+    }
+
+    /// ∫M from the beginning of the line to a place on it.
+    pub fn up_to(&self, x: f64) -> f64 {
+        let k = self.pieces.partition_point(|piece| piece.lower <= x).max(1) - 1;
+        let piece = &self.pieces[k];
+        let half = 0.5 * (piece.upper - piece.lower);
+        piece.below + half * clenshaw(&piece.coefficients, ((x - piece.lower) / half - 1.0).clamp(-1.0, 1.0))[0]
+    }
+
+    /// `count` + 1 nodes from a to b, places on the line with the same ∫M between neighbours.
+    pub fn divided(&self, [a, b]: [f64; 2], count: usize) -> Vec<f64> {
+        let [from, to] = [a, b].map(|x| if x == self.ends()[1] { self.whole } else { self.up_to(x) });
+        let share = |i: usize| from + (to - from) * (i as f64 / count as f64);
+        let inner = self.inverted((1..count).map(share));
+        [a].into_iter().chain(inner.into_iter().map(|x| x.clamp(a, b))).chain([b]).collect()
+    }
+
+    /// Where G is as large as each of some values that grow.
+    pub fn inverted(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut k = 0;
+        let mut s = -1.0;
+        let place = |g: f64| {
+            while k + 1 < self.pieces.len() && g >= self.pieces[k + 1].below {
+                (k, s) = (k + 1, -1.0);
+            }
+            let piece = &self.pieces[k];
+            s = piece.inverted(g, s);
+            piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + s)
+        };
+        values.map(place).collect()
+    }
+
+    /// Over the line.
+    pub fn whole(&self) -> f64 {
+        self.whole
+    }
+
+    /// The ends of the line.
+    pub fn ends(&self) -> [f64; 2] {
+        [self.pieces[0].lower, self.pieces[self.pieces.len() - 1].upper]
+    }
+}
+
+/// Share of ∫M over the line that tells of a jump of u.
+const NOTICEABLE: f64 = 1e-12;
+
+impl Piece {
+    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and the size of its last
+    /// coefficients.
+    fn through([lower, upper]: [f64; 2], values: &[f64], transform: &[[f64; POINTS]; POINTS]) -> (Self, f64) {
+        let c: [f64; POINTS] =
+            std::array::from_fn(|k| transform[k].iter().zip(values).map(|(weight, value)| weight * value).sum());
+        // ∫T_k = (T_{k+1}/(k + 1) − T_{k−1}/(k − 1))/2, ∫T_0 = T_1, ∫T_1 = T_2/4
+        let at = |k: usize| c.get(k).copied().unwrap_or(0.0);
+        let mut coefficients: Vec<f64> = (0..=POINTS)
+            .map(|k| match k {
+                0 => 0.0,
+                1 => at(0) - 0.5 * at(2),
+                k => (at(k - 1) - at(k + 1)) / (2.0 * k as f64),
+            })
+            .collect();
+        // T_k(−1) = (−1)^k, T_k(1) = 1
+        coefficients[0] = (1..=POINTS).map(|k| if k % 2 == 1 { coefficients[k] } else { -coefficients[k] }).sum();
+        let integral = 0.5 * (upper - lower) * coefficients.iter().sum::<f64>();
+        let tail = c[DEGREE - 2..].iter().map(|c| c.abs()).sum();
+        (Self { lower, upper, below: 0.0, integral, coefficients }, tail)
+    }
+
+    /// s where G is `g`, at or beyond `from`.
+    fn inverted(&self, g: f64, from: f64) -> f64 {
+        let half = 0.5 * (self.upper - self.lower);
+        let wanted = (g - self.below) / half;
+        let (mut low, mut high) = (from, 1.0_f64);
+        let mut s = (2.0 * (g - self.below) / self.integral - 1.0).clamp(low, high);
+        for _ in 0..MOST_NEWTON {
+            let [value, slope] = clenshaw(&self.coefficients, s);
+            let off = value - wanted;
+            *(if off > 0.0 { &mut high } else { &mut low }) = s;
+            let newton = s - off / slope;
+            // where the step is lost in rounding, so is what is off
+            if (newton - s).abs() <= f64::EPSILON || high - low <= f64::EPSILON {
+                return newton.clamp(low, high);
+            }
+            s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        }
+        s
+    }
+}
+
+/// Σ c_k T_k and its derivative.
+fn clenshaw(c: &[f64], s: f64) -> [f64; 2] {
+    let (mut b, mut b_next) = (0.0, 0.0);
+    let (mut d, mut d_next) = (0.0, 0.0);
+    for &c in c[1..].iter().rev() {
+        (d, d_next) = (2.0 * b + 2.0 * s * d - d_next, d);
+        (b, b_next) = (c + 2.0 * s * b - b_next, b);
+    }
+    [c[0] + s * b - b_next, b + s * d - d_next]
+}
+
+/// The Chebyshev points between two places, both ends among them.
+fn points([lower, upper]: &[f64; 2]) -> impl Iterator<Item = f64> + use<> {
+    let [lower, upper] = [*lower, *upper];
+    let half = 0.5 * (upper - lower);
+    (0..POINTS).map(move |j| match j {
+        0 => upper,
+        DEGREE => lower,
+        // from the nearer end, so that no place leaves the piece
+        j if 2 * j < DEGREE => upper - half * 2.0 * (0.5 * PI * j as f64 / DEGREE as f64).sin().powi(2),
+        j => lower + half * 2.0 * (0.5 * PI * j as f64 / DEGREE as f64).cos().powi(2),
+    })
+}
+
+/// From values in the Chebyshev points, s_j = cos(jπ/n), to coefficients: c_k = (2/n) Σ″ f_j cos(jkπ/n), halved for k = 0 and n.
+fn transform() -> [[f64; POINTS]; POINTS] {
+    let half = |k: usize| if k == 0 || k == DEGREE { 0.5 } else { 1.0 };
+    std::array::from_fn(|k| {
+        std::array::from_fn(|j| {
+            2.0 / DEGREE as f64 * half(k) * half(j) * (PI * (j * k % (2 * DEGREE)) as f64 / DEGREE as f64).cos()
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(m: &str) -> Cumulative {
+        Cumulative::new(&LineDensity::formula(m).unwrap(), 0.0, [0.0, 1.0]).unwrap()
+    }
+
+    /// Against closed forms, smooth, with a kink, with a jump, and with a layer at an end.
+    #[test]
+    fn the_integral_is_exact() {
+        for (m, exact) in [
+            ("x^2 + 1", Box::new(|x: f64| x + x.powi(3) / 3.0) as Box<dyn Fn(f64) -> f64>),
+            ("abs(x - 0.3) + 0.1", Box::new(|x| 0.1 * x + 0.5 * (0.09 + (x - 0.3) * (x - 0.3).abs()))),
+            ("if(x < 0.37, 1, 1e6)", Box::new(|x| if x < 0.37 { x } else { 0.37 + 1e6 * (x - 0.37) })),
+            ("1 + 1e9*exp(-x/1e-9)", Box::new(|x| x - (-x / 1e-9).exp_m1())),
+            (
+                "sqrt(abs(x - 0.5)) + 1e-6",
+                Box::new(|x: f64| {
+                    let part = |d: f64| d.abs().powf(1.5).copysign(d) * 2.0 / 3.0;
+                    part(x - 0.5) - part(-0.5) + 1e-6 * x
+                }),
+            ),
+        ] {
+            let g = of(m);
+            for k in 0..=1000 {
+                let x = k as f64 / 1000.0;
+                assert!((g.up_to(x) - exact(x)).abs() < 3e-14 * g.whole(), "{m} at {x}: {} {}", g.up_to(x), exact(x));
+            }
+        }
+    }
+
+    /// M x_ξ is constant: of x² + 1 the middle node is known.
+    #[test]
+    fn the_inverse_divides_evenly() {
+        let x = of("x^2 + 1").divided([0.0, 1.0], 2);
+        assert!((x[1] - 0.596_071_637_983_321_5).abs() < 1e-15, "{}", x[1]);
+        let g = of("1 + 1e9*exp(-x/1e-9)");
+        for count in [7, 160, 10_000] {
+            let x = g.divided([0.0, 1.0], count);
+            let shares: Vec<f64> =
+                x.windows(2).map(|x| x[1] - x[0] + ((-x[0] / 1e-9).exp() * -((x[0] - x[1]) / 1e-9).exp_m1())).collect();
+            assert!(shares.iter().all(|share| (share * count as f64 / 2.0 - 1.0).abs() < 1e-9));
+        }
+    }
+
+    /// A layer of an arc length, however thin and wherever it is, is not missed; where M is a formula, its place is named.
+    #[test]
+    fn thin_layers_are_found() {
+        for width in [1e-2, 1e-5, 1e-9, 1e-12] {
+            for place in [0.0, 0.3, 0.77] {
+                let u = LineDensity::arclength(&format!("tanh((x - {place})/{width})")).unwrap();
+                let g = Cumulative::new(&u, 0.0, [0.0, 1.0]).unwrap();
+                let jump = if place == 0.0 { 1.0 } else { 2.0 };
+                assert!((g.whole() - 1.0 - jump).abs() < 4.0 * width, "{width} at {place}: {}", g.whole());
+            }
+            let spike = LineDensity::formula(&format!("1 + exp(-((x - 0.3)/{width})^2)/{width}")).unwrap();
+            let g = Cumulative::new(&spike.with_spikes(vec![0.3]), 0.0, [0.0, 1.0]).unwrap();
+            assert!((g.whole() - 1.0 - PI.sqrt()).abs() < 1e-9, "{width}: {}", g.whole());
+        }
+    }
+
+    /// M is asked for inside the line, and seldom.
+    #[test]
+    fn few_places_are_asked_for_and_none_outside() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        static ASKED: AtomicUsize = AtomicUsize::new(0);
+        let density = LineDensity::on_line([-2.0, 3.0], |_, x| {
+            ASKED.fetch_add(x.len(), Ordering::Relaxed);
+            assert!(x.iter().all(|x| (-2.0..=3.0).contains(x)));
+            x.iter().map(|x| 1.0 + 1e6 * (-((x - 0.1) / 1e-6_f64).powi(2)).exp() + (x - 0.7).abs().sqrt()).collect()
+        });
+        let g = Cumulative::new(&density.with_spikes(vec![0.1]), 0.0, [-2.0, 3.0]).unwrap();
+        g.divided([-2.0, 3.0], 160);
+        assert!(ASKED.load(Ordering::Relaxed) < 50_000, "{ASKED:?}");
+    }
+}
