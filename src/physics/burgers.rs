@@ -274,6 +274,10 @@ impl Physics for Burgers {
         }
     }
 
+    fn side_values(&self, t: f64, x: [f64; 2]) -> Vec<Option<f64>> {
+        vec![self.side_value(t, x)]
+    }
+
     fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
         self.given[0].is_none().then(|| self.on_mesh(t, mesh))
     }

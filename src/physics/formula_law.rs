@@ -207,6 +207,10 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
         Field::nodal(evaluate(&self.initial, t, mesh))
     }
 
+    fn side_values(&self, t: f64, x: [f64; 2]) -> Vec<Option<f64>> {
+        self.side(t, x).to_vec()
+    }
+
     fn check(&self, t: f64, mesh: &Mesh<2>, u: &Field) -> Result<(), Failure> {
         let values = u.values().as_chunks::<B>().0;
         if let Some(place) = u.values().iter().position(|u| !u.is_finite()) {

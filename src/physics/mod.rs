@@ -43,6 +43,11 @@ pub trait Physics: Send {
     /// The solution at time t on a mesh.
     fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field;
 
+    /// The value of each unknown at a place on a bounded side, where one is given there; nothing where none are.
+    fn side_values(&self, _t: f64, _x: [f64; 2]) -> Vec<Option<f64>> {
+        Vec::new()
+    }
+
     /// The solution at t + dt on the new mesh from the one at t on the old mesh.
     ///
     /// # Errors

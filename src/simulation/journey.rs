@@ -1,6 +1,7 @@
 //! What a mesh may do to the solution on its way.
 
 use super::State;
+use crate::density::need;
 use crate::geometry::{DualCells, Field, Mesh, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
@@ -24,7 +25,8 @@ const INTERPOLATION: f64 = 0.2;
 ///
 /// Where the solution stands still nothing heals what that adds up to, so a mesh that starts far from where it wants to be
 /// takes its time: over a run it adds no more than a share of the error that equal cells have. Where the solution changes by
-/// itself, a mesh that follows may add a share of that change.
+/// itself, a mesh that follows may add a share of that change, unless equal cells resolve it: there is no hurry on the way back
+/// to them.
 pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span: f64) -> f64 {
     let (begin, end) = (DualCells::new(from), DualCells::new(to));
     let swept = begin.swept(&end);
@@ -55,9 +57,8 @@ pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span
         let slopes = metrics.gradient(&values).into_iter().map(|g| (g[0] * h[0]).hypot(g[1] * h[1]));
         let over_cell = slopes.fold(0.0, larger) / range;
         let uniform = INTERPOLATION * over_cell * over_cell;
-        // where equal cells resolve it there is no hurry
-        let urgent = if std::env::var("NOURG").is_ok() { 1.0 } else { crate::density::need(over_cell) };
-        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + OF_CHANGE * urgent * state.own_change * dt;
+        let hurry = OF_CHANGE * need(over_cell) * state.own_change;
+        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + hurry * dt;
         if harm > budget {
             share = share.min(budget / harm);
         }

@@ -155,12 +155,33 @@ impl Simulation {
     /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer returned.
     pub fn adapted(&self, mesh: Mesh<2>, observers: &mut [&mut dyn Observer]) -> Result<Start> {
         mover::adapted(mesh, self.mover.equation.form, |mesh| {
-            let state = self.start(mesh.clone())?;
+            let state = self.with_sides(self.start(mesh.clone())?)?;
             observers.iter_mut().try_for_each(|observer| observer.adapting(&state))?;
             end_where_asked(observers, &state)?;
             let u = self.monitor.followed(state.t, &state.mesh, &state.u).map_err(|failure| self.at_start(failure))?;
             Ok((u, state.rho))
         })
+    }
+
+    /// A start with the values that its sides will have: where they differ from the initial solution, a layer begins there.
+    fn with_sides(&self, mut state: State) -> Result<State> {
+        let (lattice, count) = (*state.mesh.lattice(), state.u.components());
+        let mut differs = false;
+        for k in lattice.sides() {
+            let values = self.physics.side_values(state.t, state.mesh.image(state.mesh.x()[k]));
+            for (c, value) in values.into_iter().enumerate() {
+                let u = &mut state.u.values_mut()[k * count + c];
+                let value = value.unwrap_or(*u);
+                differs |= *u != value;
+                *u = value;
+            }
+        }
+        if differs {
+            let State { t, mesh, u, .. } = &state;
+            let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), *t, mesh, u);
+            state.rho = rho.map_err(|failure| self.at_start(failure))?;
+        }
+        Ok(state)
     }
 
     /// What the user should know of a start although nothing failed: a density that is noise at the scale of its cells, and
@@ -223,7 +244,12 @@ impl Simulation {
             let step = state.step + 1;
             let next = match pace.step(self, state, (t, dt), record) {
                 Ok(Some(next)) => next,
-                Ok(None) => continue,
+                Ok(None) => {
+                    if observers.iter().any(|observer| observer.interrupts()) {
+                        self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
+                    }
+                    continue;
+                }
                 Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
             };
             record.travelled += next.state.mesh.farthest(&state.mesh);

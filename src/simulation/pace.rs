@@ -115,6 +115,8 @@ const SHORT: f64 = 1e-5;
 const MOST_SHORT: usize = 1000;
 /// A share of the longest step that is lost in rounding.
 const SHORTEST: f64 = 1e-12;
+/// What a first step that fails is multiplied by.
+const FIRST_AGAIN: f64 = 0.1;
 /// The same below which no step is where the solution is given.
 const GIVEN: f64 = 0.02;
 /// Steps in a run in which nothing changes.
@@ -191,11 +193,14 @@ impl Free {
         let step = match step {
             Ok(step) => step,
             Err(failure) => {
-                self.dt *= 0.5;
+                // the first step is a guess, which may be far too long where a layer begins at a side
+                let first = before.step == 0;
+                self.dt *= if first { FIRST_AGAIN } else { 0.5 };
                 self.failures += 1;
+                let overshoots = first && matches!(failure, Failure::Formula { .. });
                 if self.failures > simulation.safety.halvings
                     || self.dt < SHORTEST * self.longest
-                    || !failure.is_curable()
+                    || !(failure.is_curable() || overshoots)
                 {
                     return Err(failure);
                 }
@@ -221,6 +226,7 @@ impl Free {
                 (share <= TOO_MUCH * CHANGE, factor)
             }
         };
+        let tried = self.dt;
         self.dt = (self.dt * factor).min(self.longest);
         // of a solution that is given nothing is lost where nodes pass a jump in it
         if simulation.physics.is_given() {
@@ -231,7 +237,7 @@ impl Free {
             let cause = self.cause(simulation, before, after, dt);
             return Err(Failure::VanishingStep { dt: self.dt, cause });
         }
-        if !(taken || simulation.physics.is_given() && dt <= 1.01 * GIVEN * self.longest) {
+        if !(taken || simulation.physics.is_given() && tried <= GIVEN * self.longest) {
             record.work.rejected_steps += 1;
             return Ok(None);
         }
