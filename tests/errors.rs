@@ -164,11 +164,12 @@ fn newton_stalled() {
 
 #[test]
 fn vanishing_step() {
-    let text = "[study]\nname = \"jump\"\nkind = \"moving-mesh\"\n[grid]\ncells = [8, 8]\n[time]\nstart = 0\nend = 1\n\
-                [pde]\nkind = \"prescribed\"\nu = \"if(t < 0.5, x, 2*x)\"";
-    let study = MovingMesh::from_source(&Source::new("jump.toml", text)).unwrap();
+    let text = "[study]\nname = \"blow-up\"\nkind = \"moving-mesh\"\n[grid]\ncells = [40, 40]\n[time]\nstart = 0\nend = 1\n\
+                [pde]\nkind = \"formula\"\nunknowns = [\"u\"]\nsource = { u = \"u^2\" }\ndiffusivity = { u = \"1e-4\" }\n\
+                initial = { u = \"1 + exp(-((x-0.5)^2 + (y-0.5)^2)/0.1^2)\" }\nboundary = { u = \"no-flux\" }";
+    let study = MovingMesh::from_source(&Source::new("blow-up.toml", text)).unwrap();
     let (_, failure) = driftmesh::study::compute(&study).unwrap();
-    let message = ["at t = 0.5", "time steps shrank to", "the solution grows faster than any step can follow"];
+    let message = ["time steps shrank to", "the solution grows faster than any step can follow"];
     assert_says(failure.unwrap(), &message, Some("time.end"), true);
 }
 
@@ -448,7 +449,7 @@ fn line_meshes_out_of_order() {
     assert_says(history.missed(method, stop).unwrap(), &message, Some("stop.iterations"), true);
     let far = LineDensity::arclength("tanh((x - 1000000.3)/1e-8)").unwrap();
     let thin = Line { face: FaceDensity::Exact, ends: [1e6, 1e6 + 1.0], ..Line::new(far, 1000) };
-    let message = ["of 1000 cells and the one before it are the same number, x = 1000000.3"];
+    let message = ["of 1000 cells and the one before it are the same number, x = 1000000."];
     assert_says(thin.equidistributed(0.0).unwrap_err(), &message, Some("grid.cells"), true);
 }
 

@@ -427,3 +427,80 @@ fn a_large_mesh_starts_from_a_coarser_one() {
     assert_eq!(start.end, Ending::AtRest);
     assert!(on_coarser > on_large, "{on_coarser} steps on coarser meshes, {on_large} on the mesh itself");
 }
+
+/// A pulse that spreads until equal cells resolve it: the mesh takes its time on the way back to them.
+#[test]
+fn the_way_back_to_equal_cells_harms_nothing() {
+    for (cells, w) in [(200, 0.02), (100, 0.03), (60, 0.05)] {
+        let exact = format!("{w}/sqrt({0} + 0.004*t)*exp(-(x-0.5)^2/({0} + 0.004*t))", w * w);
+        let study = |generator: &str| {
+            let text = format!(
+                "[study]\nname = \"pulse\"\nkind = \"moving-mesh\"\n[grid]\ncells = [{cells}, 2]\n[time]\nstart = 0.0\nend = 2.0\n\
+                 report = [0.5, 1.0, 2.0]\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\ndiffusivity = {{ u = \"0.001\" }}\n\
+                 initial = {{ u = \"exp(-(x-0.5)^2/{})\" }}\nboundary = {{ u = \"no-flux\" }}\nexact = {{ u = \"{exact}\" }}\n\
+                 [mesh]\ngenerator = {{ kind = \"{generator}\" }}\n",
+                w * w
+            );
+            let (summary, failure) = compute(&MovingMesh::from_source(&Source::new("pulse", text)).unwrap()).unwrap();
+            assert!(failure.is_none(), "{failure:?}");
+            summary.reports.iter().map(|report| report.error.unwrap().l2).collect::<Vec<f64>>()
+        };
+        let (moving, fixed) = (study("whole"), study("fixed"));
+        let worse = moving.iter().zip(&fixed).any(|(a, b)| *a > 1.2 * b);
+        assert!(!worse, "{cells} cells: {moving:?} and, of equal cells, {fixed:?}");
+    }
+}
+
+/// A side that is kept at another value than the initial solution: the layer that begins there has its cells from the start.
+#[test]
+fn a_layer_that_begins_at_a_side_is_seen() {
+    for (cells, diffusivity) in [(20, 1e-3), (40, 3e-4), (40, 1e-3)] {
+        let text = format!(
+            "[study]\nname = \"wall\"\nkind = \"moving-mesh\"\n[domain]\nlower = [0.0, 0.0]\nupper = [1.0, 1.0]\n\
+             periodic = [false, true]\n[grid]\ncells = [{cells}, 2]\n[time]\nstart = 0.0\nend = 0.3\nreport = [0.1, 0.3]\n[pde]\n\
+             kind = \"formula\"\nunknowns = [\"u\"]\ndiffusivity = {{ u = \"{diffusivity}\" }}\ninitial = {{ u = \"0\" }}\n\
+             boundary = {{ u = \"if(x < 0.5, 1, 0)\" }}\n\
+             exact = {{ u = \"if(x <= 0, 1, 1 - erf(x/sqrt(4*{diffusivity}*max(t, 1e-14))))\" }}\n"
+        );
+        let (summary, failure) = compute(&MovingMesh::from_source(&Source::new("wall", text)).unwrap()).unwrap();
+        assert!(failure.is_none(), "{failure:?}");
+        let errors: Vec<f64> = summary.reports.iter().map(|report| report.error.unwrap().l2).collect();
+        assert!(errors.iter().all(|error| *error < 6e-3), "{cells} cells, D = {diffusivity}: {errors:?}");
+    }
+}
+
+/// Jumps that are given, standing, moving and in time, and noise: nothing has to be solved for, and the run ends in time.
+#[test]
+fn given_jumps_complete() {
+    for u in [
+        "if(x < 0.5123, 0, 1)",
+        "if(x < 0.3 + t, 0, 1)",
+        "if((x-0.5)^2 + (y-0.5)^2 < 0.09, 1, 0)",
+        "sin(1e5*x)*cos(7.7e4*y)",
+        "if(t < 0.05, tanh((x-0.3)/0.01), tanh((x-0.7)/0.01))",
+    ] {
+        let text = format!(
+            "[study]\nname = \"jump\"\nkind = \"moving-mesh\"\n[grid]\ncells = [24, 24]\n[time]\nstart = 0.0\nend = 0.1\n[pde]\n\
+             kind = \"prescribed\"\nu = \"{u}\"\n"
+        );
+        let (summary, failure) = compute(&MovingMesh::from_source(&Source::new("jump", text)).unwrap()).unwrap();
+        assert!(failure.is_none() && summary.work.steps <= 1000, "{u}: {failure:?}");
+    }
+}
+
+/// Steps of any lengths: what a mesh learns in short ones does not throw it about in a long one.
+#[test]
+fn a_mesh_rests_in_steps_of_unequal_length() {
+    let mut mover = Mover::new(Whole::default());
+    let mut mesh = Mesh::uniform(Lattice::bounded([40, 40]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+    let mut gait = Gait::at_rest(&mesh);
+    for n in 0..600 {
+        let u: Vec<f64> = mesh.x().iter().map(|x| ((x[0] - 0.4) / 0.02).tanh()).collect();
+        let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
+        let dt = if n % 11 == 10 { 0.1 } else { 1e-3 };
+        let step = mover.step(&mesh, &gait, Followed { u: &u, rho: &rho }, dt).unwrap();
+        let way = 40.0 * step.moved.mesh.farthest(&mesh);
+        assert!(n < 580 || way < 1e-2, "{way} cells in step {n}");
+        (mesh, gait) = (step.moved.mesh, step.gait);
+    }
+}

@@ -46,8 +46,8 @@ struct Retries {
 pub struct Generator {
     kind: GeneratorKind,
     chooses: bool,
-    /// Whether noise was warned of.
-    warned: AtomicBool,
+    /// Whether noise was warned of, and a mesh that does not rest.
+    warned: [AtomicBool; 2],
     parts: Arc<Mutex<Parts>>,
 }
 
@@ -77,7 +77,7 @@ impl Generator {
             last: None,
         };
         let chooses = equation.relaxation == Relaxation::Auto;
-        Ok(Self { kind: mesh.generator, chooses, warned: AtomicBool::new(false), parts: Arc::new(Mutex::new(parts)) })
+        Ok(Self { kind: mesh.generator, chooses, warned: Default::default(), parts: Arc::new(Mutex::new(parts)) })
     }
 
     /// The nodes after a step, and what it cost as JSON.
@@ -92,7 +92,7 @@ impl Generator {
         let u = nodal(&mesh, &u)?;
         self.kind.check(mesh.lattice()).map_err(|error| plain(py, error.within("mesh.generator")))?;
         let share = noise(mesh.lattice(), &u);
-        if share > NOISE_WORTH_A_WARNING && !self.warned.swap(true, Ordering::Relaxed) {
+        if share > NOISE_WORTH_A_WARNING && !self.warned[0].swap(true, Ordering::Relaxed) {
             let text = format!(
                 "noisy-density: {:.0} % of u goes up and down from node to node, so that the mesh follows noise of the size \
                  of its cells; smooth u, or use more cells",
@@ -110,6 +110,10 @@ impl Generator {
         })?;
         let Step { moved, gait, retries } =
             step.map_err(PyRuntimeError::new_err)?.map_err(|failure| plain(py, failure))?;
+        if !self.chooses && gait.is_restless() && !self.warned[1].swap(true, Ordering::Relaxed) {
+            let text = c"`relaxation` is short: the mesh turns back from step to step; \"auto\" finds how many it takes to rest";
+            PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), text, 2)?;
+        }
         let told = Told {
             work: moved.work,
             interface: moved.interface,

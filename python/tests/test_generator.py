@@ -306,3 +306,17 @@ def test_one_cell_on_a_periodic_axis():
     assert np.diff(mesh.x[:, 0]).min() < 0.2 / 60
     carried = transfer(np.tanh(60 * (old.x - 0.37)), old, mesh)
     assert np.abs(carried - np.tanh(60 * (mesh.x - 0.37))).max() < 1e-2
+
+
+def test_a_relaxation_that_is_too_short_is_warned_of():
+    def follow_ring(relaxation):
+        mesh, generator = Mesh.uniform(cells=(40, 40)), MeshGenerator(relaxation=relaxation)
+        for _ in range(100):
+            ring = np.tanh((np.hypot(mesh.x - 0.5, mesh.y - 0.5) - 0.3) / 0.01)
+            mesh = generator.step(mesh, ring, 1e-3)
+
+    with pytest.warns(RuntimeWarning, match="`relaxation` is short: the mesh turns back from step to step"):
+        follow_ring({"steps": 4})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        follow_ring("auto")

@@ -90,7 +90,7 @@ impl Cumulative {
                 let smooth = tail * width <= RESOLVED * piece.integral || tail * width <= ROUNDING * whole;
                 let divides = piece.lower < middle && middle < piece.upper && width > f64::MIN_POSITIVE;
                 if seen && smooth || last || !divides {
-                    if !(seen || divides) && chord > NOTICEABLE * whole {
+                    if !divides && chord > JUMP * piece.integral && chord > NOTICEABLE * whole {
                         return Err(Failure::LineDensity { what: "u_x", value: f64::INFINITY, x: piece.lower, t });
                     }
                     pieces.push(piece);
@@ -171,7 +171,8 @@ impl Cumulative {
     }
 }
 
-/// Share of ∫M over the line that tells of a jump of u.
+/// Over neighbouring numbers u jumps where its chord is so many times the arc, and so large a share of the whole one.
+const JUMP: f64 = 2.0;
 const NOTICEABLE: f64 = 1e-12;
 
 impl Piece {

@@ -35,13 +35,19 @@ pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span
     let metrics = Metrics::new(&state.mesh);
     let lattice = state.mesh.lattice();
     let h = [0, 1].map(|d| state.mesh.extent()[d] / lattice.cells()[d] as f64);
+    let unknowns: Vec<(Vec<f64>, f64, f64)> = (0..state.u.components())
+        .map(|c| (state.u.component(c).collect::<Vec<f64>>(), range(&state.u, c)))
+        .filter(|(_, range)| *range > 0.0)
+        .map(|(values, range)| {
+            let slopes = metrics.gradient(&values).into_iter().map(|g| (g[0] * h[0]).hypot(g[1] * h[1]));
+            let over_cell = slopes.fold(0.0, larger) / range;
+            (values, range, over_cell)
+        })
+        .collect();
+    // one unknown that equal cells do not resolve is reason enough to hurry
+    let hurry = unknowns.iter().fold(0.0, |m, (_, _, over_cell)| larger(m, need(*over_cell)));
     let mut share = 1.0_f64;
-    for c in 0..state.u.components() {
-        let range = range(&state.u, c);
-        if range == 0.0 {
-            continue;
-        }
-        let values: Vec<f64> = state.u.component(c).collect();
+    for (values, range, over_cell) in unknowns {
         let u: Vec<f64> = padded(lattice, values.as_chunks::<1>().0, [[0.0]; 2]).into_flattened();
         let mut second = vec![[0.0; 2]; u.len()];
         for k in patch.places() {
@@ -54,11 +60,8 @@ pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span
             .zip(end.areas())
             .map(|(k, area)| (0..2).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
-        let slopes = metrics.gradient(&values).into_iter().map(|g| (g[0] * h[0]).hypot(g[1] * h[1]));
-        let over_cell = slopes.fold(0.0, larger) / range;
         let uniform = INTERPOLATION * over_cell * over_cell;
-        let hurry = OF_CHANGE * need(over_cell) * state.own_change;
-        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + hurry * dt;
+        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + OF_CHANGE * hurry * state.own_change * dt;
         if harm > budget {
             share = share.min(budget / harm);
         }
