@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from driftmesh import Mesh, StudyError, equidistribute, laplacian_stencils, schwarz
-from driftmesh.errors import LineDensity, LineStalled, NotConverged
+from driftmesh.errors import LineDensity, LineFolded, NotConverged
 
 
 def annulus(n=16, m=12):
@@ -174,7 +174,9 @@ def test_every_cell_has_the_same_share_of_a_steep_density(steep):
         (lambda: equidistribute(([0, 0.5], [1, 2]), 10), ValueError, "known from 0.0 to 0.5"),
         (lambda: equidistribute({"kind": "arclength", "value": "x"}, 10), ValueError, "arclength"),
         (lambda: equidistribute("1", 10**9), ValueError, "GiB"),
-        (lambda: equidistribute(lambda x: np.where(x < 0.3, 1.0, 100.0), 100, face_density="trapezoid"), LineStalled, "`face_density`"),
+        (lambda: equidistribute(lambda x: 1e6 + x, 10, points=[2.0]), ValueError, "points.*must lie on the line"),
+        (lambda: equidistribute(([0, 0.5, 0.5, 0.5, 1], [1, 2, 3, 4, 5]), 10), ValueError, "twice the same where M jumps"),
+        (lambda: equidistribute("1/sqrt(1 - x)", 10), LineDensity, "M is inf at x = 1"),
         (lambda: equidistribute({"kind": ["a"]}, 4), ValueError, "must be a table"),
         (lambda: equidistribute({"value": 3}, 4), ValueError, "must be a table"),
         (lambda: equidistribute("1", 10, domain=(1, 0)), ValueError, "left to right"),
@@ -194,6 +196,36 @@ def test_every_cell_has_the_same_share_of_a_steep_density(steep):
 def test_the_line_refuses_what_it_cannot_use(make, error, words):
     with pytest.raises(error, match=words):
         make()
+
+
+def test_a_density_is_asked_for_inside_the_line_and_seldom():
+    asked = []
+
+    def layer(x):
+        asked.append((x.min(), x.max(), x.size))
+        return np.sqrt(1 + (np.exp((x - 1) / 1e-4) / 1e-4) ** 2)
+
+    x = equidistribute(layer, 160)
+    assert min(a[0] for a in asked) >= 0 and max(a[1] for a in asked) <= 1
+    assert sum(a[2] for a in asked) <= 50_000 and len(asked) < 200
+    assert (np.diff(x) > 0).all() and np.count_nonzero(x > 0.999) > 60
+
+
+def test_arrays_may_jump_and_spikes_may_be_named():
+    x = equidistribute(([0, 0.4, 0.4, 1], [1.0, 1.0, 1000.0, 1000.0]), 3002)
+    assert x[2] == pytest.approx(0.4, abs=1e-14) and x[1502] == pytest.approx(0.7, abs=1e-12)
+    spike = "1 + 1e9*exp(-((x - 0.3)/1e-9)^2)"
+    assert np.count_nonzero(abs(equidistribute(spike, 40, points=[0.3]) - 0.3) < 1e-8) > 20
+    with pytest.warns(RuntimeWarning, match="`face_density`.*nodes are those of \"exact\""):
+        x = equidistribute(lambda x: np.where(x < 0.3, 1.0, 100.0), 100, face_density="trapezoid")
+    assert (np.diff(x) > 0).all()
+
+
+def test_subdomains_that_do_not_agree_are_an_error_with_its_history():
+    front = {"kind": "arclength", "of": "tanh(10*(x - 0.3))"}
+    with pytest.raises(LineFolded, match="do not agree on an order") as error:
+        schwarz(front, 100, overlap=(0.49, 0.51), linearized=True, iterations=50)
+    assert error.value.result.iterations == 50
 
 
 def test_schwarz_contracts_as_theory_says():

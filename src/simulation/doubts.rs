@@ -6,7 +6,7 @@ use crate::geometry::{Field, Lattice, Mesh, node_areas};
 use crate::numerics::{larger, sum};
 
 /// Share of the content of an unknown whose loss is told.
-const LOSS: f64 = 0.1;
+const LOSS: f64 = 0.2;
 /// Content below this share of the largest value times the area of the box is of rounding.
 const ROUNDING: f64 = 1e-9;
 /// Cells of the reference for a cell of the mesh, along an axis, and the most of its nodes.
