@@ -301,16 +301,18 @@ mod tests {
     /// A layer of an arc length, however thin and wherever it is, is not missed; where M is a formula, its place is named.
     #[test]
     fn thin_layers_are_found() {
-        for width in [1e-2, 1e-5, 1e-9, 1e-12] {
-            for place in [0.0, 0.3, 0.77] {
+        for width in [1e-2, 1e-5, 1e-9, 1e-12_f64] {
+            for place in [0.0, 0.3, 0.77_f64] {
                 let u = LineDensity::arclength(&format!("tanh((x - {place})/{width})")).unwrap();
                 let g = Cumulative::new(&u, 0.0, [0.0, 1.0]).unwrap();
                 let jump = if place == 0.0 { 1.0 } else { 2.0 };
-                assert!((g.whole() - 1.0 - jump).abs() < 4.0 * jump * width, "{width} at {place}: {}", g.whole());
+                // where u is steeper than 1 its arc is its change; places are rounded
+                let (steep, rounding) = (jump * width * (4.0 / width).ln(), 10.0 * f64::EPSILON * place / width);
+                assert!((g.whole() - 1.0 - jump).abs() < steep + rounding, "{width} at {place}: {}", g.whole());
             }
             let spike = LineDensity::formula(&format!("1 + exp(-((x - 0.3)/{width})^2)/{width}")).unwrap();
             let g = Cumulative::new(&spike.with_spikes(vec![0.3]), 0.0, [0.0, 1.0]).unwrap();
-            assert!((g.whole() - 1.0 - PI.sqrt()).abs() < 1e-9, "{width}: {}", g.whole());
+            assert!((g.whole() - 1.0 - PI.sqrt()).abs() < 1e-9 + f64::EPSILON / width, "{width}: {}", g.whole());
         }
     }
 
