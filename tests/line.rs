@@ -1,36 +1,13 @@
 //! A line never stalls: densities of all kinds are equidistributed, and every Schwarz method converges or says why.
 
+mod dice;
+
+use dice::Dice;
 use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
 use driftmesh::study::{EquidistributionStudy, Source};
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
-
-/// SplitMix64: the numbers of a case, from its own.
-struct Dice(u64);
-
-impl Dice {
-    fn word(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn share(&mut self) -> f64 {
-        (self.word() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Between two positive numbers, each power of ten as likely as the others.
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        let value = low * (high / low).powf(self.share());
-        format!("{value:.2e}").parse().unwrap()
-    }
-
-    fn whole(&mut self, low: usize, high: usize) -> usize {
-        low + self.word() as usize % (high - low + 1)
-    }
-}
 
 /// `[density]` of case `n` on [0, 1]: layers at an end and inside, spikes, kinks, roots, steps.
 fn density(dice: &mut Dice) -> String {
@@ -160,7 +137,7 @@ fn impossible_densities_are_named() {
 fn study(n: u64) -> Option<(String, EquidistributionStudy)> {
     let mut dice = Dice(n.wrapping_mul(0xD1B5_4A32_D192_ED03));
     let density = density(&mut dice);
-    let faces = ["exact", "trapezoid", "midpoint"][dice.whole(0, 2)];
+    let faces = dice.of(["exact", "trapezoid", "midpoint"]);
     let subdomains = dice.whole(1, 16).min(dice.whole(1, 64));
     let overlap = 2 * dice.whole(1, 3);
     let width = dice.whole(overlap + 2, overlap + 30);
@@ -185,8 +162,7 @@ fn study(n: u64) -> Option<(String, EquidistributionStudy)> {
         1 => format!("iterations = 60\ntolerance = {:e}", dice.between(1e-12, 1e-3)),
         _ => format!("iterations = 60\ntolerance = {:e}\nmeasure = \"increment\"", dice.between(1e-12, 1e-3)),
     };
-    let start = ["\"uniform\"", "\"equidistributed\"", "{ formula = \"xi^1.3\" }", "{ formula = \"xi^0.2\" }"]
-        [dice.whole(0, 3)];
+    let start = dice.of(["\"uniform\"", "\"equidistributed\"", "{ formula = \"xi^1.3\" }", "{ formula = \"xi^0.2\" }"]);
     let text = format!(
         "[study]\nname = \"line\"\nkind = \"equidistribution\"\n[grid]\ncells = [{cells}]\n[density]\n{density}\n\
          [equidistribution]\nface_density = \"{faces}\"\n{schwarz}[stop]\n{stop}\n[start]\nmesh = {start}\n"

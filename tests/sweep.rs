@@ -1,5 +1,8 @@
 //! Random studies: each is completed or ends with a named error, and no mesh that a run shows is folded or off its box.
 
+mod dice;
+
+use dice::Dice;
 use driftmesh::geometry::{Mesh, check_unfolded};
 use driftmesh::simulation::{Event, Observer, Record, Retries, Snapshot};
 use driftmesh::study::{MovingMesh, Source};
@@ -7,36 +10,6 @@ use driftmesh::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-
-/// SplitMix64: the numbers of a study, from its own.
-struct Dice(u64);
-
-impl Dice {
-    fn word(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn share(&mut self) -> f64 {
-        (self.word() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Between two positive numbers, each power of ten as likely as the others.
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        let value = low * (high / low).powf(self.share());
-        format!("{value:.2e}").parse().unwrap()
-    }
-
-    fn whole(&mut self, low: usize, high: usize) -> usize {
-        low + self.word() as usize % (high - low + 1)
-    }
-
-    fn of<T: Copy, const N: usize>(&mut self, all: [T; N]) -> T {
-        all[self.whole(0, N - 1)]
-    }
-}
 
 /// Study number `n`.
 fn study(n: u64) -> (String, MovingMesh) {

@@ -106,9 +106,8 @@ impl Gait {
         rho.iter().zip(&self.rho).map(|(newest, last)| NEWEST * newest + (1.0 - NEWEST) * last).collect()
     }
 
-    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ over this step, `share` how much of the velocity is
-    /// kept, and `chooses` is true
-    /// where τ is the mover's own.
+    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ over this
+    /// step, `share` how much of the velocity is kept, and `chooses` is true where τ is the mover's own.
     pub(super) fn after(
         &self,
         predicted: &Predicted,
