@@ -65,6 +65,22 @@ fn what_the_mesh_misses_of_an_unknown_is_told() {
     assert_eq!(doubts(&blob(0.15, "u")), [""; 0]);
 }
 
+/// A blob too small to matter for the content of an unknown that slopes is told by its place; peaks, jumps and ridges that
+/// the mesh sees are not.
+#[test]
+fn what_hides_between_the_nodes_is_told() {
+    let given = |u: &str| study("start = 0\nend = 0.1", &format!("kind = \"prescribed\"\nu = \"{u}\""), "");
+    let said = doubts(&given("2*x + exp(-((x-0.7375)^2 + (y-0.5125)^2)/0.006^2)"));
+    assert!(matches!(&said[..], [said] if said.contains("at x = 0.737500, y = 0.512500")), "{said:?}");
+    for u in [
+        "2*x + exp(-((x-0.7375)^2 + (y-0.5125)^2)/0.1^2)",
+        "tanh(300*(x - 0.5 + 0.1*y))",
+        "max(0, 1 - 20*abs(x - 0.5))",
+    ] {
+        assert_eq!(doubts(&given(u)), [""; 0], "{u}");
+    }
+}
+
 /// Data that go up and down from node to node are noise; a front or a ridge of one node is none.
 #[test]
 fn noise_is_named() {

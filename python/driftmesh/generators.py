@@ -294,6 +294,8 @@ class MeshGenerator:
             raise ValueError(
                 f"`monitor` is {monitor!r}, but must be Arclength(…), RootGradient(), Given(), an array or a function"
             )
+        if relaxation is None:
+            raise ValueError('`relaxation` is None, but must be "auto", a time, or {"steps": …}')
         self.monitor: Monitor = RootGradient() if monitor is None else monitor
         self._method, self._relaxation, self._form = method, relaxation, form
         self._begin()

@@ -5,7 +5,7 @@ use driftmesh::Failure;
 use driftmesh::density::{Monitor, MonitorKind, NOISE_WORTH_A_WARNING, noise};
 use driftmesh::geometry::{Mesh, check_unfolded};
 use driftmesh::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
-use driftmesh::mover::{Followed, Gait, Mover, Step};
+use driftmesh::mover::{Followed, Gait, Mover, Step, steps_to_rest};
 use driftmesh::study::{MeshForm, MeshTable, Source};
 use numpy::{PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::{PyRuntimeError, PyRuntimeWarning};
@@ -100,19 +100,23 @@ impl Generator {
             );
             PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &CString::new(text)?, 2)?;
         }
-        let parts = self.parts.clone();
+        let (parts, followed) = (self.parts.clone(), u.clone());
         let step = compute(py, move || {
             let mut parts = parts.try_lock().map_err(|error| match error {
                 TryLockError::WouldBlock => "this generator is still at work on another step; wait, or use two",
                 TryLockError::Poisoned(_) => "this generator broke in an earlier step; make a new one",
             })?;
-            Ok::<_, &str>(parts.step(&mesh, &u, dt))
+            Ok::<_, &str>(parts.step(&mesh, &followed, dt))
         })?;
         let Step { moved, gait, retries } =
             step.map_err(PyRuntimeError::new_err)?.map_err(|failure| plain(py, failure))?;
         if !self.chooses && gait.is_restless() && !self.warned[1].swap(true, Ordering::Relaxed) {
-            let text = c"`relaxation` is short: the mesh turns back from step to step; \"auto\" finds how many it takes to rest";
-            PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), text, 2)?;
+            PyErr::warn(
+                py,
+                &py.get_type::<PyRuntimeWarning>(),
+                &CString::new(self.hasty(py, &moved.mesh, u, dt)?)?,
+                2,
+            )?;
         }
         let told = Told {
             work: moved.work,
@@ -122,6 +126,24 @@ impl Generator {
         };
         let told = serde_json::to_string(&told).map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
         Ok((nodes(py, &moved.mesh)?, told))
+    }
+}
+
+impl Generator {
+    /// What to say of a mesh that turns back from step to step, with the τ that would let it rest on u.
+    fn hasty(&self, py: Python<'_>, mesh: &Mesh<2>, u: Vec<f64>, dt: f64) -> PyResult<String> {
+        let (parts, mesh) = (self.parts.clone(), mesh.clone());
+        let limit = compute(py, move || {
+            let parts = parts.try_lock().ok()?;
+            steps_to_rest(&mesh, parts.mover.equation.form, &*parts.monitor, &u)
+        })?;
+        let limit = limit.map_or("\"auto\" finds how many steps it takes to rest".into(), |steps| {
+            format!(
+                "on this u it comes to rest with {:.3e}, {steps:.0} steps, which \"auto\" finds by itself",
+                steps * dt
+            )
+        });
+        Ok(format!("`relaxation` is short: the mesh turns back from step to step; {limit}"))
     }
 }
 

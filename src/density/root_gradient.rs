@@ -49,7 +49,9 @@ impl Monitor for RootGradient {
         let ([n, m], periodic) = (lattice.cells(), lattice.periodic());
         let (x, values) = (mesh.closed(), lattice.closed(u));
         let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
+        // slopes of u over its range, so that squares of no unit overflow
         let (range, size) = (high - low, high.max(-low));
+        let unit = if range > 0.0 { range } else { 1.0 };
         let h = [0, 1].map(|d| mesh.extent()[d] / lattice.cells()[d] as f64);
         let cells = || (0..n).flat_map(|i| i * (m + 1)..i * (m + 1) + m);
         // the four corners of a cell and its diagonals
@@ -63,7 +65,7 @@ impl Monitor for RootGradient {
             let corners @ [a, c, b, d] = corners(k);
             let diagonals = diagonals(corners);
             let ([px, py], [qx, qy]) = diagonals;
-            let (p, q) = (values[c] - values[a], values[b] - values[d]);
+            let (p, q) = ((values[c] - values[a]) / unit, (values[b] - values[d]) / unit);
             let twice = twice_area(diagonals);
             let (gx, gy) = (h[0] * (p * qy - q * py), h[1] * (q * px - p * qx));
             let slope = (gx * gx + gy * gy).sqrt() / twice;
@@ -78,10 +80,10 @@ impl Monitor for RootGradient {
         let mean = sum(rho.iter().zip(areas).map(|(root, area)| excess(*root) * area)) / domain;
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
         let mean = mean.max(BETA * excess(steepest.sqrt()) / CONTRAST);
-        if mean <= ROUNDING * background || steepest * n.max(m) as f64 <= ROUNDING * size {
+        if mean <= ROUNDING * background || steepest * unit * n.max(m) as f64 <= ROUNDING * size {
             return Ok(vec![1.0; lattice.len()]);
         }
-        let beta = BETA * need(steepest / range);
+        let beta = BETA * need(steepest);
         rho.iter_mut().for_each(|root| *root = 1.0 + beta * excess(*root) / mean);
         // from cells to nodes and back is a pass
         let passes = [n, m].map(|n| ((PASSES * ((n + 1) as f64 / 41.0).powi(2)).round() - 1.0).max(0.0));
@@ -168,7 +170,7 @@ mod tests {
         let mesh = Mesh::uniform(Lattice::bounded([3, 4]).unwrap(), [0.0; 2], [2.0, 1.0]).unwrap();
         let bent = mesh.x().iter().map(|&[x, y]| [x + 0.1 * (x * (2.0 - x)) * y, y + 0.1 * (y * (1.0 - y)) * x]);
         let mesh = mesh.moved(bent.collect()).unwrap();
-        for unit in [1.0, 1e-6] {
+        for unit in [1.0, 1e-6, 1e200, 1e-200] {
             let u: Vec<f64> = mesh.x().iter().map(|[x, y]| unit * (3.0 * x - 2.0 * y)).collect();
             let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
             assert!(rho.iter().all(|rho| (rho - 1.0).abs() < 1e-9), "{rho:?}");

@@ -6,14 +6,13 @@ mod start;
 
 pub use gait::Gait;
 pub use retries::{Care, Retries};
-pub use start::{Ending, Start, adapted};
+pub use start::{Ending, Start, adapted, steps_to_rest};
 
 use crate::error::{Failure, Result};
 use crate::geometry::{Mesh, check_unfolded};
 use crate::meshing::{Form, Interface, MeshGenerator, Mmpde, Moved, Relaxation};
 use crate::work::Work;
 pub(crate) use gait::Predicted;
-pub(crate) use start::to_rest;
 
 /// Moves a mesh from step to step
 ///

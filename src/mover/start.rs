@@ -1,6 +1,7 @@
 use super::{Followed, Gait, Mover};
+use crate::density::Monitor;
 use crate::error::Result;
-use crate::geometry::{Mesh, check_unfolded};
+use crate::geometry::{Mesh, check_unfolded, interpolate};
 use crate::meshing::{Form, Mmpde, Relaxation, Whole};
 
 /// A mesh that was adapted to a density at the start.
@@ -63,8 +64,20 @@ fn from_coarser(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<S
     to_rest(if check_unfolded(&start).is_ok() { start } else { mesh }, form, followed)
 }
 
+/// The fewest time steps in τ with which a mesh rests on `values`, given at the nodes of `mesh` and carried by interpolation,
+/// as far as [`adapted`] can tell from equal cells; nothing where it does not come to rest.
+pub fn steps_to_rest(mesh: &Mesh<2>, form: Form, monitor: &dyn Monitor, values: &[f64]) -> Option<f64> {
+    let uniform = Mesh::uniform(*mesh.lattice(), mesh.lower(), mesh.upper()).ok()?;
+    let start = to_rest(uniform, form, &mut |on| {
+        let u = interpolate(mesh, values, on);
+        let rho = monitor.density(on, &u, None)?;
+        Ok((u, rho))
+    });
+    start.ok().filter(|start| start.end == Ending::AtRest).map(|start| start.steps)
+}
+
 /// The same, on this mesh alone.
-pub(crate) fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
+fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
     let equation = Mmpde { relaxation: Relaxation::Auto, form };
     let mut mover = Mover::by(Box::new(Whole::to(0.1 * AT_REST)), equation);
     let mut gait = Gait::at_rest(&mesh);

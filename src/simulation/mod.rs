@@ -28,10 +28,10 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Field, Mesh, Quality, check_unfolded, interpolate, largest, quality, quality_and_integral};
+use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality, quality_and_integral};
 use crate::kept::Kept;
 use crate::meshing::{Interface, Relaxation};
-use crate::mover::{self, Ending, Gait, Mover, Start};
+use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use crate::stopwatch::Stopwatch;
 use crate::work::Work;
@@ -327,16 +327,12 @@ impl Simulation {
             return;
         }
         let steps = relaxation.over(dt) / dt;
-        let (lower, upper) = (state.mesh.lower(), state.mesh.upper());
-        let found = self.monitor.followed(t, &state.mesh, &state.u).map_err(Error::from).and_then(|values| {
-            mover::to_rest(Mesh::uniform(*state.mesh.lattice(), lower, upper)?, self.mover.equation.form, &mut |mesh| {
-                let u = interpolate(&state.mesh, &values, mesh);
-                let rho = self.monitor.density(mesh, &u, None)?;
-                Ok((u, rho))
-            })
-        });
+        let found =
+            self.monitor.followed(t, &state.mesh, &state.u).ok().and_then(|values| {
+                mover::steps_to_rest(&state.mesh, self.mover.equation.form, &*self.monitor, &values)
+            });
         let limit = match found {
-            Ok(Start { end: Ending::AtRest, steps: limit, .. }) if limit > steps => {
+            Some(limit) if limit > steps => {
                 format!("on this solution it comes to rest with {limit:.0}, which \"auto\" finds by itself")
             }
             _ => "\"auto\" finds how many it takes".into(),

@@ -1,7 +1,8 @@
 use super::MovingMesh;
+use super::moving_mesh::StartMesh;
 use crate::density::{MonitorKind, Strength};
 use crate::error::Result;
-use crate::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde, Whole};
+use crate::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde, Relaxation, Whole};
 use crate::simulation::{Record, Simulation, State};
 
 /// A mesh of which no node went so many cells in a whole run does not move.
@@ -70,8 +71,16 @@ fn held_back(study: &MovingMesh, record: &Record) -> String {
     if 2 * retries > record.work.steps {
         format!("{retries} tries of {} steps failed, so that [safety] held it back", record.work.steps)
     } else {
-        let tau = study.mesh.relaxation.over(span / record.work.steps.max(1) as f64);
-        format!("with `mesh.relaxation` it follows in about τ = {tau:.3e}, and the run lasts {span:.3e}; lower it")
+        match study.mesh.relaxation {
+            Relaxation::Auto if study.mesh.start == Some(StartMesh::Uniform) => {
+                "\"auto\" follows what moves and has no hurry on the way from equal cells; set `mesh.start` to \"adapted\"".into()
+            }
+            Relaxation::Auto => "\"auto\" follows what moves; give `mesh.relaxation` as a time to follow faster".into(),
+            given => {
+                let tau = given.over(span / record.work.steps.max(1) as f64);
+                format!("with `mesh.relaxation` it follows in about τ = {tau:.3e}, and the run lasts {span:.3e}; lower it")
+            }
+        }
     }
 }
 
