@@ -222,7 +222,7 @@ impl<const D: usize> MeshOperator<D> {
         old: &[[f64; K]],
         new: &[[f64; K]],
         jump: [[f64; K]; D],
-        solver: &mut Pcg<K>,
+        solver: &mut Pcg<D, K>,
         closeness: f64,
     ) -> Option<(Vec<[f64; K]>, Work)> {
         let volumes = self.volumes.as_ref()?;

@@ -19,7 +19,7 @@ pub struct Whole {
     #[serde(skip)]
     plane: Robust<2>,
     #[serde(skip)]
-    symmetric: Pcg<2>,
+    symmetric: Pcg<2, 2>,
     /// How exactly conjugate gradients solve for positions, as a share of the shortest edge. A residual of the mesh
     /// equation bounds the error it leaves.
     #[serde(skip, default = "closeness")]

@@ -10,6 +10,7 @@ mod block;
 mod ilu;
 mod krylov;
 mod lu;
+mod multigrid;
 mod pcg;
 mod relaxation;
 mod sparse;

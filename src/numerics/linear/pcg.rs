@@ -1,8 +1,13 @@
 use super::krylov::{divide, dot};
+use super::multigrid::Multigrid;
 use super::{LatticeMatrix, larger, solved, stalled};
 use crate::error::Failure;
 
-/// Conjugate gradients for symmetric M-matrices on a star, preconditioned by modified incomplete elimination
+/// Conjugate gradients for symmetric M-matrices on a star, preconditioned by multigrid where they are stiff, by modified
+/// incomplete elimination where they are not
+///
+/// A V-cycle takes six to nine iterations for any lattice and stiffness. Elimination takes about 3.4 (8a)^¼ for conductances a
+/// over the mass of a node, each of a third of the cost:
 ///
 /// ```text
 /// M = (L + E) E⁻¹ (E + Lᵀ),   e_i = a_ii − Σ_k a_ik (a_ik + Σ_j a_kj) / e_k,   k below i, j ≠ i above k
@@ -14,8 +19,9 @@ use crate::error::Failure;
 ///
 /// # Source
 /// Gustafsson, *A class of first order factorization methods*, BIT 18 (1978).
-#[derive(Debug, Clone, Default)]
-pub struct Pcg<const K: usize> {
+#[derive(Debug, Clone)]
+pub struct Pcg<const D: usize, const K: usize> {
+    multigrid: Multigrid<D, K>,
     factors: Factors,
     space: [Vec<[f64; K]>; 4],
 }
@@ -30,8 +36,26 @@ struct Factors {
 }
 
 const MAX_ITERATIONS: usize = 1000;
+/// What the edges of a node conduct over its mass, above which a V-cycle costs less than elimination.
+const STIFF: f64 = 4e3;
 
-impl<const K: usize> Pcg<K> {
+/// True where the mean over all nodes of what their edges conduct is so large.
+fn is_stiff<const D: usize, const S: usize>(a: &LatticeMatrix<D, S>) -> bool {
+    let (mut edges, mut mass) = (0.0, 0.0);
+    for row in &a.rows {
+        edges -= row[1..].iter().sum::<f64>();
+        mass += row.iter().sum::<f64>();
+    }
+    edges > STIFF * mass
+}
+
+impl<const D: usize, const K: usize> Default for Pcg<D, K> {
+    fn default() -> Self {
+        Self { multigrid: Multigrid::default(), factors: Factors::default(), space: Default::default() }
+    }
+}
+
+impl<const D: usize, const K: usize> Pcg<D, K> {
     /// Solves A x = b for K right-hand sides
     ///
     /// `x` is padded: its ring holds the known values, its unknowns the guess and then the solution. The residual of
@@ -39,7 +63,7 @@ impl<const K: usize> Pcg<K> {
     ///
     /// # Errors
     /// [`Failure::LinearStalled`] where it is not reached, or the matrix is not positive definite.
-    pub fn solve<const D: usize, const S: usize>(
+    pub fn solve<const S: usize>(
         &mut self,
         a: &LatticeMatrix<D, S>,
         weights: &[f64],
@@ -47,7 +71,7 @@ impl<const K: usize> Pcg<K> {
         x: &mut [[f64; K]],
         tolerance: [f64; K],
     ) -> Result<usize, Failure> {
-        let Self { factors, space } = self;
+        let Self { multigrid, factors, space } = self;
         for v in space.iter_mut() {
             v.clear();
             v.resize(a.patch.padded_len(), [0.0; K]);
@@ -70,12 +94,16 @@ impl<const K: usize> Pcg<K> {
         if solved(sizes, tolerance) {
             return Ok(0);
         }
-        if !factors.eliminate(a) {
+        let coarse = is_stiff(a);
+        if !(if coarse { multigrid.build(a) } else { factors.eliminate(a) }) {
             return Err(stalled(unknowns, sizes, tolerance, 0));
         }
         let mut before = [1.0; K];
         for iteration in 1..=MAX_ITERATIONS {
-            factors.precondition(a, r, z);
+            match coarse {
+                true => multigrid.cycle(r, z),
+                false => factors.precondition(a, r, z),
+            }
             let now = dot(r, z);
             let active = std::array::from_fn(|c| sizes[c] > tolerance[c]);
             let gain = if iteration == 1 { [0.0; K] } else { divide(active, now, before) };
