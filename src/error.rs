@@ -438,16 +438,14 @@ impl Failure {
                 "raise mesh.generator.iterations or mesh.generator.overlap, or lower time.step"
             }
             Self::Subdomains { .. } => "give every axis between one subdomain and one a cell",
-            Self::LineDensity { .. } => {
-                "mend density.value or density.of; with conditions of Robin's kind M is asked for outside the domain too"
-            }
+            Self::LineDensity { .. } => "change density.value or density.of so",
             Self::LineStalled { remedy, .. } if !remedy.is_empty() => remedy,
             Self::LineStalled { .. } => {
                 "set equidistribution.face_density to \"exact\", or refine grid.cells; with [time] lower time.step; with conditions of Robin's kind set schwarz.robin to \"auto\" or \"lagged\""
             }
             Self::LineUnresolved { .. } => "lower grid.cells, or give the density a thicker layer",
             Self::LineFolded { .. } => {
-                "raise stop.iterations, or give stop.tolerance in its place; where the iteration does not contract, give more overlap or set schwarz.linearized to false"
+                "raise stop.iterations, or give stop.tolerance in its place, which tells whether the iteration contracts"
             }
             Self::NotConverged { remedy, .. } if !remedy.is_empty() => remedy,
             Self::NotConverged { .. } => {
@@ -634,11 +632,15 @@ fn given_as(values: &[(String, f64)]) -> String {
 /// What a density of a line breaks.
 pub(crate) fn line_rule(what: &str, value: f64) -> &'static str {
     match what {
-        "M" if value > 0.0 && value.is_finite() => {
-            "it must be above 0 by more than 1e-14 of its largest on the line, which is rounding"
+        "u_x" => "u jumps there, and no mesh resolves a jump: give it a width, as in tanh((x - c)/w)",
+        "M" if value.is_nan() => "it has no value there: mend it, or move the ends of the line",
+        "M" if value == f64::INFINITY => "it must be finite: bound it, as in min(M, 1e6), or move the ends of the line",
+        "M" if value <= 0.0 => "it must be above 0 on the whole line: add a floor, as in max(M, 1e-6)",
+        "M" if value > 1e140 => "it is too large for sums: divide it by a constant, since only its ratios count",
+        "M" => {
+            "it must be above 0 by more than 1e-14 of its largest on the line, which is rounding: add a floor, as in max(M, 1e-6) \
+             where M is about 1"
         }
-        "M" => "it must be finite and above 0 on the whole line",
-        "u_x" => "u jumps there, and no mesh resolves a jump",
         _ => "it must be bounded on the whole line",
     }
 }

@@ -180,9 +180,8 @@ fn what_does_not_converge_is_no_success() {
         panic!("{:?}", finished.failure)
     };
     assert!(failure.to_string().contains("the linearised iteration need not converge"), "{failure}");
-    for remedy in ["schwarz.linearized", "schwarz.sweep", "schwarz.coarse", "overlap"] {
-        assert!(failure.help().contains(remedy), "{remedy}");
-    }
+    // others help here, this one helps always
+    assert_eq!(failure.help(), "set schwarz.linearized to false");
     for cure in [
         "schwarz.linearized=false",
         "schwarz.sweep=alternating",

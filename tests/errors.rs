@@ -428,14 +428,14 @@ fn not_a_run() {
 fn line_density() {
     let line = Line::new(LineDensity::formula("sqrt(0.5 - x)").unwrap(), 10);
     let error = line.solve(0.0, &line.uniform(), None).unwrap_err();
-    assert_says(error, &["M is 0e0 at x = 0.5", "finite and above 0"], Some("density.value"), true);
+    assert_says(error, &["M is 0e0 at x = 0.5", "above 0 on the whole line: add a floor"], Some("density.value"), true);
 }
 
 #[test]
 fn line_stalled() {
     let line = Line::new(LineDensity::formula("if(x < 0.3, 1, 50)").unwrap(), 100);
     let error = line.solve(0.0, &line.uniform(), None).unwrap_err();
-    assert_says(error, &["stalled on the line", "residual"], Some("grid.cells"), true);
+    assert_says(error, &["stalled on the line", "residual"], Some("face_density"), true);
 }
 
 /// Iterates of the linearised method pass each other, and a layer may be thinner than numbers tell apart.

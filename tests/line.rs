@@ -59,6 +59,79 @@ fn equidistributes(density: &str, cells: usize) -> Result<(), String> {
     Ok(())
 }
 
+/// Every Schwarz method with exact averages, from equal cells: optimal conditions take as many iterations as there are
+/// subdomains, whatever the density, and no method stalls.
+#[test]
+fn schwarz_with_exact_averages_never_stalls() {
+    use driftmesh::equidistribution::{Measure, Method, Robin, Stop};
+    for density in [
+        "value = \"x^6 + 1e-9\"",
+        "value = \"if(x > 0.3, 1, 1e-6)\"",
+        "value = \"sqrt(abs(x - 0.5)) + 1e-6\"",
+        "value = \"1 + 1000*exp(-((x - 0.5)/1e-3)^2)\"",
+        "value = \"1e-6 + exp(-x/1e-3)\"",
+        "value = \"1 + 1e6*exp(-x/2e-6)\"",
+        "value = \"1.0001 + tanh((x - 0.4)/1e-4)\"",
+        "of = \"tanh((x - 0.3)/1e-6)\"",
+    ] {
+        let line = line(density, 160);
+        let line = Line { density: line.density.clone().within(line.ends), ..line };
+        for ranges in [vec![[0, 80], [80, 160]], vec![[0, 40], [40, 80], [80, 120], [120, 160]]] {
+            let run = |method, iterations| {
+                let stop = Stop { iterations, tolerance: None, measure: Measure::Error };
+                line.iterate(0.0, &ranges, method, &line.uniform(), None, stop)
+                    .unwrap_or_else(|e| panic!("{density}: {e}"))
+            };
+            let error = run(Method::Optimal { panels: None }, ranges.len()).iterates[ranges.len()].error;
+            assert!(error < 1e-9, "{density} on {} subdomains: {error:.1e}", ranges.len());
+            for robin in [Robin::Auto, Robin::Lagged, Robin::Value(2.0), Robin::Value(1e14)] {
+                run(Method::Optimized { robin }, 20);
+            }
+        }
+    }
+}
+
+/// Rounding of places, and noise of single precision, are not followed; nor is M asked for outside the line.
+#[test]
+fn rounding_is_not_followed() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    type M = fn(f64) -> f64;
+    let densities: [(M, &[f64]); 5] = [
+        (|x| 1.0 + (-(1.0 - x) / 2e-8).exp() / 1e-8, &[]),
+        (|x| 1.0 + (-(1.0 - x) / 2e-12).exp() / 1e-12, &[]),
+        (|x| 1e-3 + 1e8 / ((x - 0.3) / 1e-8).cosh().powi(2), &[0.3]),
+        (|x| 1.0 + 1e6 * (-((x - 0.3) / 1e-6).powi(2)).exp(), &[0.3]),
+        (|x| f64::from((1.0 + (x * x) as f32) * 1.1_f32), &[]),
+    ];
+    for (k, (m, spikes)) in densities.into_iter().enumerate() {
+        let asked = Arc::new(AtomicUsize::new(0));
+        let counter = asked.clone();
+        let density = LineDensity::on_line([0.0, 1.0], move |_, x| {
+            counter.fetch_add(x.len(), Ordering::Relaxed);
+            assert!(x.iter().all(|x| (0.0..=1.0).contains(x)));
+            x.iter().map(|x| m(*x)).collect()
+        });
+        let line = Line { face: FaceDensity::Exact, ..Line::new(density.with_spikes(spikes.to_vec()), 160) };
+        let mesh = line.equidistributed(0.0).unwrap();
+        assert!(mesh.is_sorted_by(|a, b| a < b));
+        let asked = asked.load(Ordering::Relaxed);
+        assert!(asked <= 50_000, "density {k}: {asked} evaluations");
+    }
+}
+
+/// Only ratios of M count: what is too large or too small for sums is refused by name, and so are lines.
+#[test]
+fn sizes_beyond_sums_are_refused() {
+    for m in ["1e308", "5e-324", "1e-200*(1 + x)"] {
+        let error = Line::new(LineDensity::formula(m).unwrap(), 20).equidistributed(0.0).unwrap_err();
+        assert!(error.to_string().starts_with("M is "), "{error}");
+    }
+    for (ends, accepted) in [([0.0, 1e-300], false), ([-1e300, 1e300], false), ([-1e9, 1e-100], true)] {
+        assert_eq!(driftmesh::equidistribution::check_ends("domain", ends).is_ok(), accepted, "{ends:?}");
+    }
+}
+
 /// 200 densities at 20, 160 and 1000 cells, some of them at 10⁵.
 #[test]
 fn all_kinds_of_densities_are_equidistributed() {

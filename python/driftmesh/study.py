@@ -295,7 +295,7 @@ def _interrupted(directory: Path, ended: bool) -> str:
         )
     summary = json.loads((directory / "summary.json").read_text("utf-8"))
     if summary["status"] == "interrupted":
-        message = summary["error"]["message"]
+        message = summary.get("failure", summary.get("error"))["message"]
         if not (directory / "final.npz").is_file():
             return f"{message}, before the first step"
         on = "; run(…, resume=True) goes on" if any(directory.glob("checkpoint.[01]")) else ""

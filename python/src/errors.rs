@@ -76,15 +76,11 @@ fn remedy(failure: &Failure) -> Option<&'static str> {
         Failure::LongWalks { .. } => "raise `relaxation`, lower `dt` or the number of walks, or use Whole()",
         Failure::NoisyInterface { .. } => "raise the estimator's `walks` or `paths`, or use ResidualWalk()",
         Failure::SchwarzStalled { .. } => "raise `iterations` or `overlap` of Schwarz(…), or lower `dt`",
-        Failure::LineDensity { .. } => {
-            "mend the density; an optimized Schwarz method asks for it outside the domain too"
-        }
-        Failure::LineStalled { .. } => {
-            "set `face_density` to \"exact\", or give more cells; for the method \"optimized\" set `robin` to \"auto\" or \"lagged\""
-        }
+        Failure::LineDensity { .. } => "change the density so",
+        Failure::LineStalled { .. } => "set `face_density` to \"exact\"",
         Failure::LineUnresolved { .. } => "give fewer cells, or the density a thicker layer",
         Failure::LineFolded { .. } => {
-            "raise `iterations`, or give a tolerance in its place; where the iteration does not contract, give more overlap"
+            "raise `iterations`, or give a tolerance in its place, which tells whether the iteration contracts"
         }
         Failure::DegenerateStencil { .. } => "make the cells around it less flat",
         Failure::Subdomains { .. } => "give every axis between one subdomain and one a cell",

@@ -1,6 +1,6 @@
 use crate::errors::plain;
 use crate::threads::{BRIEFLY, Caller, Calls, Ended, calls, interruptible};
-use driftmesh::equidistribution::{History, Iterate, Line, LineDensity, Settled};
+use driftmesh::equidistribution::{History, Iterate, Line, LineDensity, Settled, check_ends};
 use driftmesh::study::{Discretization, SchwarzTable, Source, StopTable, check_memory};
 use driftmesh::{Error, Failure};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
@@ -78,7 +78,9 @@ fn problem(
     settings.stop.resolve()?;
     settings.equidistribution.check(ends).map_err(|error| error.within("equidistribution"))?;
     check_memory(cells as u128 + 1, BYTES_PER_CELL, &[cells])?;
-    let density = line_density(density, ends, caller)?.with_spikes(settings.equidistribution.points.clone());
+    check_ends("domain", ends)?;
+    let density =
+        line_density(density, ends, caller)?.with_spikes(settings.equidistribution.points.clone()).within(ends);
     Ok((Line { density, face: settings.equidistribution.face_density, cells, ends }, settings))
 }
 

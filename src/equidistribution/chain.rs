@@ -67,6 +67,7 @@ pub(super) struct Chain<'a> {
 }
 
 const MAX_NEWTON: usize = 200;
+const MAX_BISECTIONS: usize = 400;
 const HALVINGS: i32 = 40;
 const FEW_HALVINGS: i32 = 8;
 
@@ -98,7 +99,7 @@ impl Law {
         match self {
             Self::Robin { slope } => Ok([slope * x, slope]),
             Self::Rest { to, length, panels: None } => {
-                Ok([density.integral(t, x, to)? / length, -density.at(t, x)?[0] / length])
+                Ok([chain.integral(x, to)? / length, -density.at(t, x)?[0] / length])
             }
             Self::Rest { to, length, panels: Some(n) } => {
                 let step = (to - x) / n as f64;
@@ -127,24 +128,56 @@ impl Chain<'_> {
 
     /// ∫M from a to b.
     fn integral(&self, a: f64, b: f64) -> Result<f64, Failure> {
-        let on_line = |x: f64| (self.ends[0]..=self.ends[1]).contains(&x);
         match self.cumulative {
-            Some(cumulative) if on_line(a) && on_line(b) => Ok(cumulative.up_to(b) - cumulative.up_to(a)),
-            _ => self.density.integral(self.t, a, b),
+            Some(cumulative) => Ok(cumulative.up_to(b) - cumulative.up_to(a)),
+            None => self.density.integral(self.t, a, b),
         }
     }
 
-    /// The nodes between two of the line where M is averaged exactly, or a guess of them where it is not.
-    fn divided(&self, count: usize, ends: [End; 2]) -> Option<Vec<f64>> {
-        let ([End::Value(a), End::Value(b)], cumulative) = (ends, self.cumulative?) else { return None };
-        let on_line = |x: f64| (self.ends[0]..=self.ends[1]).contains(&x);
-        if !(on_line(a) && on_line(b)) {
-            return None;
+    /// The nodes of a piece where M is averaged exactly: all cells then have the same ∫M, and the ends are where the laws there
+    /// let the flux F be what it is. With G = ∫M from the beginning of the line, and n cells,
+    ///
+    /// ```text
+    /// G_right(F) − G_left(F) = n h F,   G_end(F) = G(x) at a given node,   G(to) − length (F − g),   G((F − g)/slope)
+    /// ```
+    ///
+    /// by what the law is. The left side falls with F, so that there is one solution. None where ∫M is not known, or a law is
+    /// none of these.
+    fn even(&self, guess: &[f64], ends: [End; 2]) -> Option<Vec<f64>> {
+        let (cumulative, n) = (self.cumulative?, guess.len() - 1);
+        let length = n as f64 * self.h;
+        let place = |end: End, flux: f64| match end {
+            End::Value(x) => Some([cumulative.up_to(x), 0.0]),
+            End::Flux { g, law: Law::Robin { slope } } => {
+                let [y, m] = cumulative.at((flux - g) / slope);
+                Some([y, m / slope])
+            }
+            End::Flux { g, law: Law::Rest { to, length, panels: None } } => {
+                Some([cumulative.up_to(to) - length * (flux - g), -length])
+            }
+            End::Flux { .. } => None,
+        };
+        let left_over = |flux: f64| {
+            let [[left, left_slope], [right, right_slope]] = [place(ends[0], flux)?, place(ends[1], flux)?];
+            let falls = left_slope >= 0.0 && right_slope <= 0.0;
+            falls.then_some([right - left - length * flux, right_slope - left_slope - length])
+        };
+        let first = (cumulative.up_to(guess[n]) - cumulative.up_to(guess[0])) / length;
+        let flux = falling_root(first, cumulative.whole(), left_over)?;
+        let [from, to] = [place(ends[0], flux)?[0], place(ends[1], flux)?[0]];
+        let share = |i: usize| from + (to - from) * (i as f64 / n as f64);
+        // conditions on the flux may ask for a piece that runs backwards
+        let mut x = match from <= to {
+            true => cumulative.inverted((0..=n).map(share)),
+            false => cumulative.inverted((0..=n).rev().map(share)).into_iter().rev().collect(),
+        };
+        for (end, node) in ends.into_iter().zip([0, n]) {
+            if let End::Value(given) = end {
+                x[node] = given;
+            }
         }
-        // values that pass each other are those of a mesh that runs backwards
-        let mut x = cumulative.divided([a.min(b), a.max(b)], count);
-        if a > b {
-            x.reverse();
+        if let [End::Value(a), End::Value(b)] = ends {
+            x.iter_mut().for_each(|x| *x = x.clamp(a.min(b), a.max(b)));
         }
         Some(x)
     }
@@ -232,20 +265,20 @@ impl Chain<'_> {
         Ok((residual, rows))
     }
 
-    /// The nodes of a piece, and the number of linear solves: by inversion of ∫M where M is averaged exactly between given
-    /// ends; else by Newton's method from a guess and, where that stalls, from the nodes that exact averages have.
+    /// The nodes of a piece, and the number of linear solves: by inversion of ∫M where M is averaged exactly; else by Newton's
+    /// method from a guess and, where that stalls, from the nodes that exact averages have.
     ///
     /// # Errors
     /// [`Failure::LineDensity`], [`Failure::LineStalled`].
     pub fn solve(&self, guess: &[f64], ends: [End; 2], step: Option<Step<'_>>) -> Result<(Vec<f64>, usize), Failure> {
         if self.face == FaceDensity::Exact
             && step.is_none()
-            && let Some(nodes) = self.divided(guess.len() - 1, ends)
+            && let Some(nodes) = self.even(guess, ends)
         {
             return Ok((nodes, 0));
         }
         match self.newton(guess, ends, step) {
-            Err(stalled @ Failure::LineStalled { .. }) => match self.divided(guess.len() - 1, ends) {
+            Err(stalled @ Failure::LineStalled { .. }) => match self.even(guess, ends) {
                 Some(near) if near.is_sorted_by(|a, b| a < b) => self.newton(&near, ends, step).map_err(|_| stalled),
                 _ => Err(stalled),
             },
@@ -261,13 +294,12 @@ impl Chain<'_> {
         let mut last = f64::INFINITY;
         // an iterate of conditions on the flux may run backwards, and pass through no order on its way
         let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
-        let remedy = match (free, step) {
-            (true, _) => {
-                "set schwarz.robin to \"auto\" or \"lagged\", schwarz.method to \"classical\", or refine grid.cells"
-            }
-            (false, Some(_)) => "lower time.step, refine grid.cells, or set equidistribution.face_density to \"exact\"",
-            (false, None) => {
-                "set equidistribution.face_density to \"exact\", or refine grid.cells: a density that jumps or peaks within a cell has no mesh by trapezoids or midpoints"
+        let remedy = match (self.face, step) {
+            (FaceDensity::Exact, Some(_)) => "lower time.step, or refine grid.cells",
+            (FaceDensity::Exact, None) => "set schwarz.integral to \"exact\"",
+            (_, Some(_)) => "set equidistribution.face_density to \"exact\", lower time.step, or refine grid.cells",
+            (_, None) => {
+                "set equidistribution.face_density to \"exact\": a density that jumps or peaks within a cell has no mesh by trapezoids or midpoints"
             }
         };
         let most = if free { MAX_NEWTON / 2 } else { MAX_NEWTON };
@@ -338,6 +370,40 @@ impl Chain<'_> {
         }
         Ok(thomas(&rows, &right))
     }
+}
+
+/// Where a function that falls is zero, given with its derivative: Newton's method between two bounds. None where it has no
+/// value, or no bounds are found.
+fn falling_root(first: f64, size: f64, f: impl Fn(f64) -> Option<[f64; 2]>) -> Option<f64> {
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    let mut at = first;
+    let mut step = size.max(first.abs());
+    for _ in 0..MAX_BISECTIONS {
+        let [value, slope] = f(at)?;
+        if value == 0.0 {
+            return Some(at);
+        }
+        *(if value > 0.0 { &mut low } else { &mut high }) = at;
+        if value.is_nan() {
+            return None;
+        }
+        let bounded = low.is_finite() && high.is_finite();
+        let newton = at - value / slope;
+        if (newton - at).abs() <= f64::EPSILON * at.abs()
+            || bounded && high - low <= f64::EPSILON * low.abs().max(high.abs())
+        {
+            return Some(if newton >= low && newton <= high { newton } else { at });
+        }
+        at = if newton > low && newton < high {
+            newton
+        } else if bounded {
+            0.5 * (low + high)
+        } else {
+            step *= 2.0;
+            at + step.copysign(value)
+        };
+    }
+    (low.is_finite() && high.is_finite()).then_some(at)
 }
 
 /// A guess with new end values: the whole piece stretched, so that nodes keep their order.

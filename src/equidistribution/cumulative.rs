@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 /// G(x) = ∫M from the beginning of a line to x, and its inverse
 ///
 /// M is interpolated by polynomials in Chebyshev points on pieces that are halved until their last coefficients are below
-/// 1e-12 of the mean of M on the piece, or do not count beside ∫M over the line. Integrated, they give G in every place; as
+/// 1e-12 of the mean of M on the piece, or do not count beside ∫M over the line, or are of rounding: what M changes by where x
+/// is rounded, or what halving does not lower on either half. Integrated, they give G in every place; as
 /// M > 0, G grows, and Newton's method held between two bounds inverts it. M is asked for inside the line only, many places at
 /// once.
 ///
@@ -34,6 +35,15 @@ struct Piece {
     coefficients: Vec<f64>,
 }
 
+/// The last coefficients of a polynomial.
+struct Tail {
+    size: f64,
+    /// How large they are where places are rounded.
+    rounding: f64,
+}
+
+/// Distance of the places in the middle of a piece, as a share of it.
+const PLACES_APART: f64 = 0.1;
 /// Degree of the polynomials.
 const DEGREE: usize = 16;
 const POINTS: usize = DEGREE + 1;
@@ -43,6 +53,8 @@ const MOST: usize = 1 << 16;
 /// The last coefficients over the mean of M on the piece, and their share in ∫M over the line, that are good enough.
 const RESOLVED: f64 = 1e-12;
 const ROUNDING: f64 = 1e-16;
+/// The same share where they may be noise.
+const NOISY: f64 = 1e-6;
 /// Share by which a chord may be longer than the arc: rounding of u.
 const CHORD: f64 = 1e-9;
 const MOST_NEWTON: usize = 100;
@@ -64,6 +76,8 @@ impl Cumulative {
         let mut unsure: Vec<[f64; 2]> = ends.windows(2).map(|ends| [ends[0], ends[1]]).collect();
         let transform = transform();
         let mut pieces: Vec<Piece> = Vec::new();
+        // of the piece that each is a half of
+        let mut tails_before = vec![f64::INFINITY; unsure.len()];
         while !unsure.is_empty() {
             let last = pieces.len() + unsure.len() > MOST;
             let places: Vec<f64> = unsure.iter().flat_map(points).collect();
@@ -74,31 +88,36 @@ impl Cumulative {
                 density.values(t, &sorted).and(Err(failure))
             })?;
             let u = density.followed(t, &unsure.concat());
-            let found: Vec<(Piece, f64)> = unsure
+            let found: Vec<(Piece, Tail)> = unsure
                 .iter()
                 .zip(values.chunks_exact(POINTS))
                 .map(|(ends, values)| Piece::through(*ends, values, &transform))
                 .collect();
             let whole: f64 =
                 pieces.iter().chain(found.iter().map(|(piece, _)| piece)).map(|piece| piece.integral).sum();
-            let mut halves = Vec::new();
+            let (mut halves, mut tails) = (Vec::new(), Vec::new());
+            let relative: Vec<f64> =
+                found.iter().map(|(piece, tail)| tail.size * (piece.upper - piece.lower) / piece.integral).collect();
+            let stays = |k: usize| relative[k] <= NOISY && relative[k] >= 0.5 * tails_before[k];
             for (k, (piece, tail)) in found.into_iter().enumerate() {
                 let width = piece.upper - piece.lower;
                 let middle = piece.lower + 0.5 * width;
                 let chord = u.as_ref().map_or(0.0, |u| width.hypot(u[2 * k + 1] - u[2 * k]));
                 let seen = chord <= piece.integral * (1.0 + CHORD) + ROUNDING * whole;
-                let smooth = tail * width <= RESOLVED * piece.integral || tail * width <= ROUNDING * whole;
+                let smooth = relative[k] <= RESOLVED || tail.size * width <= ROUNDING * whole;
+                let rounded = tail.size <= tail.rounding || tails_before[k].is_finite() && stays(k) && stays(k ^ 1);
                 let divides = piece.lower < middle && middle < piece.upper && width > f64::MIN_POSITIVE;
-                if seen && smooth || last || !divides {
+                if seen && (smooth || rounded) || last || !divides {
                     if !divides && chord > JUMP * piece.integral && chord > NOTICEABLE * whole {
                         return Err(Failure::LineDensity { what: "u_x", value: f64::INFINITY, x: piece.lower, t });
                     }
                     pieces.push(piece);
                 } else {
                     halves.extend([[piece.lower, middle], [middle, piece.upper]]);
+                    tails.extend([relative[k]; 2]);
                 }
             }
-            unsure = halves;
+            (unsure, tails_before) = (halves, tails);
         }
         Ok(Self::of(pieces))
     }
@@ -129,27 +148,36 @@ impl Cumulative {
         Self { pieces, whole: sum + lost }
     }
 
-    /// ∫M from the beginning of the line to a place on it.
-    pub fn up_to(&self, x: f64) -> f64 {
-        let k = self.pieces.partition_point(|piece| piece.lower <= x).max(1) - 1;
+    /// G and M at a place; beyond the ends of the line M is constant.
+    pub fn at(&self, x: f64) -> [f64; 2] {
+        let [a, b] = self.ends();
+        let inside = x.clamp(a, b);
+        let k = self.pieces.partition_point(|piece| piece.lower <= inside).max(1) - 1;
         let piece = &self.pieces[k];
         let half = 0.5 * (piece.upper - piece.lower);
-        piece.below + half * clenshaw(&piece.coefficients, ((x - piece.lower) / half - 1.0).clamp(-1.0, 1.0))[0]
+        let [g, m] = clenshaw(&piece.coefficients, ((inside - piece.lower) / half - 1.0).clamp(-1.0, 1.0));
+        // to the last bit
+        let g = if inside == b { self.whole } else { piece.below + half * g };
+        [g + (x - inside) * m, m]
     }
 
-    /// `count` + 1 nodes from a to b, places on the line with the same ∫M between neighbours.
-    pub fn divided(&self, [a, b]: [f64; 2], count: usize) -> Vec<f64> {
-        let [from, to] = [a, b].map(|x| if x == self.ends()[1] { self.whole } else { self.up_to(x) });
-        let share = |i: usize| from + (to - from) * (i as f64 / count as f64);
-        let inner = self.inverted((1..count).map(share));
-        [a].into_iter().chain(inner.into_iter().map(|x| x.clamp(a, b))).chain([b]).collect()
+    /// G at a place.
+    pub fn up_to(&self, x: f64) -> f64 {
+        self.at(x)[0]
     }
 
     /// Where G is as large as each of some values that grow.
     pub fn inverted(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut k = 0;
         let mut s = -1.0;
+        let [a, b] = self.ends();
         let place = |g: f64| {
+            if g < 0.0 {
+                return a + g / self.at(a)[1];
+            }
+            if g > self.whole {
+                return b + (g - self.whole) / self.at(b)[1];
+            }
             while k + 1 < self.pieces.len() && g >= self.pieces[k + 1].below {
                 (k, s) = (k + 1, -1.0);
             }
@@ -158,6 +186,14 @@ impl Cumulative {
             piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + s)
         };
         values.map(place).collect()
+    }
+
+    /// `count` + 1 nodes from a to b, places on the line with the same ∫M between neighbours.
+    pub fn divided(&self, [a, b]: [f64; 2], count: usize) -> Vec<f64> {
+        let [from, to] = [a, b].map(|x| self.up_to(x));
+        let share = |i: usize| from + (to - from) * (i as f64 / count as f64);
+        let inner = self.inverted((1..count).map(share));
+        [a].into_iter().chain(inner.into_iter().map(|x| x.clamp(a, b))).chain([b]).collect()
     }
 
     /// Over the line.
@@ -176,9 +212,8 @@ const JUMP: f64 = 2.0;
 const NOTICEABLE: f64 = 1e-12;
 
 impl Piece {
-    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and the size of its last
-    /// coefficients.
-    fn through([lower, upper]: [f64; 2], values: &[f64], transform: &[[f64; POINTS]; POINTS]) -> (Self, f64) {
+    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and its last coefficients.
+    fn through([lower, upper]: [f64; 2], values: &[f64], transform: &[[f64; POINTS]; POINTS]) -> (Self, Tail) {
         let c: [f64; POINTS] =
             std::array::from_fn(|k| transform[k].iter().zip(values).map(|(weight, value)| weight * value).sum());
         // ∫T_k = (T_{k+1}/(k + 1) − T_{k−1}/(k − 1))/2, ∫T_0 = T_1, ∫T_1 = T_2/4
@@ -193,8 +228,11 @@ impl Piece {
         // T_k(−1) = (−1)^k, T_k(1) = 1
         coefficients[0] = (1..=POINTS).map(|k| if k % 2 == 1 { coefficients[k] } else { -coefficients[k] }).sum();
         let integral = 0.5 * (upper - lower) * coefficients.iter().sum::<f64>();
-        let tail = c[DEGREE - 2..].iter().map(|c| c.abs()).sum();
-        (Self { lower, upper, below: 0.0, integral, coefficients }, tail)
+        let size = c[DEGREE - 2..].iter().map(|c| c.abs()).sum();
+        let steepest =
+            values.windows(2).map(|m| (m[1] - m[0]).abs()).fold(0.0, f64::max) / (PLACES_APART * (upper - lower));
+        let rounding = 2.0 * f64::EPSILON * lower.abs().max(upper.abs()) * steepest;
+        (Self { lower, upper, below: 0.0, integral, coefficients }, Tail { size, rounding })
     }
 
     /// s where G is `g`, at or beyond `from`.

@@ -1,12 +1,13 @@
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake, Program};
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
 /// M(x, t) > 0 on a line, with its exact derivative by x
 ///
-/// A formula itself, or the arc length √(1 + u_x²) of one. Outside [0, 1], where iterates of Robin conditions may go, it
-/// must be finite and positive too.
+/// A formula itself, or the arc length √(1 + u_x²) of one. Only its ratios count. Iterates of Robin conditions may go beyond
+/// the ends of the line: see [`within`](Self::within).
 #[derive(Debug, Clone)]
 pub struct LineDensity {
     kind: Kind,
@@ -14,6 +15,8 @@ pub struct LineDensity {
     followed: Option<Program<1, 1>>,
     /// Where it may have spikes.
     spikes: Vec<f64>,
+    /// The line beyond whose ends it is constant.
+    line: Option<[f64; 2]>,
 }
 
 #[derive(Clone)]
@@ -27,36 +30,29 @@ enum Kind {
     /// Linear between places.
     Samples(Samples),
     /// M of a time and places on the line.
-    Values(Values),
+    Values(Values, [f64; 2]),
 }
 
 /// M by its values, defined on a line only.
 #[derive(Clone)]
-struct Values {
-    of: Arc<ValuesFunction>,
-    ends: [f64; 2],
-}
+struct Values(Arc<ValuesFunction>);
 
 /// Distance over which values are differenced, as a share of the line: Newton's method needs no better.
 const APART: f64 = 1e-6;
 
 impl Values {
-    /// M with its difference over a short distance, both on the line; beyond its ends M is constant.
-    fn pairs(&self, t: f64, x: &[f64]) -> Result<Vec<[f64; 2]>, Failure> {
-        let ([a, b], n) = (self.ends, x.len());
+    /// M with its difference over a short distance, all on the line.
+    fn pairs(&self, t: f64, x: &[f64], [a, b]: [f64; 2]) -> Result<Vec<[f64; 2]>, Failure> {
+        let n = x.len();
         let apart = APART * (b - a);
-        let inside: Vec<f64> = x.iter().map(|x| x.clamp(a, b)).collect();
-        let lower = inside.iter().map(|x| (x - apart).max(a));
-        let upper = inside.iter().map(|x| (x + apart).min(b));
-        let places: Vec<f64> = inside.iter().copied().chain(lower).chain(upper).collect();
-        let m = (self.of)(t, &places);
+        let lower = x.iter().map(|x| (x - apart).max(a));
+        let upper = x.iter().map(|x| (x + apart).min(b));
+        let places: Vec<f64> = x.iter().copied().chain(lower).chain(upper).collect();
+        let m = (self.0)(t, &places);
         if m.len() != places.len() {
             return Err(Failure::WrongLength { what: "the density", found: m.len(), expected: places.len() });
         }
-        let slope = |k: usize| match x[k] == inside[k] {
-            true => (m[2 * n + k] - m[n + k]) / (places[2 * n + k] - places[n + k]),
-            false => 0.0,
-        };
+        let slope = |k: usize| (m[2 * n + k] - m[n + k]) / (places[2 * n + k] - places[n + k]);
         Ok((0..n).map(|k| [m[k], slope(k)]).collect())
     }
 }
@@ -107,7 +103,7 @@ impl fmt::Debug for Kind {
             Self::Arclength(_) => "Arclength",
             Self::Function(_) => "Function",
             Self::Samples(_) => "Samples",
-            Self::Values(_) => "Values",
+            Self::Values(..) => "Values",
         })
     }
 }
@@ -149,7 +145,7 @@ impl LineDensity {
     pub fn formula(text: &str) -> Result<Self> {
         let m = parsed("value", text)?;
         let slope = differentiated("value", text, &m)?;
-        Ok(Self { kind: Kind::Formula(Program::new([&m, &slope])), followed: None, spikes: Vec::new() })
+        Ok(Self { kind: Kind::Formula(Program::new([&m, &slope])), followed: None, spikes: Vec::new(), line: None })
     }
 
     /// √(1 + u_x²) for u by a formula of x and t.
@@ -164,6 +160,7 @@ impl LineDensity {
             kind: Kind::Arclength(Program::new([&slope, &curvature])),
             followed: Some(Program::new([&u])),
             spikes: Vec::new(),
+            line: None,
         })
     }
 
@@ -181,7 +178,7 @@ impl LineDensity {
     /// # Ok::<(), driftmesh::Error>(())
     /// ```
     pub fn function(f: impl Fn(f64, &[f64]) -> Vec<[f64; 2]> + Send + Sync + 'static) -> Self {
-        Self { kind: Kind::Function(Arc::new(f)), followed: None, spikes: Vec::new() }
+        Self { kind: Kind::Function(Arc::new(f)), followed: None, spikes: Vec::new(), line: None }
     }
 
     /// M by a function of t and some places on a line, which gives one value a place; beyond the ends M is constant.
@@ -196,7 +193,8 @@ impl LineDensity {
     /// # Ok::<(), driftmesh::Error>(())
     /// ```
     pub fn on_line(ends: [f64; 2], f: impl Fn(f64, &[f64]) -> Vec<f64> + Send + Sync + 'static) -> Self {
-        Self { kind: Kind::Values(Values { of: Arc::new(f), ends }), followed: None, spikes: Vec::new() }
+        let kind = Kind::Values(Values(Arc::new(f)), ends);
+        Self { kind, followed: None, spikes: Vec::new(), line: Some(ends) }
     }
 
     /// M at some places, linear between them and constant beyond; best with [`FaceDensity::Exact`](super::FaceDensity).
@@ -239,7 +237,7 @@ impl LineDensity {
             sum += 0.5 * (m[k - 1] + m[k]) * (x[k] - x[k - 1]);
             integral.push(sum);
         }
-        Ok(Self { kind: Kind::Samples(Samples { x, m, integral }), followed: None, spikes: Vec::new() })
+        Ok(Self { kind: Kind::Samples(Samples { x, m, integral }), followed: None, spikes: Vec::new(), line: None })
     }
 
     /// u at each place, where M is an arc length.
@@ -257,7 +255,7 @@ impl LineDensity {
     pub fn at_each(&self, t: f64, x: &[f64]) -> Result<Vec<[f64; 2]>, Failure> {
         let mut out = self.pairs(t, x)?;
         for ([m, slope], x) in out.iter_mut().zip(x) {
-            if !(m.is_finite() && *m > 0.0) {
+            if !is_sound(*m) {
                 return Err(Failure::LineDensity { what: "M", value: *m, x: *x, t });
             }
             // where M has a kink or a vertical tangent
@@ -284,21 +282,28 @@ impl LineDensity {
         Self { spikes, ..self }
     }
 
+    /// The same, asked for on a line only: beyond its ends M is what it is there.
+    #[must_use]
+    pub fn within(self, ends: [f64; 2]) -> Self {
+        Self { line: Some(ends), ..self }
+    }
+
     pub(super) fn spikes(&self) -> &[f64] {
         &self.spikes
     }
 
     /// M and M_x at each place, whatever they are.
     fn pairs(&self, t: f64, x: &[f64]) -> Result<Vec<[f64; 2]>, Failure> {
+        let inside = self.inside(x);
         let mut out = vec![[0.0; 2]; x.len()];
-        let points: Vec<[f64; 1]> = x.iter().map(|x| [*x]).collect();
+        let points: Vec<[f64; 1]> = inside.iter().map(|x| [*x]).collect();
         match &self.kind {
             Kind::Formula(program) => program.eval_each(&points, &[t], &mut out),
             Kind::Arclength(program) => {
                 program.eval_each(&points, &[t], &mut out);
                 for [m, slope] in &mut out {
                     let (u_x, u_xx) = (*m, *slope);
-                    *m = (1.0 + u_x * u_x).sqrt();
+                    *m = 1.0_f64.hypot(u_x);
                     *slope = u_x * u_xx / *m;
                 }
             }
@@ -306,14 +311,27 @@ impl LineDensity {
                 out.iter_mut().zip(x).for_each(|(out, x)| *out = samples.at(*x));
             }
             Kind::Function(f) => {
-                out = f(t, x);
+                out = f(t, &inside);
                 if out.len() != x.len() {
                     return Err(Failure::WrongLength { what: "the density", found: out.len(), expected: x.len() });
                 }
             }
-            Kind::Values(values) => out = values.pairs(t, x)?,
+            Kind::Values(values, ends) => out = values.pairs(t, &inside, *ends)?,
+        }
+        for ((pair, x), inside) in out.iter_mut().zip(x).zip(inside.iter()) {
+            if x != inside {
+                pair[1] = 0.0;
+            }
         }
         Ok(out)
+    }
+
+    /// Each place, or the end of the line that it lies beyond.
+    fn inside<'a>(&self, x: &'a [f64]) -> Cow<'a, [f64]> {
+        match self.line {
+            Some([a, b]) if x.iter().any(|x| !(a..=b).contains(x)) => x.iter().map(|x| x.clamp(a, b)).collect(),
+            _ => x.into(),
+        }
     }
 
     /// M at each place.
@@ -322,8 +340,8 @@ impl LineDensity {
     /// [`Failure::LineDensity`] at the first place where M is not finite and positive.
     pub fn values(&self, t: f64, x: &[f64]) -> Result<Vec<f64>, Failure> {
         let m: Vec<f64> = match &self.kind {
-            Kind::Values(values) => {
-                let m = (values.of)(t, x);
+            Kind::Values(values, _) => {
+                let m = (values.0)(t, &self.inside(x));
                 if m.len() != x.len() {
                     return Err(Failure::WrongLength { what: "the density", found: m.len(), expected: x.len() });
                 }
@@ -331,7 +349,7 @@ impl LineDensity {
             }
             _ => self.pairs(t, x)?.into_iter().map(|[m, _]| m).collect(),
         };
-        match m.iter().position(|m| !(m.is_finite() && *m > 0.0)) {
+        match m.iter().position(|m| !is_sound(*m)) {
             None => Ok(m),
             Some(k) => Err(Failure::LineDensity { what: "M", value: m[k], x: x[k], t }),
         }
@@ -466,6 +484,30 @@ impl LineDensity {
             unsure = halves;
         }
         Ok(sum)
+    }
+}
+
+/// Values of M, and lengths of a line, with which sums and products neither overflow nor vanish.
+const SMALLEST: f64 = 1e-150;
+const LARGEST: f64 = 1e150;
+
+fn is_sound(m: f64) -> bool {
+    (SMALLEST..=LARGEST).contains(&m)
+}
+
+/// Refuses a line that is too long, too short or too far away for products of its places.
+///
+/// # Errors
+/// [`Error::Invalid`] with the key.
+pub fn check_ends(key: &str, [a, b]: [f64; 2]) -> Result<()> {
+    match a.abs().max(b.abs()) <= LARGEST && b - a >= SMALLEST {
+        true => Ok(()),
+        false => {
+            let rule = format!(
+                "a line has ends up to {LARGEST:e} and a length from {SMALLEST:e} on: take another unit of length"
+            );
+            Err(Error::invalid(key, format!("[{a:e}, {b:e}]"), rule))
+        }
     }
 }
 

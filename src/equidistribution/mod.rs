@@ -21,7 +21,7 @@ mod schwarz;
 mod tests;
 
 pub use chain::FaceDensity;
-pub use density::LineDensity;
+pub use density::{LineDensity, check_ends};
 pub use predict::Prediction;
 pub use schwarz::{Coarse, Method, Robin, Sweep};
 
@@ -168,41 +168,41 @@ impl History {
         let measured: Vec<f64> = self.iterates.iter().map(|iterate| stop.measure.of(iterate)).collect();
         let (count, last) = (self.count(), measured[self.count()]);
         let size = self.mesh.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
-        // an iteration that stands still has come as far as rounding lets it
         let still = count > 0 && self.iterates[count].increment <= f64::EPSILON * size;
-        let rounding = if still { STILL * last } else { IS_ROUNDING * size };
-        let linearized = matches!(method, Method::Classical { linearized: true, .. });
-        let advice = match contraction(&measured) {
+        // an iteration that stands still near the solution has come as far as rounding lets it
+        let rounding = if still && last <= NEAR * length { STILL * last } else { IS_ROUNDING * size };
+        let rate = contraction(&measured);
+        let more = rate.map(|rate| 2.0 * (tolerance.max(rounding) / last).ln() / rate.ln());
+        let advice = match (rate, more) {
             _ if last <= rounding => {
                 format!("; that is rounding, which no iteration lowers: ask for {:.0e} or more", rounding / length)
             }
-            Some(rate) => {
-                let more = 2.0 * (tolerance.max(rounding) / last).ln() / rate.ln();
+            _ if still => {
+                "; it stands still: with these conditions subdomains learn next to nothing of each other".into()
+            }
+            (Some(rate), Some(more)) if more <= MOST_ITERATIONS => {
                 format!("; it contracts by {rate:.4} in two iterations: about {more:.0} more would do")
             }
-            None if linearized => {
+            (Some(rate), _) => format!("; it contracts by {rate:.6} in two iterations, which is too slow to wait for"),
+            _ if matches!(method, Method::Classical { linearized: true, .. }) => {
                 "; the linearised iteration need not converge where M varies much over the overlap".into()
             }
-            None if count < FEW => "; so few do not tell whether it contracts".into(),
-            None => "; it does not contract".into(),
+            _ if count < FEW => "; so few do not tell whether it contracts".into(),
+            _ => "; it does not contract".into(),
         };
         let remedy = match method {
             _ if last <= rounding => "raise stop.tolerance",
-            Method::Classical { linearized: true, .. } => {
-                "set schwarz.linearized to false, schwarz.sweep to \"alternating\" or schwarz.coarse to \"galerkin\", or give more overlap"
+            _ if !still && (more.is_some_and(|more| more <= MOST_ITERATIONS) || count < FEW) => "raise stop.iterations",
+            Method::Classical { linearized: true, .. } => "set schwarz.linearized to false",
+            Method::Classical { coarse: Coarse::None, sweep: Sweep::Parallel, .. } => {
+                "give more overlap, or set schwarz.coarse to \"galerkin\""
             }
-            Method::Classical { coarse: Coarse::Galerkin, .. } => {
-                "raise stop.iterations where it contracts; else give more overlap, or more grid.cells"
+            Method::Classical { .. } => "give more overlap, or more grid.cells",
+            Method::Optimized { robin: Robin::Value(_) } => "set schwarz.robin to \"auto\" or \"lagged\"",
+            Method::Optimized { .. } => {
+                "set schwarz.method to \"optimal\" and equidistribution.face_density to \"exact\""
             }
-            Method::Classical { .. } => {
-                "raise stop.iterations where it contracts, give more overlap, or set schwarz.coarse to \"galerkin\""
-            }
-            Method::Optimized { robin: Robin::Value(_) } => {
-                "raise stop.iterations where it contracts; else set schwarz.robin to \"auto\" or \"lagged\""
-            }
-            Method::Optimized { .. } | Method::Optimal { .. } => {
-                "raise stop.iterations where it contracts; else set equidistribution.face_density to \"exact\", or more grid.cells"
-            }
+            Method::Optimal { .. } => "set equidistribution.face_density to \"exact\", or give more grid.cells",
         };
         let measure = stop.measure.name();
         Some(Failure::NotConverged { measure, last, iterations: count, tolerance, advice, remedy })
@@ -221,6 +221,10 @@ fn contraction(measured: &[f64]) -> Option<f64> {
 
 /// Errors below this share of the largest coordinate are of rounding.
 const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// An iteration that stands still nearer than this share of the line has converged, as far as rounding lets it.
+const NEAR: f64 = 1e-6;
+/// Iterations that a study may ask for.
+const MOST_ITERATIONS: f64 = 1e6;
 /// What to ask for of what stands still, over what it came to.
 const STILL: f64 = 1.5;
 /// Iterations that tell nothing of an iteration that has not fallen in them.

@@ -2,7 +2,9 @@
 
 use super::mapped::parse;
 use super::{Header, Output, Source};
-use crate::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Measure, Method, Robin, Stop, Sweep, pieces};
+use crate::equidistribution::{
+    Coarse, FaceDensity, Line, LineDensity, Measure, Method, Robin, Stop, Sweep, check_ends, pieces,
+};
 use crate::error::{Error, Failure, Result, line_rule};
 use crate::formula::Formula;
 use crate::kind::kinds;
@@ -302,6 +304,7 @@ impl EquidistributionStudy {
                 format!("must lie above domain.lower = [{a:?}]"),
             ));
         }
+        check_ends("domain", [a, b])?;
         let [cells] = self.grid.cells;
         if cells < 2 {
             return Err(Error::invalid("grid.cells", format!("[{cells}]"), "must be 2 or more"));
@@ -363,7 +366,7 @@ impl EquidistributionStudy {
 
     fn line(&self, density: LineDensity) -> Line {
         let ends = [self.domain.lower[0], self.domain.upper[0]];
-        let density = density.with_spikes(self.equidistribution.points.clone());
+        let density = density.with_spikes(self.equidistribution.points.clone()).within(ends);
         Line { density, face: self.equidistribution.face_density, cells: self.grid.cells[0], ends }
     }
 

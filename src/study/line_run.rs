@@ -557,8 +557,8 @@ fn unseen(line: &Line, t: f64, mesh: &[f64]) -> Result<Option<String>> {
     };
     Ok(((seen - there).abs() > NOTICEABLE * there).then(|| {
         format!(
-            "the cells see another density than there is: ∫M is {seen:.3} over them and {there:.3} in truth; refine grid.cells, \
-             or begin with a start.mesh that has nodes where M is large"
+            "the cells see another density than there is: ∫M is {seen:.3} over them and {there:.3} in truth; name the \
+             place of its layer in equidistribution.points, or refine grid.cells"
         )
     }))
 }

