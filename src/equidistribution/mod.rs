@@ -190,9 +190,13 @@ impl History {
             _ if count < FEW => "; so few do not tell whether it contracts".into(),
             _ => "; it does not contract".into(),
         };
+        let converges = !still && (more.is_some_and(|more| more <= MOST_ITERATIONS) || count < FEW);
         let remedy = match method {
             _ if last <= rounding => "raise stop.tolerance",
-            _ if !still && (more.is_some_and(|more| more <= MOST_ITERATIONS) || count < FEW) => "raise stop.iterations",
+            Method::Optimized { robin: Robin::Value(_) } if converges => {
+                "raise stop.iterations, or set schwarz.robin to \"auto\" or \"lagged\""
+            }
+            _ if converges => "raise stop.iterations",
             Method::Classical { linearized: true, .. } => "set schwarz.linearized to false",
             Method::Classical { coarse: Coarse::None, sweep: Sweep::Parallel, .. } => {
                 "give more overlap, or set schwarz.coarse to \"galerkin\""
