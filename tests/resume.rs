@@ -114,6 +114,8 @@ fn every_generator_goes_on() {
         "mesh.generator={kind=\"schwarz\",subdomains=[2,2]}".into(),
         "mesh.generator={kind=\"fixed\"}".into(),
         format!("{walks}{{kind=\"residual-walk\"}}}}"),
+        format!("{walks}{{kind=\"strip\"}}}}"),
+        "mesh.generator={kind=\"schwarz\",subdomains=[2,2],method=\"optimized\",iterations=2}".into(),
         format!("{walks}{{kind=\"grid-walk\",walks=200}}}}"),
         format!("{walks}{{kind=\"monte-carlo\",paths=200,substeps=4}}}}"),
         format!("{walks}{{kind=\"monte-carlo\",paths=256,substeps=4,sobol=true}},interface={{sample=3}}}}"),

@@ -82,8 +82,9 @@ fn text(n: u64, dice: &mut Dice) -> String {
         1..=3 => "{ kind = \"whole\" }".into(),
         4..=5 => format!("{{ kind = \"schwarz\", subdomains = {subdomains:?}, overlap = {} }}", dice.whole(1, 2)),
         _ => {
-            let estimator = match dice.whole(0, 2) {
+            let estimator = match dice.whole(0, 3) {
                 0 => "{ kind = \"residual-walk\" }".into(),
+                3 => "{ kind = \"strip\" }".into(),
                 1 => format!("{{ kind = \"grid-walk\", walks = {} }}", dice.whole(100, 1000)),
                 _ => {
                     let (paths, substeps) = (dice.whole(100, 1000), dice.whole(1, 4));

@@ -195,11 +195,21 @@ fn interfaces(t: f64, interface: &Interface) -> String {
     if interface.sweeps > 0 {
         text += &format!(", {} sweeps a step", interface.sweeps);
     }
+    if interface.walks == 0 && interface.contraction.is_none() {
+        text += ", by strips alone";
+    }
+    if interface.read > 0 {
+        let times = if interface.exchanges == 1 { "once".into() } else { format!("{} times", interface.exchanges) };
+        text += &format!(", up to {} nodes read from neighbours {times} a step", interface.read);
+    }
+    if interface.gathered > 0 {
+        text += &format!(", {} coarse ones gathered", interface.gathered);
+    }
     if let Some(c) = interface.contraction {
-        text += &format!(
-            ", {} iterations a step, contraction {:.3} (at most {:.3})",
-            c.iterations, c.observed, c.predicted
-        );
+        text += &format!(", {} iterations a step, contraction {:.3}", c.iterations, c.observed);
+        if let Some(predicted) = c.predicted {
+            text += &format!(" (at most {predicted:.3})");
+        }
     }
     text + "\n"
 }

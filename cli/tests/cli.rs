@@ -189,6 +189,19 @@ fn bad_settings_are_refused_by_name() {
         ("mesh.generator.seed=-1", &["expected a whole number from 0 to 2^63 - 1"]),
         ("mesh.generator.seed=9223372036854775808", &["--set:1"]),
         ("mesh.generator.estimator.walks=0", &["`mesh.generator.estimator.walks` is 0", "set it to 1 or more"]),
+        (
+            "mesh.generator.estimator={kind=\"strip\",width=0}",
+            &["`mesh.generator.estimator.width` is 0", "1 node or more", "\"auto\""],
+        ),
+        (
+            "mesh.generator.estimator={kind=\"strip\",width=7}",
+            &["`mesh.generator.estimator.width` is 7", "narrowest subdomain", "fewer subdomains"],
+        ),
+        ("mesh.generator.estimator={kind=\"strip\",widht=2}", &["widht", "did you mean `width`?"]),
+        (
+            "mesh.generator={kind=\"schwarz\",subdomains=[2,2],robin=1.0}",
+            &["`mesh.generator.robin` is 1", "method to \"optimized\""],
+        ),
         ("mesh.generator.estimator.sweeps=many", &["a number or \"auto\"", "--set:1"]),
         (
             "mesh.generator.estimator={kind=\"monte-carlo\",paths=0,substeps=1}",

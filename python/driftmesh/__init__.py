@@ -25,6 +25,7 @@ from .generators import (
     RootGradient,
     Schwarz,
     Stochastic,
+    Strip,
     Whole,
 )
 from .laplacian import laplacian_stencils
@@ -50,6 +51,7 @@ __all__ = [
     "Schwarz",
     "SchwarzResult",
     "Stochastic",
+    "Strip",
     "StudyError",
     "Whole",
     "__version__",

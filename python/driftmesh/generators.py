@@ -121,35 +121,40 @@ class Fixed(_Kind):
 
 @dataclass(frozen=True)
 class Schwarz(_Kind):
-    """Overlapping subdomains, solved in parallel and iterated to a tolerance.
+    """Overlapping subdomains, solved in parallel and iterated to a tolerance or so many times.
 
     Args:
         subdomains: Along each axis.
         overlap: Cells that neighbours share.
-        tolerance: Change in the last iteration, as a share of the largest coordinate.
-        iterations: Most in a step.
+        method: ``"classical"``, neighbours exchange values, or ``"optimized"``, Robin's conditions, which take fewer iterations.
+        robin: p of these, or ``"auto"``.
+        tolerance: Change in the last iteration, as a share of the largest coordinate; 1e-10 where neither it nor
+            ``iterations`` is given.
+        iterations: Exactly so many in a step; with ``tolerance`` at most so many, 1000 where nothing is given.
 
     >>> from driftmesh import Mesh, MeshGenerator, Schwarz
     >>> mesh = Mesh.uniform(cells=(16, 16))
-    >>> generator = MeshGenerator(method=Schwarz(subdomains=(2, 2)))
+    >>> generator = MeshGenerator(method=Schwarz(subdomains=(2, 2), iterations=3))
     >>> _ = generator.step(mesh, mesh.x**2, dt=0.01)
-    >>> generator.last["interface"]["contraction"]["observed"] < 1
-    True
+    >>> generator.last["interface"]["contraction"]["iterations"]
+    3
     """
 
     kind = "schwarz"
     subdomains: tuple[int, int] = (2, 2)
     overlap: int = 2
-    tolerance: float = 1e-10
-    iterations: int = 1000
+    method: Literal["classical", "optimized"] = "classical"
+    robin: float | Literal["auto"] = "auto"
+    tolerance: float | None = None
+    iterations: int | None = None
 
 
 @dataclass(frozen=True)
 class ResidualWalk(_Kind):
-    """Sweeps of relaxation, then random walks that estimate what the sweeps leave.
+    """Strips around the interfaces, then random walks that estimate what the strips leave.
 
     Args:
-        sweeps: A number, or ``"auto"``.
+        sweeps: So many sweeps of relaxation in the strips, or ``"auto"``: they are solved.
         walks: From each node.
         smoother: ``"chebyshev"`` or ``"jacobi"``.
 
@@ -162,6 +167,29 @@ class ResidualWalk(_Kind):
     sweeps: int | Literal["auto"] = "auto"
     walks: int = 10
     smoother: Literal["chebyshev", "jacobi"] = "chebyshev"
+
+
+@dataclass(frozen=True)
+class Strip(_Kind):
+    """Every subdomain is solved once with a strip of its neighbours, after a coarse lattice; no walks.
+
+    Args:
+        width: Nodes of the neighbours that a subdomain sees, or ``"auto"``.
+        coarse: Cells along each axis to one of the coarse lattice, 1 for none, or ``"auto"``.
+        exchanges: In a step, or ``"auto"``: one, more where one is not enough.
+
+    >>> from driftmesh import Mesh, MeshGenerator, Stochastic, Strip
+    >>> mesh = Mesh.uniform(cells=(16, 16))
+    >>> generator = MeshGenerator(method=Stochastic(subdomains=(2, 2), estimator=Strip(width=4)))
+    >>> _ = generator.step(mesh, mesh.x**2, dt=0.001)
+    >>> generator.last["interface"]["exchanges"]
+    1
+    """
+
+    kind = "strip"
+    width: int | Literal["auto"] = "auto"
+    coarse: int | Literal["auto"] = "auto"
+    exchanges: int | Literal["auto"] = "auto"
 
 
 @dataclass(frozen=True)
@@ -211,11 +239,11 @@ class Interpolation:
 
 @dataclass(frozen=True)
 class Stochastic(_Kind):
-    """Random walks give the nodes between the subdomains, then each is solved by itself: no iteration between them.
+    """Random walks or strips give the nodes between the subdomains, then each is solved by itself.
 
     Args:
         subdomains: Along each axis.
-        estimator: :class:`ResidualWalk`, :class:`GridWalk` or :class:`MonteCarlo`.
+        estimator: :class:`ResidualWalk`, :class:`Strip`, :class:`GridWalk` or :class:`MonteCarlo`.
         seed: Of all random numbers.
         interface: :class:`Interpolation`, or every node where nothing is said.
 
@@ -229,13 +257,14 @@ class Stochastic(_Kind):
 
     kind = "stochastic"
     subdomains: tuple[int, int] = (2, 2)
-    estimator: ResidualWalk | GridWalk | MonteCarlo = ResidualWalk()
+    estimator: ResidualWalk | Strip | GridWalk | MonteCarlo = ResidualWalk()
     seed: int = 0
     interface: Interpolation | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.estimator, (ResidualWalk, GridWalk, MonteCarlo)):
-            raise ValueError(f"`estimator` is {self.estimator!r}, but must be ResidualWalk(…), GridWalk(…) or MonteCarlo(…)")
+        if not isinstance(self.estimator, (ResidualWalk, Strip, GridWalk, MonteCarlo)):
+            text = "must be ResidualWalk(…), Strip(…), GridWalk(…) or MonteCarlo(…)"
+            raise ValueError(f"`estimator` is {self.estimator!r}, but {text}")
         if not isinstance(self.interface, (Interpolation, NoneType)):
             raise ValueError(f"`interface` is {self.interface!r}, but must be Interpolation(…) or None")
 

@@ -30,6 +30,7 @@ from driftmesh import (
     RootGradient,
     Schwarz,
     Stochastic,
+    Strip,
     Whole,
     transfer,
 )
@@ -78,6 +79,8 @@ def test_monitors_by_name_by_array_and_by_function_are_the_same():
         Schwarz(subdomains=(2, 2)),
         Stochastic(subdomains=(2, 3), seed=3),
         Stochastic(subdomains=(2, 2), estimator=ResidualWalk(sweeps=20, walks=4, smoother="jacobi")),
+        Stochastic(subdomains=(2, 2), estimator=Strip(width=4)),
+        Schwarz(subdomains=(2, 2), method="optimized", tolerance=1e-10),
         Stochastic(subdomains=(2, 2), estimator=GridWalk(walks=200, increment=True), interface=Interpolation(sample=9)),
         Stochastic(subdomains=(2, 2), estimator=MonteCarlo(paths=2000, substeps=10, control_variate=True)),
     ],

@@ -50,6 +50,22 @@ impl Decomposition {
         Ok(Self { lattice: *lattice, spans })
     }
 
+    /// What is divided.
+    pub fn lattice(&self) -> &Lattice<2> {
+        &self.lattice
+    }
+
+    /// True where there are cuts across an axis.
+    pub fn is_divided(&self, d: usize) -> bool {
+        self.spans[d].len() > 1
+    }
+
+    /// Cells of the narrowest subdomain across any cuts; as many as can be counted where there are none.
+    pub fn narrowest(&self) -> usize {
+        let divided = self.spans.iter().filter(|spans| spans.len() > 1).flatten();
+        divided.map(|[low, high]| high - low).min().unwrap_or(usize::MAX)
+    }
+
     /// True where a whole periodic axis is one subdomain.
     fn wraps(&self, d: usize) -> bool {
         self.lattice.periodic()[d] && self.spans[d].len() == 1

@@ -190,6 +190,11 @@ pub struct MeshOperator<const D: usize> {
 }
 
 impl<const D: usize> MeshOperator<D> {
+    /// The lattice it stands on.
+    pub fn lattice(&self) -> &Lattice<D> {
+        &self.lattice
+    }
+
     /// For each node and axis the weights toward the neighbour below and above.
     pub fn weights(&self) -> &[[[f64; 2]; D]] {
         &self.weights
@@ -237,13 +242,18 @@ impl<const D: usize> MeshOperator<D> {
         Some((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
     }
 
+    /// The first node off the sides that has a weight below zero: |b|h > 2, or no number.
+    pub(super) fn negative_weight(&self) -> Option<usize> {
+        let negative = |k: &usize| !self.weights[*k].as_flattened().iter().all(|&w| w >= 0.0);
+        Patch::whole(&self.lattice).nodes(&self.lattice).find(negative)
+    }
+
     /// Refuses an operator whose weights cannot be probabilities: |b|h > 2 at a node that is not on a side.
     ///
     /// # Errors
     /// [`Failure::SteepDensity`] at the first such node.
     pub fn check_weights(&self, mesh: &Mesh<D>) -> Result<(), Failure> {
-        let negative = |k: &usize| !self.weights[*k].as_flattened().iter().all(|&w| w >= 0.0);
-        match Patch::whole(&self.lattice).nodes(&self.lattice).find(negative) {
+        match self.negative_weight() {
             None => Ok(()),
             Some(k) => {
                 let skews = self.weights[k].map(|[below, above]| 2.0 * ((above - below) / (above + below)).abs());

@@ -3,6 +3,7 @@
 mod decomposition;
 mod fixed;
 mod mmpde;
+mod overlap;
 mod relaxation;
 mod schwarz;
 mod sides;
@@ -13,11 +14,11 @@ pub use decomposition::{Cut, Decomposition};
 pub use fixed::Fixed;
 pub use mmpde::{Form, MeshOperator, Mmpde};
 pub use relaxation::{Relaxation, STEPS_TO_BEGIN_WITH, Steps};
-pub use schwarz::Schwarz;
+pub use schwarz::{Schwarz, Transmission};
 pub use sides::move_sides;
 pub use stochastic::{
-    Estimate, Estimator, EstimatorKind, GridWalk, Interpolation, MonteCarlo, Placement, Problem, ResidualWalk,
-    Stochastic,
+    Estimate, Estimates, Estimator, EstimatorKind, GridWalk, Interpolation, MonteCarlo, Placement, Problem,
+    ResidualWalk, Stochastic, Strip, Strips,
 };
 pub use whole::Whole;
 
@@ -68,7 +69,8 @@ pub struct Moved {
 }
 
 /// What one step knows about the values at which subdomains meet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Interface {
     /// Nodes at which subdomains meet.
     pub points: usize,
@@ -77,8 +79,18 @@ pub struct Interface {
     pub standard_error: Option<f64>,
     /// That over the shortest edge of the mesh.
     pub noise: Option<f64>,
-    /// Relaxation sweeps before the walks.
+    /// Relaxation sweeps in strips before the walks.
     pub sweeps: usize,
+    /// Walks or paths from each point; 0 of deterministic methods, and where strips alone are better than walks.
+    pub walks: usize,
+    /// Exchanges between neighbours.
+    pub exchanges: usize,
+    /// Nodes that the subdomain with the most to read reads from its neighbours in one exchange.
+    pub read: usize,
+    /// Unknowns of a coarse lattice, whose right-hand sides are gathered in an exchange.
+    pub gathered: usize,
+    /// Walks that ended where another subdomain pays.
+    pub handed_on: usize,
     /// How fast an iteration between the subdomains converged.
     pub contraction: Option<Contraction>,
     /// Seconds spent on interface values.
@@ -91,8 +103,8 @@ pub struct Interface {
 pub struct Contraction {
     /// Iterations done.
     pub iterations: usize,
-    /// Bound on the factor by which an iteration shrinks the error, from the operator itself.
-    pub predicted: f64,
+    /// Bound on the factor by which an iteration shrinks the error, from the operator itself; none of optimised conditions.
+    pub predicted: Option<f64>,
     /// Geometric mean of the factors seen between the first and the last change.
     pub observed: f64,
 }
@@ -101,8 +113,8 @@ kinds! {
     /// `mesh.generator` of a study.
     GeneratorKind {
         "whole" = Whole: "one implicit solve of the mesh equation on the whole domain",
-        "stochastic" = Stochastic: "random walks give the interfaces between subdomains, then each is solved by itself",
-        "schwarz" = Schwarz: "overlapping subdomains, solved in parallel and iterated to a tolerance",
+        "stochastic" = Stochastic: "walks or strips give the interfaces between subdomains, then each is solved by itself",
+        "schwarz" = Schwarz: "overlapping subdomains, solved in parallel and iterated to a tolerance or so many times",
         "fixed" = Fixed: "the mesh does not move",
     }
 }

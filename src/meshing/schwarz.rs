@@ -1,3 +1,4 @@
+use super::overlap::{Local, Part, place, residual};
 use super::sides::{jump, size};
 use super::{Contraction, Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
 use crate::error::{Error, Failure, Result};
@@ -5,7 +6,7 @@ use crate::geometry::{Lattice, Mesh, Patch};
 use crate::numerics::larger;
 use crate::numerics::linear::Robust;
 use crate::parallel;
-use crate::setting::pair;
+use crate::setting::{Auto, pair};
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,22 +24,35 @@ use std::time::Instant;
 ///
 /// inside, and the largest w at a node on another subdomain's ring bounds the contraction of an iteration.
 ///
+/// With `method = "optimized"` neighbours exchange c_g − β c_i of the correction c at a node g of the ring and the one
+/// before it, β = 1/(1 + p h), which is a condition of Robin's kind, ∂_n c + p c. β = e^−θ would be exact for one wave:
+///
+/// ```text
+/// ρ(φ) = (β − z)/(1 − β z) z^(overlap − 1),   z = e^−θ,   cosh θ = 1 + (1 + 2 a_t (1 − cos φ)) / (2 a_n)
+/// ```
+///
+/// is what a wave cos φj along a single cut leaves of itself, a = Δt/(τh²) across (n) and along (t) it, for a density that
+/// does not vary; p = "auto" makes the largest of them smallest. Where subdomains have corners it is no bound, and none
+/// is told.
+///
 /// # Source
 /// Gander, *Schwarz methods over the course of time* (2008); Gander and Haynes (2012) for mesh equations.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(from = "Written")]
 pub struct Schwarz {
     /// Along each axis.
-    #[serde(deserialize_with = "pair")]
     pub subdomains: [usize; 2],
     /// Cells that neighbouring subdomains share.
-    #[serde(default = "overlap")]
     pub overlap: usize,
-    /// The iteration stops where its last change is at most this share of the largest coordinate.
-    #[serde(default = "tolerance")]
-    pub tolerance: f64,
-    /// Most iterations a step.
-    #[serde(default = "iterations")]
+    /// What neighbours exchange.
+    pub method: Transmission,
+    /// p of the optimised conditions, in units of one over the length of the square of ξ.
+    pub robin: Auto<f64>,
+    /// The iteration stops where its last change is at most this share of the largest coordinate; without it after as
+    /// many iterations as are given, which is no failure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
+    /// Iterations a step; at most so many where there is a tolerance.
     pub iterations: usize,
     #[serde(skip)]
     line: Robust<1>,
@@ -46,48 +60,102 @@ pub struct Schwarz {
     parts: Parts,
 }
 
-fn overlap() -> usize {
-    2
+/// Conditions between subdomains.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Transmission {
+    /// The values of the neighbour.
+    #[default]
+    Classical,
+    /// Robin's conditions.
+    #[serde(alias = "optimised")]
+    Optimized,
 }
 
-fn tolerance() -> f64 {
-    1e-10
+/// A [`Schwarz`] as a study writes it.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    /// Along each axis.
+    #[serde(deserialize_with = "pair")]
+    subdomains: [usize; 2],
+    /// Cells that neighbouring subdomains share, 2 where nothing is said.
+    overlap: Option<usize>,
+    /// What neighbours exchange.
+    #[serde(default)]
+    method: Transmission,
+    /// p of the optimised conditions.
+    #[serde(default)]
+    robin: Auto<f64>,
+    /// Share of the largest coordinate, 1e-10 where nothing is said of it and of `iterations`.
+    tolerance: Option<f64>,
+    /// Alone: exactly so many a step. With a tolerance: at most so many, 1000 where nothing is said.
+    iterations: Option<usize>,
 }
 
-fn iterations() -> usize {
-    1000
+impl From<Written> for Schwarz {
+    fn from(written: Written) -> Self {
+        let Written { subdomains, overlap, method, robin, tolerance, iterations } = written;
+        let tolerance = if iterations.is_none() { tolerance.or(Some(TOLERANCE)) } else { tolerance };
+        Self {
+            method,
+            robin,
+            tolerance,
+            iterations: iterations.unwrap_or(ITERATIONS),
+            ..Self::new(subdomains, overlap.unwrap_or(OVERLAP))
+        }
+    }
 }
+
+const OVERLAP: usize = 2;
+const TOLERANCE: f64 = 1e-10;
+const ITERATIONS: usize = 1000;
 
 /// The subdomains of a lattice with the memory of their solvers.
 #[derive(Debug, Clone, Default)]
 struct Parts {
     lattice: Option<Lattice<2>>,
     parts: Vec<Part>,
+    /// For each part what Robin's conditions need of its ring.
+    traces: Vec<Vec<Trace>>,
+    /// The right-hand sides of a step without what the rings add by them.
+    right: Vec<Vec<[f64; 2]>>,
     /// Nodes on the ring of some subdomain, bounded sides left out.
     rings: Vec<usize>,
+    point: Vec<Robust<1>>,
 }
 
-#[derive(Debug, Clone)]
-struct Part {
-    patch: Patch<2>,
-    /// The nodes that it answers for: where they are in its padded vectors, and on which axes beyond the seam.
-    own: Vec<Own>,
-    plane: Robust<2>,
-    point: Robust<1>,
-}
-
+/// A node on the ring of a part and the unknown before it.
 #[derive(Debug, Clone, Copy)]
-struct Own {
-    node: usize,
-    place: usize,
-    beyond: [bool; 2],
+struct Trace {
+    /// Across which axis, and whether at its upper end.
+    axis: usize,
+    upper: bool,
+    /// The row of the unknown, and both places in padded vectors of the part.
+    row: usize,
+    ring: usize,
+    inner: usize,
+    /// The part that answers for the node on the ring, and both places there.
+    other: usize,
+    other_ring: usize,
+    other_inner: usize,
+    /// What the unknown draws from the ring.
+    weight: f64,
 }
 
 impl Schwarz {
     /// Overlapping subdomains with the default tolerance.
     pub fn new(subdomains: [usize; 2], overlap: usize) -> Self {
-        let (tolerance, iterations) = (tolerance(), iterations());
-        Self { subdomains, overlap, tolerance, iterations, line: Robust::default(), parts: Parts::default() }
+        Self {
+            subdomains,
+            overlap,
+            method: Transmission::Classical,
+            robin: Auto::Auto,
+            tolerance: Some(TOLERANCE),
+            iterations: ITERATIONS,
+            line: Robust::default(),
+            parts: Parts::default(),
+        }
     }
 
     /// Refuses settings out of range for a lattice.
@@ -103,15 +171,50 @@ impl Schwarz {
                 "without overlap the iteration does not converge; set it to 1 or more",
             ));
         }
-        if !(self.tolerance.is_finite() && self.tolerance >= 1e-12) {
-            return Err(Error::invalid("tolerance", self.tolerance, "must be a finite number, 1e-12 or more"));
+        if let Some(tolerance) = self.tolerance.filter(|t| !(t.is_finite() && *t >= 1e-12)) {
+            return Err(Error::invalid("tolerance", tolerance, "must be a finite number, 1e-12 or more"));
         }
         if self.iterations == 0 {
             return Err(Error::invalid("iterations", 0, "must be 1 or more"));
         }
-        Ok(())
+        match self.robin {
+            Auto::Value(p) if self.method == Transmission::Classical => Err(Error::invalid(
+                "robin",
+                p,
+                "classical conditions have none; set method to \"optimized\", or leave it out",
+            )),
+            Auto::Value(p) if !(p.is_finite() && p > 0.0) => {
+                Err(Error::invalid("robin", p, "p must be a finite number above 0, or \"auto\""))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// β across each axis.
+    fn reflection(&self, equation: &Mmpde, lattice: &Lattice<2>, dt: f64) -> [f64; 2] {
+        let a = equation.stiffness(lattice, dt);
+        [0, 1].map(|d| {
+            if let Auto::Value(p) = self.robin {
+                return 1.0 / (1.0 + p * lattice.spacing()[d]);
+            }
+            let waves = (1..=WAVES).map(|m| std::f64::consts::PI * m as f64 / WAVES as f64);
+            let slow = std::f64::consts::PI / lattice.cells()[1 - d] as f64;
+            let z: Vec<f64> = (std::iter::once(slow).chain(waves))
+                .map(|phi| (-(1.0 + (1.0 + 2.0 * a[1 - d] * (1.0 - phi.cos())) / (2.0 * a[d])).acosh()).exp())
+                .collect();
+            let largest = |beta: f64| {
+                let left = z.iter().map(|z| ((beta - z) / (1.0 - beta * z)).abs() * z.powi(self.overlap as i32 - 1));
+                left.fold(0.0, f64::max)
+            };
+            let all = (0..TRIALS).map(|m| m as f64 / TRIALS as f64);
+            all.min_by(|a, b| largest(*a).total_cmp(&largest(*b))).unwrap_or(0.0)
+        })
     }
 }
+
+/// Waves along a cut, and values of β, that are tried.
+const WAVES: usize = 64;
+const TRIALS: usize = 200;
 
 impl Parts {
     fn prepare(&mut self, lattice: &Lattice<2>, subdomains: [usize; 2], overlap: usize) -> Result<(), Failure> {
@@ -123,12 +226,20 @@ impl Parts {
         let extended = decomposition.extended([overlap / 2, overlap - overlap / 2]);
         let mut on_ring = vec![false; lattice.len()];
         for (patch, _) in &extended {
-            ring(patch, lattice).for_each(|k| on_ring[k] = true);
+            ring(patch, lattice).for_each(|(k, ..)| on_ring[k] = true);
+        }
+        let parts: Vec<Part> = extended.into_iter().map(|(patch, own)| Part::new(lattice, patch, own)).collect();
+        let mut owner = vec![usize::MAX; lattice.len()];
+        for (number, part) in parts.iter().enumerate() {
+            part.own.iter().for_each(|&(node, _)| owner[node] = number);
         }
         *self = Self {
             lattice: Some(*lattice),
-            parts: extended.into_iter().map(|(patch, own)| Part::new(lattice, patch, &own)).collect(),
+            traces: parts.iter().map(|part| traces(part, &parts, &owner, lattice)).collect(),
             rings: (0..lattice.len()).filter(|&k| on_ring[k] && !decomposition.on_side(k)).collect(),
+            point: vec![Robust::default(); parts.len()],
+            right: Vec::new(),
+            parts,
         };
         Ok(())
     }
@@ -139,41 +250,115 @@ impl Parts {
         let mut side = vec![[1.0]; lattice.len()];
         lattice.sides().for_each(|k| side[k] = [0.0]);
         let zero = vec![[0.0]; lattice.len()];
-        let solved = parallel::map_mut(&mut self.parts, |part| {
-            operator.solve::<5, 1>(part.patch, &zero, &side, [[0.0]; 2], &mut part.point, [1.0])
+        let mut all: Vec<(&Part, &mut Robust<1>)> = self.parts.iter().zip(&mut self.point).collect();
+        let solved = parallel::map_mut(&mut all, |(part, solver)| {
+            operator.solve::<5, 1>(part.patch, &zero, &side, [[0.0]; 2], *solver, [1.0])
         });
         let mut bound = zero.clone();
         let mut work = Work::default();
         for (part, solved) in self.parts.iter().zip(solved) {
             let (w, cost) = solved?;
             work += cost;
-            part.own.iter().for_each(|own| bound[own.node] = w[own.place]);
+            part.own.iter().for_each(|&(node, place)| bound[node] = w[place]);
         }
         Ok((self.rings.iter().map(|&k| bound[k][0]).fold(0.0, larger), work))
     }
-}
 
-impl Part {
-    fn new(lattice: &Lattice<2>, patch: Patch<2>, own: &[usize]) -> Self {
-        let mut owned = vec![false; lattice.len()];
-        own.iter().for_each(|&k| owned[k] = true);
-        let own = (patch.entries(lattice).zip(patch.places()))
-            .filter(|((node, _), _)| owned[*node])
-            .map(|((node, beyond), place)| Own { node, place, beyond })
+    /// The systems of a step. Robin's conditions take an unknown beside the ring to the left, c_g = β c_i + given.
+    fn set(&mut self, operator: &MeshOperator<2>, residual: &[[f64; 2]], beta: [f64; 2]) {
+        for (part, traces) in self.parts.iter_mut().zip(&mut self.traces) {
+            part.prepare(operator, residual);
+            part.correction.clear();
+            for trace in traces.iter_mut().filter(|_| beta != [0.0; 2]) {
+                let (row, ring) = (&mut part.matrix.rows[trace.row], 1 + 2 * trace.axis + usize::from(trace.upper));
+                trace.weight = -std::mem::take(&mut row[ring]);
+                row[0] -= beta[trace.axis] * trace.weight;
+            }
+        }
+        self.right = self.parts.iter().map(|part| part.right.clone()).collect();
+    }
+
+    /// One iteration from corrections `c` at all nodes; returns its largest change. `beta` is that of Robin's
+    /// conditions, 0 for classical ones.
+    fn iterate(&mut self, c: &mut [[f64; 2]], beta: [f64; 2], size: [f64; 2]) -> Result<(f64, Work), Failure> {
+        let lattice = self.lattice.as_ref().expect("parts are prepared first");
+        let robin = beta != [0.0; 2];
+        let before: Vec<Vec<[f64; 2]>> =
+            if robin { self.parts.iter().map(|part| part.correction.clone()).collect() } else { Vec::new() };
+        let (newest, own) = (&*c, &self.right);
+        let mut all: Vec<(usize, &mut Part, &[Trace])> = (self.parts.iter_mut().zip(&self.traces).enumerate())
+            .map(|(number, (part, traces))| (number, part, traces.as_slice()))
             .collect();
-        Self { patch, own, plane: Robust::default(), point: Robust::default() }
+        let solved = parallel::map_mut(&mut all, |(number, part, traces)| {
+            part.start(lattice, newest);
+            if !robin {
+                return part.correct(Local::Solve { share: 0.0 }, size);
+            }
+            part.right.copy_from_slice(&own[*number]);
+            for trace in *traces {
+                // a part that has not been solved yet has corrected nothing
+                let at = |place: usize| before[trace.other].get(place).copied().unwrap_or([0.0; 2]);
+                let (ring, inner) = (at(trace.other_ring), at(trace.other_inner));
+                let given = [0, 1].map(|c| ring[c] - beta[trace.axis] * inner[c]);
+                (0..2).for_each(|c| part.right[trace.row][c] += trace.weight * given[c]);
+                part.correction[trace.ring] = given;
+            }
+            let work = part.correct(Local::Solve { share: 0.0 }, size)?;
+            for trace in *traces {
+                let inner = part.correction[trace.inner];
+                (0..2).for_each(|c| part.correction[trace.ring][c] += beta[trace.axis] * inner[c]);
+            }
+            Ok(work)
+        });
+        let (mut change, mut work) = (0.0, Work::default());
+        for (part, solved) in self.parts.iter().zip(solved) {
+            work += solved?;
+            for &(node, place) in &part.own {
+                let new = part.correction[place];
+                change = (0..2).map(|k| new[k] - c[node][k]).fold(change, larger);
+                c[node] = new;
+            }
+        }
+        Ok((change, work))
     }
 }
 
-/// Nodes of the ring around a patch, without its corners; on a wrapping axis there is none.
-fn ring<'a>(patch: &'a Patch<2>, lattice: &'a Lattice<2>) -> impl Iterator<Item = usize> + 'a {
+/// What Robin's conditions need of the ring of a part.
+fn traces(part: &Part, parts: &[Part], owner: &[usize], lattice: &Lattice<2>) -> Vec<Trace> {
+    let strides = part.patch.padded_strides();
+    let mut all = Vec::new();
+    for (node, axis, upper, along) in ring(&part.patch, lattice) {
+        let Some(&other) = owner.get(node).filter(|&&other| other < parts.len()) else { continue };
+        let last = part.patch.size[axis];
+        let (mut at, step) = ([0; 2], if upper { -1 } else { 1 });
+        at[axis] = if upper { last + 1 } else { 0 };
+        at[1 - axis] = along + 1;
+        let ring = at[0] * strides[0] + at[1] * strides[1];
+        let inner = ring.wrapping_add_signed(step * strides[axis] as isize);
+        let mut unknown = at.map(|i| i.wrapping_sub(1));
+        unknown[axis] = if upper { last - 1 } else { 0 };
+        let Some(other_ring) = place(&parts[other].patch, lattice, node, 0) else { continue };
+        let other_strides = parts[other].patch.padded_strides();
+        let other_inner = other_ring.wrapping_add_signed(step * other_strides[axis] as isize);
+        let row = unknown[0] * part.patch.size[1] + unknown[1];
+        all.push(Trace { axis, upper, row, ring, inner, other, other_ring, other_inner, weight: 0.0 });
+    }
+    all
+}
+
+/// Nodes of the ring around a patch, without its corners, each with the axis across which it lies, whether at the upper
+/// end, and its place along the other axis; on a wrapping axis there is none.
+fn ring<'a>(patch: &'a Patch<2>, lattice: &'a Lattice<2>) -> impl Iterator<Item = (usize, usize, bool, usize)> + 'a {
     let nodes = lattice.nodes();
     let strides = lattice.strides();
     (0..2).filter(|&d| !patch.wraps[d]).flat_map(move |d| {
-        let ends = [patch.origin[d] + nodes[d] - 1, patch.origin[d] + patch.size[d]];
-        ends.into_iter().flat_map(move |end| {
-            (0..patch.size[1 - d])
-                .map(move |k| end % nodes[d] * strides[d] + (patch.origin[1 - d] + k) % nodes[1 - d] * strides[1 - d])
+        let ends = [(patch.origin[d] + nodes[d] - 1, false), (patch.origin[d] + patch.size[d], true)];
+        ends.into_iter().flat_map(move |(end, upper)| {
+            (0..patch.size[1 - d]).map(move |k| {
+                let across = end % nodes[d] * strides[d];
+                let along = (patch.origin[1 - d] + k) % nodes[1 - d] * strides[1 - d];
+                (across + along, d, upper, k)
+            })
         })
     })
 }
@@ -186,47 +371,57 @@ impl MeshGenerator for Schwarz {
         let mut x = mesh.x().to_vec();
         let mut work = move_sides(equation, mesh, rho, dt, &mut x, &mut self.line)?;
         let started = Instant::now();
-        let (predicted, cost) = self.parts.predict(&operator, mesh)?;
-        work += cost;
+        let (beta, predicted) = if self.method == Transmission::Optimized {
+            (self.reflection(equation, lattice, dt), None)
+        } else {
+            let (predicted, cost) = self.parts.predict(&operator, mesh)?;
+            work += cost;
+            ([0.0; 2], Some(predicted))
+        };
         let seconds = started.elapsed().as_secs_f64();
 
-        let (jump, size) = (jump(mesh), size(mesh));
-        let tolerance = self.tolerance * size[0].max(size[1]);
+        let residual = residual(&operator, mesh.x(), &x, jump(mesh));
+        self.parts.set(&operator, &residual, beta);
+        let size = size(mesh);
+        let tolerance = self.tolerance.map(|tolerance| tolerance * size[0].max(size[1]));
+        let mut c = vec![[0.0; 2]; lattice.len()];
         let mut changes: Vec<f64> = Vec::new();
         loop {
-            let solved = parallel::map_mut(&mut self.parts.parts, |part| {
-                operator.solve::<5, 2>(part.patch, mesh.x(), &x, jump, &mut part.plane, size)
-            });
-            let mut change = 0.0;
-            let mut next = x.clone();
-            for (part, solved) in self.parts.parts.iter().zip(solved) {
-                let (inside, cost) = solved?;
-                work += cost;
-                for &Own { node, place, beyond } in &part.own {
-                    let turn = [0, 1].map(|d| if beyond[d] { jump[d][d] } else { 0.0 });
-                    next[node] = [0, 1].map(|c| inside[place][c] - turn[c]);
-                    change = (0..2).map(|c| next[node][c] - x[node][c]).fold(change, larger);
-                }
-            }
-            x = next;
+            let (change, cost) = self.parts.iterate(&mut c, beta, size)?;
+            work += cost;
             changes.push(change);
             let iterations = changes.len();
-            if change <= tolerance || self.parts.rings.is_empty() {
+            if tolerance.is_some_and(|tolerance| change <= tolerance) || self.parts.rings.is_empty() {
                 break;
             }
             if iterations == self.iterations || !change.is_finite() {
-                return Err(Failure::SchwarzStalled { change, tolerance, iterations });
+                match tolerance {
+                    None if change.is_finite() => break,
+                    _ => {
+                        let tolerance = tolerance.unwrap_or(f64::INFINITY);
+                        return Err(Failure::SchwarzStalled { change, tolerance, iterations });
+                    }
+                }
             }
         }
-        // the first change is the step itself, the later ones are corrections of the rings
-        let observed = match changes.as_slice() {
-            [_, second, .., last] if *second > 0.0 => (last / second).powf(1.0 / (changes.len() - 2) as f64),
-            [_, ..] => 0.0,
-            [] => unreachable!("at least one iteration was done"),
+        x.iter_mut().zip(&c).for_each(|(x, c)| (0..2).for_each(|k| x[k] += c[k]));
+        let contraction = Some(Contraction { iterations: changes.len(), predicted, observed: observed(&changes) });
+        let interface = Interface {
+            points: self.parts.rings.len(),
+            exchanges: changes.len(),
+            read: self.parts.parts.iter().map(|part| part.read(lattice)).max().unwrap_or(0),
+            contraction,
+            seconds,
+            ..Interface::default()
         };
-        let contraction = Some(Contraction { iterations: changes.len(), predicted, observed });
-        let points = self.parts.rings.len();
-        let interface = Interface { points, standard_error: None, noise: None, sweeps: 0, contraction, seconds };
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: Some(interface) })
+    }
+}
+
+/// The mean factor between changes; the first of them is the step itself, the later ones are corrections of the rings.
+fn observed(changes: &[f64]) -> f64 {
+    match changes {
+        [_, second, .., last] if *second > 0.0 => (last / second).powf(1.0 / (changes.len() - 2) as f64),
+        _ => 0.0,
     }
 }

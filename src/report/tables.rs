@@ -28,7 +28,7 @@ const MANY: usize = 8;
 const SHOWN: usize = 250;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 51] = [
+const NAMES: [(&str, &str, &str); 56] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -56,6 +56,11 @@ const NAMES: [(&str, &str, &str); 51] = [
     ("interface.standard_error", "standard error of these points", "root mean square over both coordinates"),
     ("interface.noise", "… over the shortest edge", ""),
     ("interface.sweeps", "sweeps before the walks", ""),
+    ("interface.walks", "walks or paths from each point", ""),
+    ("interface.exchanges", "exchanges between neighbours", "in the last step"),
+    ("interface.read", "nodes read from neighbours", "by the subdomain with the most, in one exchange"),
+    ("interface.gathered", "coarse unknowns gathered", "in one exchange"),
+    ("interface.handed_on", "walks handed on", "to another subdomain, in the last step"),
     ("contraction.iterations", "Schwarz iterations", "in the last step"),
     ("contraction.predicted", "contraction, predicted", "bound on the factor by which an iteration shrinks the error"),
     ("contraction.observed", "contraction, observed", ""),
@@ -142,7 +147,7 @@ fn of_records(key: &str, records: &[Value]) -> Table {
         }
     }
     // what no record knows is no row
-    let said = |path: &str, value: &Value| !(value.is_null() || path == "interface.sweeps" && *value == 0);
+    let said = |path: &str, value: &Value| !(value.is_null() || path.starts_with("interface.") && *value == 0);
     paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && said(path, value)));
     let at = |record: &[(String, Value)], path: &String| {
         record.iter().find(|(other, _)| other == path).map_or("–".into(), |(_, value)| shown(value))

@@ -4,7 +4,7 @@ use crate::error::{Failure, Result};
 use crate::geometry::{Lattice, Mesh, compare};
 use crate::meshing::{
     Decomposition, Estimator, EstimatorKind, GridWalk, Interpolation, MeshGenerator, MeshOperator, Mmpde, MonteCarlo,
-    Moved, Placement, Problem, ResidualWalk, Stochastic, Whole, move_sides,
+    Moved, Placement, Problem, ResidualWalk, Stochastic, Strip, Strips, Whole, move_sides,
 };
 use crate::mover::Mover;
 use crate::numerics::linear::{Robust, Smoother};
@@ -29,7 +29,7 @@ pub struct InterfaceStep {
 }
 
 /// What an estimator did on a step.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Measured {
     /// Root mean square over both coordinates of all interface points.
     pub error: f64,
@@ -37,8 +37,16 @@ pub struct Measured {
     pub standard_error: f64,
     /// Steps of walks for each point.
     pub evaluations: f64,
-    /// Sweeps over the whole lattice.
+    /// Sweeps in strips.
     pub sweeps: usize,
+    /// Exchanges between neighbours.
+    pub exchanges: usize,
+    /// Nodes that the subdomain with the most to read reads in one.
+    pub read: usize,
+    /// Unknowns of the coarse lattice, whose right-hand sides are gathered in one.
+    pub gathered: usize,
+    /// Walks for each point that another subdomain pays.
+    pub handed_on: f64,
     /// Seconds for all points.
     pub seconds: f64,
 }
@@ -134,64 +142,43 @@ impl InterfaceStep {
     /// # Errors
     /// As [`Estimator::estimate`].
     pub fn measure(&self, estimator: &dyn Estimator, seeds: u64) -> Result<Measured, Failure> {
-        let mut sum = Measured { error: 0.0, standard_error: 0.0, evaluations: 0.0, sweeps: 0, seconds: 0.0 };
+        let mut sum = Measured::default();
+        let mut strips = Strips::new(&self.decomposition);
         for seed in 1..=seeds {
             let started = Instant::now();
-            let found = estimator.estimate(&self.problem(seed), &self.points)?;
+            let found = estimator.estimate(&self.problem(seed), &self.points, &mut strips)?;
             sum.seconds += started.elapsed().as_secs_f64();
             sum.error += self.error(|p| found.points[p].x).powi(2);
             let squares = found.points.iter().flat_map(|e| e.standard_error).map(|s| s * s).sum::<f64>();
             sum.standard_error += squares / (2 * self.points.len()) as f64;
             sum.evaluations += found.work.path_steps as f64 / self.points.len() as f64;
             sum.sweeps = found.sweeps;
+            (sum.exchanges, sum.read, sum.gathered) = match found.exchanges {
+                0 => (0, 0, 0),
+                exchanges => (exchanges, strips.read(), strips.gathered()),
+            };
+            sum.handed_on += found.handed_on as f64 / self.points.len() as f64;
         }
         let n = seeds as f64;
         Ok(Measured {
             error: (sum.error / n).sqrt(),
             standard_error: (sum.standard_error / n).sqrt(),
             evaluations: sum.evaluations / n,
+            handed_on: sum.handed_on / n,
             seconds: sum.seconds / n,
             ..sum
         })
-    }
-
-    /// Error of sweeps alone, without a walk.
-    ///
-    /// # Errors
-    /// As [`Estimator::estimate`].
-    pub fn sweeps_alone(&self, walk: &ResidualWalk) -> Result<f64, Failure> {
-        let walk = ResidualWalk { walks: 1, ..walk.clone() };
-        let guess = walk.estimate(&self.problem(1), &[])?.guess;
-        Ok(self.error(|p| guess[self.points[p]]))
-    }
-
-    /// Error, unknowns for each point and seconds of one overlapping Schwarz sweep from the old mesh: every subdomain
-    /// made larger by `width` cells on all sides.
-    ///
-    /// # Errors
-    /// As [`MeshOperator::solve`].
-    pub fn strip(&self, width: usize) -> Result<(f64, f64, f64), Failure> {
-        let started = Instant::now();
-        let lattice = self.mesh.lattice();
-        let mut x = self.new.clone();
-        let mut unknowns = 0;
-        for (patch, own) in self.decomposition.extended([width, width]) {
-            let solver = &mut Robust::<2>::default();
-            let zero = [[0.0; 2]; 2];
-            let (inside, _) = self.operator.solve::<5, 2>(patch, self.mesh.x(), &self.new, zero, solver, [1.0; 2])?;
-            let mut all = self.new.clone();
-            patch.scatter(lattice, &inside, &mut all, zero);
-            own.into_iter().for_each(|k| x[k] = all[k]);
-            unknowns += patch.len();
-        }
-        let seconds = started.elapsed().as_secs_f64();
-        Ok((self.error(|p| x[self.points[p]]), unknowns as f64 / self.points.len() as f64, seconds))
     }
 }
 
 /// What an independent implementation of this project measured: the range of ±10 % around it.
 const fn about(low: f64, high: f64) -> Option<[f64; 2]> {
     Some([0.9 * low, 1.1 * high])
+}
+
+/// What an estimator says of its own error, if anything.
+fn own(standard_error: f64) -> String {
+    if standard_error.is_nan() { String::new() } else { format!("{standard_error:.1e}") }
 }
 
 /// How an error compares with one that was measured before.
@@ -211,7 +198,7 @@ fn estimators(quick: bool) -> Vec<(&'static str, EstimatorKind, Option<[f64; 2]>
         EstimatorKind::ResidualWalk(ResidualWalk { sweeps: Auto::Value(sweeps), walks, smoother: Smoother::Jacobi })
     };
     let grid = |walks, increment| EstimatorKind::GridWalk(GridWalk { walks, increment });
-    let monte = EstimatorKind::MonteCarlo;
+    let (monte, strip) = (EstimatorKind::MonteCarlo, EstimatorKind::Strip);
     let mut all = vec![
         ("Monte Carlo N=10⁴ M=10, as published", monte(paths(10_000, 10)), about(4.2e-4, 4.5e-4)),
         ("Monte Carlo N=10³ M=10", monte(paths(1000, 10)), about(1.4e-3, 1.4e-3)),
@@ -231,6 +218,9 @@ fn estimators(quick: bool) -> Vec<(&'static str, EstimatorKind, Option<[f64; 2]>
         ("residual walk k=4 N=10, Jacobi", residual(4, 10), about(1.3e-5, 1.3e-5)),
         ("residual walk k=16 N=10, Jacobi", residual(16, 10), about(1.3e-6, 1.3e-6)),
         ("residual walk, the default", EstimatorKind::default(), None),
+        ("strip of 4 cells, no coarse lattice", strip(Strip::plain(4)), None),
+        ("strip of 8 cells, no coarse lattice", strip(Strip::plain(8)), about(2.7e-7, 2.7e-7)),
+        ("strip, its default", strip(Strip::default()), None),
     ];
     if quick {
         all.retain(|(name, _, _)| !name.starts_with("  common"));
@@ -254,6 +244,9 @@ pub(super) fn run(options: Options) -> Result<Vec<Table>> {
             "error",
             "its own estimate",
             "against before",
+            "nodes read",
+            "gathered",
+            "handed on a point",
             "µs a point",
             "times the default",
         ],
@@ -269,6 +262,9 @@ pub(super) fn run(options: Options) -> Result<Vec<Table>> {
         &verdict(step.do_nothing(), about(9.7e-5, 9.7e-5)),
         "0",
         "0",
+        "0",
+        "0",
+        "0",
     ]);
     let mut published = default;
     let mut cheap = default;
@@ -281,8 +277,11 @@ pub(super) fn run(options: Options) -> Result<Vec<Table>> {
             format!("{:.0}", found.evaluations),
             found.sweeps.to_string(),
             format!("{:.1e}", found.error),
-            format!("{:.1e}", found.standard_error),
+            own(found.standard_error),
             verdict(found.error, before),
+            found.read.to_string(),
+            found.gathered.to_string(),
+            format!("{:.2}", found.handed_on),
             format!("{:.2}", us(found.seconds)),
             format!("{:.2}", found.seconds / default.seconds),
         ]);
@@ -292,19 +291,9 @@ pub(super) fn run(options: Options) -> Result<Vec<Table>> {
             _ => {}
         }
     }
-    let (error, unknowns, seconds) = step.strip(8)?;
-    table.row([
-        "deterministic strip, 8 cells to each side".to_string(),
-        format!("{unknowns:.0} unknowns"),
-        "0".into(),
-        format!("{error:.1e}"),
-        String::new(),
-        verdict(error, about(2.7e-7, 2.7e-7)),
-        format!("{:.2}", us(seconds)),
-        format!("{:.2}", seconds / default.seconds),
-    ]);
     table.note("error: root mean square over both coordinates of all points, against the discrete step on one domain");
-    table.note("its own estimate: the standard error of the samples; it does not see the bias of Monte Carlo");
+    table.note("its own estimate: the standard error of the samples; it does not see the bias of Monte Carlo, and strips without walks have none");
+    table.note("nodes read: by the subdomain with the most, from its neighbours, in the one exchange of a step; gathered: unknowns of a coarse lattice; handed on: walks that another subdomain pays");
     table.note("against before: against an independent implementation of this project, the same where within 10 %");
     table.note(format!(
         "residual walk k=4 N=10 against Monte Carlo N=10⁴ M=10, {} threads: {:.0} times cheaper at 1/{:.0} of the error",
@@ -315,20 +304,21 @@ pub(super) fn run(options: Options) -> Result<Vec<Table>> {
     Ok(vec![table, over_stiffness(options)?, coupled(options)?])
 }
 
-/// The default over a = Δt/(τh²).
+/// The default and the strip over a = Δt/(τh²).
 fn over_stiffness(options: Options) -> Result<Table> {
     let mut table = Table::new(
-        "The default residual walk (N = 10) over a = Δt/(τh²), from the mesh and density of case A at t = .75",
+        "The default residual walk (N = 10) and the strip over a = Δt/(τh²), from the mesh and density of case A at t = .75",
         &[
             "cells",
             "a",
-            "sweeps",
             "jumps a walk",
             "do nothing",
             "error",
             "its own estimate",
+            "µs a point",
+            "strip: error",
             "of the shortest edge",
-            "sweeps alone",
+            "exchanges",
             "µs a point",
         ],
     );
@@ -339,23 +329,25 @@ fn over_stiffness(options: Options) -> Result<Table> {
             let dt = a / (cells * cells) as f64;
             let step = at.with_step(dt)?;
             let walk = ResidualWalk::default();
-            let found = step.measure(&walk, if options.quick { 2 } else { 10 })?;
+            let seeds = if options.quick { 2 } else { 10 };
+            let (found, strip) = (step.measure(&walk, seeds)?, step.measure(&Strip::default(), seeds)?);
             table.row([
                 format!("{cells}²"),
                 format!("{:.1}", step.stiffness()),
-                found.sweeps.to_string(),
                 format!("{:.0}", found.evaluations / walk.walks as f64),
                 format!("{:.1e}", step.do_nothing()),
                 format!("{:.1e}", found.error),
-                format!("{:.1e}", found.standard_error),
-                format!("{:.2} %", 100.0 * found.standard_error / step.shortest_edge()),
-                format!("{:.1e}", step.sweeps_alone(&walk)?),
+                own(found.standard_error),
                 format!("{:.2}", found.seconds * 1e6 / step.points() as f64),
+                format!("{:.1e}", strip.error),
+                format!("{:.4} %", 100.0 * strip.error / step.shortest_edge()),
+                strip.exchanges.to_string(),
+                format!("{:.2}", strip.seconds * 1e6 / step.points() as f64),
             ]);
         }
     }
     table.note("a run says so where the standard error is above 5 % of the shortest edge, and ends with noisy-interface where it is above 100 %");
-    table.note("sweeps alone: the error without any walk. From a = 16 on it is the smaller one in a single step, and nearly all of the time goes into walks: there sweeps alone would do");
+    table.note("where walks would take more than 64 jumps the default does none and is the strip");
     Ok(table)
 }
 
@@ -372,7 +364,7 @@ impl MeshGenerator for SweepsAlone {
         let mut x = mesh.x().to_vec();
         move_sides(equation, mesh, rho, dt, &mut x, &mut Robust::default())?;
         let problem = Problem::new(equation, &operator, mesh, rho, dt, &x, 0, 0);
-        let guess = self.walk.estimate(&problem, &[])?.guess;
+        let guess = self.walk.estimate(&problem, &[], &mut Strips::new(&self.decomposition))?.guess;
         x.copy_from_slice(&guess);
         let zero = [[0.0; 2]; 2];
         for patch in self.decomposition.patches() {
@@ -409,6 +401,8 @@ fn coupled(options: Options) -> Result<Table> {
     let walking = |walk: ResidualWalk| -> Box<dyn MeshGenerator> {
         Box::new(Stochastic::new([4, 4], 1, EstimatorKind::ResidualWalk(walk)))
     };
+    let strip =
+        |strip: Strip| -> Box<dyn MeshGenerator> { Box::new(Stochastic::new([4, 4], 1, EstimatorKind::Strip(strip))) };
     let sampled = |placement| -> Box<dyn MeshGenerator> {
         let mut generator = Stochastic::new([4, 4], 1, EstimatorKind::default());
         generator.interface = Some(Interpolation { sample: 9, placement });
@@ -421,7 +415,8 @@ fn coupled(options: Options) -> Result<Table> {
         ("k=4 by Jacobi, no walk", alone(jacobi(1))?),
         ("k=4 by Jacobi, N=1", walking(jacobi(1))),
         ("k=4 by Jacobi, N=10", walking(jacobi(10))),
-        ("the default's sweeps, no walk", alone(ResidualWalk::default())?),
+        ("strip of 8 cells, no coarse lattice", strip(Strip::plain(8))),
+        ("strip, its default", strip(Strip::default())),
         ("the default", walking(ResidualWalk::default())),
         ("the default on 9 nodes of each interface, by density", sampled(Placement::Density)),
         ("the default on 9 nodes of each interface, evenly", sampled(Placement::Uniform)),
@@ -436,6 +431,6 @@ fn coupled(options: Options) -> Result<Table> {
         };
         table.row([label.to_string()].into_iter().chain(cells));
     }
-    table.note("without walks the sweeps' errors have a sign and add up from step to step; walks make each step's error independent of the last");
+    table.note("few sweeps without walks leave errors that have a sign and add up from step to step; walks make each step's error independent of the last");
     Ok(table)
 }

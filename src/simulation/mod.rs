@@ -344,7 +344,7 @@ impl Simulation {
 
     /// Says once in a run that interface values are noisy, or that nobody knows.
     fn warn_of_noise(&self, state: &State, record: &mut Record) {
-        let Some(interface) = record.interface.filter(|i| i.points > 0 && i.contraction.is_none()) else { return };
+        let Some(interface) = record.interface.filter(|i| i.walks > 0) else { return };
         let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * NOISE_WORTH_A_WARNING);
         let warning = match percent {
             None => format!(

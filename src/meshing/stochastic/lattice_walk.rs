@@ -1,11 +1,7 @@
-use super::super::mmpde::exactness;
-use super::super::sides::{jump, size};
-use super::{Estimate, Estimates, Estimator, Problem};
+use super::super::sides::jump;
+use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::Patch;
-use crate::numerics::linear::{LatticeMatrix, Smoother, relax};
 use crate::parallel;
-use crate::setting::Auto;
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,51 +27,11 @@ pub struct GridWalk {
     pub increment: bool,
 }
 
-/// Random walks for what relaxation leaves
-///
-/// ```text
-/// P = k sweeps on M x = xⁿ from xⁿ, with the new sides,   r = xⁿ − M P,   x_i = P_i + E[r where the walk stops]
-/// ```
-///
-/// The walks are those of [`GridWalk`]. P is a control variate whose target is known exactly: the estimate stays
-/// unbiased for any P, and its variance falls with the square of the residual.
-///
-/// `sweeps = "auto"` takes k = ⌈8√a⌉, a = Δt/(τh²) averaged over the axes and bounded by what the sides leave of the
-/// slowest mode; as many as Chebyshev's sweeps need to shrink any error some hundred times. Where a is large, k more
-/// follow until no residual, the most that a walk can pay, is above 1 % of the shortest edge of the mesh. Where walks
-/// would take more than 1000 jumps, sweeps are cheaper: they follow to 10⁻⁶ of the edge and no walk is done; this bound
-/// on the error is then given as its standard error.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ResidualWalk {
-    /// k.
-    pub sweeps: Auto<usize>,
-    /// N, for each point.
-    pub walks: usize,
-    /// Weights of the sweeps.
-    pub smoother: Smoother,
-}
-
-impl Default for ResidualWalk {
-    fn default() -> Self {
-        Self { sweeps: Auto::Auto, walks: 10, smoother: Smoother::Chebyshev }
-    }
-}
-
 /// More than this of anything takes longer than anyone waits.
 const MAX_WALKS: usize = 1 << 31;
-const MAX_SWEEPS: usize = 1_000_000;
 /// Jumps in one step beyond which walks are refused: hours.
 const MAX_JUMPS: f64 = 1e11;
-/// Jumps of a walk beyond which more sweeps are certainly cheaper.
-const WORTH_WALKING: f64 = 1e3;
-/// Largest residual, as a share of the shortest edge, that automatic sweeps leave to walks, and where there are none.
-const LEFT_TO_WALKS: f64 = 1e-2;
-const LEFT_ALONE: f64 = 1e-6;
-/// Automatic sweeps, in units of ⌈8√a⌉, each of which gains two digits: some more than there are.
-const MAX_ROUNDS: usize = 12;
-
-fn check_walks(walks: usize) -> Result<()> {
+pub(super) fn check_walks(walks: usize) -> Result<()> {
     match walks {
         0 => Err(Error::invalid("walks", 0, "without walks there is no estimate; set it to 1 or more")),
         1..=MAX_WALKS => Ok(()),
@@ -93,26 +49,6 @@ impl GridWalk {
     }
 }
 
-impl ResidualWalk {
-    /// Refuses settings out of range.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`].
-    pub fn check(&self) -> Result<()> {
-        match self.sweeps {
-            Auto::Value(sweeps) if sweeps > MAX_SWEEPS => {
-                Err(Error::invalid("sweeps", sweeps, format!("must be at most {MAX_SWEEPS}, or \"auto\"")))
-            }
-            _ => check_walks(self.walks),
-        }
-    }
-}
-
-/// ⌈8√a⌉ sweeps.
-fn sweeps_for(lowest: f64) -> usize {
-    (8.0 * (0.25 * (1.0 / lowest - 1.0)).sqrt()).ceil().clamp(4.0, MAX_SWEEPS as f64) as usize
-}
-
 /// Refuses walks that nobody lives to see stop.
 fn check_jumps(problem: &Problem<'_>, walks: usize, points: usize) -> Result<(), Failure> {
     let jumps = mean_jumps(problem);
@@ -124,7 +60,7 @@ fn check_jumps(problem: &Problem<'_>, walks: usize, points: usize) -> Result<(),
 }
 
 /// Lower end of the spectrum of the step, over its diagonal: the slowest mode has half a wave across a bounded axis.
-fn lowest(problem: &Problem<'_>) -> f64 {
+pub(super) fn lowest(problem: &Problem<'_>) -> f64 {
     let (lattice, a) = (problem.mesh.lattice(), problem.stiffness());
     let slowest: f64 = (0..2)
         .filter(|&d| !lattice.periodic()[d])
@@ -134,178 +70,150 @@ fn lowest(problem: &Problem<'_>) -> f64 {
 }
 
 /// Jumps of a walk, about.
-fn mean_jumps(problem: &Problem<'_>) -> f64 {
+pub(super) fn mean_jumps(problem: &Problem<'_>) -> f64 {
     1.0 / lowest(problem)
 }
 
 impl Estimator for GridWalk {
-    fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
-        if self.increment {
-            return on_residual(problem, points, self.walks, Smoother::Jacobi, Auto::Value(0));
-        }
-        check_jumps(problem, self.walks, points.len())?;
-        let table = Table::new(problem)?;
-        let (estimates, path_steps) =
-            table.walk(problem, points, self.walks, problem.new, jump(problem.mesh), |k| problem.mesh.x()[k]);
-        Ok(Estimates {
-            points: estimates,
-            guess: problem.new.to_vec(),
-            work: Work { path_steps, ..Work::default() },
-            sweeps: 0,
-        })
-    }
-}
-
-impl Estimator for ResidualWalk {
-    fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
-        on_residual(problem, points, self.walks, self.smoother, self.sweeps)
-    }
-}
-
-/// Sweeps, then walks that pay the residual.
-fn on_residual(
-    problem: &Problem<'_>,
-    points: &[usize],
-    walks: usize,
-    smoother: Smoother,
-    sweeps: Auto<usize>,
-) -> Result<Estimates, Failure> {
-    let (mesh, lattice) = (problem.mesh, problem.mesh.lattice());
-    let (jump, patch) = (jump(mesh), Patch::whole(lattice));
-    let table = Table::new(problem)?;
-    let matrix: LatticeMatrix<2, 5> = problem.operator.matrix(patch);
-    let right = problem.operator.right(patch, mesh.x(), jump);
-    let mut x = patch.gather(lattice, problem.new, jump);
-    let mut padded = vec![[0.0; 2]; x.len()];
-    let mut sizes = matrix.residual(&right, &x, &mut padded);
-    let exact = exactness(&matrix, size(mesh));
-    let lowest = lowest(problem);
-    let alone = sweeps == Auto::Auto && mean_jumps(problem) > WORTH_WALKING;
-    let share = |share: f64| exact.map(|exact| exact.max(share * mesh.shortest_edge()));
-    let (round, left) = match sweeps {
-        Auto::Value(sweeps) => (sweeps, [f64::INFINITY; 2]),
-        Auto::Auto => (sweeps_for(lowest), share(if alone { LEFT_ALONE } else { LEFT_TO_WALKS })),
-    };
-    let within = |sizes: [f64; 2], limits: [f64; 2]| sizes.iter().zip(limits).all(|(r, limit)| *r <= limit);
-    let mut sweeps = 0;
-    // a mesh that is at rest but for round-off stays, to the last bit
-    if !within(sizes, exact) {
-        for _ in 0..MAX_ROUNDS {
-            relax(&matrix, &right, &mut x, smoother, round, lowest);
-            sweeps += round;
-            let before = std::mem::replace(&mut sizes, matrix.residual(&right, &x, &mut padded));
-            // not `>=`: what is not finite has not shrunk either
-            let shrunk = sizes[0].max(sizes[1]) < 0.5 * before[0].max(before[1]);
-            if within(sizes, left) || !shrunk {
-                break;
+    fn estimate(&self, problem: &Problem<'_>, points: &[usize], _strips: &mut Strips) -> Result<Estimates, Failure> {
+        let (mesh, jump) = (problem.mesh, jump(problem.mesh));
+        let walks = Walks::new(problem, self.walks, points.len())?;
+        let paid = |p: usize, Stop { node, turns }: Stop| -> [f64; 2] {
+            if self.increment {
+                return motion(problem, node, jump);
             }
+            [0, 1].map(|c| problem.new[node][c] + f64::from(turns[c]) * jump[c][c] - mesh.x()[points[p]][c])
+        };
+        let (mut estimates, path_steps) = walks.mean(points, self.walks, paid);
+        for (estimate, &k) in estimates.iter_mut().zip(points) {
+            estimate.x = [0, 1].map(|c| mesh.x()[k][c] + estimate.x[c]);
         }
+        if self.increment {
+            forget_certainty(&mut estimates);
+        }
+        let work = Work { path_steps, ..Work::default() };
+        Ok(Estimates { work, ..Estimates::sampled(estimates, problem.new.to_vec(), self.walks) })
     }
-    let mut guess = problem.new.to_vec();
-    patch.scatter(lattice, &x, &mut guess, jump);
-    if within(sizes, if alone { share(LEFT_TO_WALKS) } else { exact }) {
-        // nothing is left to pay: rows that add up to one bound the error by the residual
-        let points = points.iter().map(|&k| Estimate { x: guess[k], standard_error: sizes }).collect();
-        return Ok(Estimates { points, guess, work: Work::default(), sweeps });
+}
+
+/// xⁿ − M x at a node for x = xⁿ between the new sides; zero on them.
+fn motion(problem: &Problem<'_>, node: usize, jump: [[f64; 2]; 2]) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for_each_neighbour(problem, node, |neighbour, turns, weight| {
+        for c in 0..2 {
+            sum[c] += weight * (problem.new[neighbour][c] + turns[c] * jump[c][c] - problem.new[node][c]);
+        }
+    });
+    sum
+}
+
+/// Calls `f(neighbour, turns around periodic axes on the way, weight)` for the neighbours of a node off the sides; for a
+/// node on one never.
+pub(super) fn for_each_neighbour(problem: &Problem<'_>, node: usize, mut f: impl FnMut(usize, [f64; 2], f64)) {
+    let lattice = problem.mesh.lattice();
+    if lattice.on_side(node) {
+        return;
     }
-    check_jumps(problem, walks, points.len())?;
-    let mut residual = vec![[0.0; 2]; lattice.len()];
-    if sizes.iter().all(|r| r.is_finite()) {
-        patch.scatter(lattice, &padded, &mut residual, [[0.0; 2]; 2]);
+    let (at, nodes, strides) = (lattice.node(node), lattice.nodes(), lattice.strides());
+    for d in 0..2 {
+        let (step, back) = (strides[d], strides[d] * (nodes[d] - 1));
+        let [below, above] = problem.operator.weights()[node][d];
+        let turn = |turn: f64| if d == 0 { [turn, 0.0] } else { [0.0, turn] };
+        let down = if at[d] == 0 { (node + back, turn(-1.0)) } else { (node - step, turn(0.0)) };
+        let up = if at[d] + 1 == nodes[d] { (node - back, turn(1.0)) } else { (node + step, turn(0.0)) };
+        f(down.0, down.1, below);
+        f(up.0, up.1, above);
     }
-    let (mut estimates, path_steps) = table.walk(problem, points, walks, &residual, [[0.0; 2]; 2], |_| [0.0; 2]);
-    for (estimate, &k) in estimates.iter_mut().zip(points) {
-        estimate.x = [0, 1].map(|c| guess[k][c] + estimate.x[c]);
-    }
+}
+
+/// Where no walk stopped at anything to pay, that says nothing of what others would have been paid.
+pub(super) fn forget_certainty(estimates: &mut [Estimate]) {
     if estimates.iter().all(|estimate| estimate.standard_error == [0.0; 2]) {
-        // no walk stopped where there is something to pay: that says nothing of what others would have paid
         estimates.iter_mut().for_each(|estimate| estimate.standard_error = [f64::NAN; 2]);
     }
-    Ok(Estimates { points: estimates, guess, work: Work { path_steps, ..Work::default() }, sweeps })
 }
 
-/// Where a walk goes from each node.
-struct Table {
-    rows: Vec<Row>,
+/// Walks on the lattice of a problem.
+pub(super) struct Walks<'a> {
+    problem: &'a Problem<'a>,
+    nodes: [usize; 2],
+    periodic: [bool; 2],
 }
 
-/// A random word below the first threshold goes to the first neighbour, below the second to the second …; beyond the
-/// last the walk stops. Probabilities are rounded to 2⁻³².
-#[derive(Clone, Copy)]
-struct Row {
-    thresholds: [u32; 4],
-    neighbours: [u32; 4],
+/// Where a walk stopped.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stop {
+    pub node: usize,
+    /// Turns around periodic axes on the way.
+    pub turns: [i32; 2],
 }
 
-impl Table {
-    fn new(problem: &Problem<'_>) -> Result<Self, Failure> {
-        let lattice = problem.mesh.lattice();
+impl<'a> Walks<'a> {
+    /// # Errors
+    /// [`Failure::SteepDensity`] where the weights are no probabilities, [`Failure::LongWalks`] where so many walks from
+    /// so many points would take too long.
+    pub fn new(problem: &'a Problem<'a>, walks: usize, points: usize) -> Result<Self, Failure> {
+        check_jumps(problem, walks, points)?;
         problem.operator.check_weights(problem.mesh)?;
-        let (nodes, strides, periodic) = (lattice.nodes(), lattice.strides(), lattice.periodic());
-        let places = (0..nodes[0]).flat_map(|i| (0..nodes[1]).map(move |j| [i, j]));
-        let row = |(k, (node, weights)): (usize, ([usize; 2], &[[f64; 2]; 2]))| {
-            let mut row = Row { thresholds: [0; 4], neighbours: [k as u32; 4] };
-            if (0..2).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d])) {
-                return row; // a side: the walk ends here
-            }
-            let scale = 4_294_967_296.0 / (1.0 + weights.as_flattened().iter().sum::<f64>());
-            let mut sum = 0.0;
-            for d in 0..2 {
-                // one step, or back along the whole axis
-                let (step, back) = (strides[d], strides[d] * (nodes[d] - 1));
-                let below = if node[d] == 0 { k + back } else { k - step };
-                let above = if node[d] + 1 == nodes[d] { k - back } else { k + step };
-                for (e, (to, weight)) in [below, above].into_iter().zip(weights[d]).enumerate() {
-                    sum += weight;
-                    row.neighbours[2 * d + e] = to as u32;
-                    // casts of floats saturate
-                    row.thresholds[2 * d + e] = (sum * scale + 0.5) as u32;
-                }
-            }
-            row
-        };
-        Ok(Self { rows: places.zip(problem.operator.weights()).enumerate().map(row).collect() })
+        let lattice = problem.mesh.lattice();
+        Ok(Self { problem, nodes: lattice.nodes(), periodic: lattice.periodic() })
     }
 
-    /// For each point the mean of `pay` − `base` of the point over where walks from there stop, plus `base`; `jump` is
-    /// paid for turns around periodic axes. Also the number of jumps and stops.
-    fn walk(
+    /// For each point the mean over walks of what `pay(number of the point, stop)` says, and the number of jumps and
+    /// stops.
+    pub fn mean(
         &self,
-        problem: &Problem<'_>,
         points: &[usize],
         walks: usize,
-        pay: &[[f64; 2]],
-        jump: [[f64; 2]; 2],
-        base: impl Fn(usize) -> [f64; 2] + Sync + Send,
+        pay: impl Fn(usize, Stop) -> [f64; 2] + Sync + Send,
     ) -> (Vec<Estimate>, usize) {
-        let one = |&point: &usize| {
-            let base = base(point);
+        let numbers: Vec<usize> = (0..points.len()).collect();
+        let found = parallel::map(&numbers, |&p| {
             let mut samples = Samples::new();
             let mut steps = 0;
             for path in 0..walks {
-                let mut stream = problem.random.stream(problem.step, point as u32, path as u32);
-                let mut k = point as u32;
-                let mut turns = [0_i32; 2];
-                loop {
-                    steps += 1;
-                    let (row, word) = (&self.rows[k as usize], stream.word());
-                    let exit = row.thresholds.iter().map(|&t| usize::from(word >= t)).sum::<usize>();
-                    if exit == 4 {
-                        break;
-                    }
-                    let next = row.neighbours[exit];
-                    // stepping up to a lower index, or down to a higher one, is a turn
-                    turns[exit / 2] += i32::from(exit % 2 == 1 && next < k) - i32::from(exit % 2 == 0 && next > k);
-                    k = next;
-                }
-                let paid = pay[k as usize];
-                samples.add([0, 1].map(|c| paid[c] + f64::from(turns[c]) * jump[c][c] - base[c]));
+                let stop = self.walk(points[p], path, &mut steps);
+                samples.add(pay(p, stop));
             }
-            (samples.estimate(base), steps)
-        };
-        let found = parallel::map(points, one);
+            (samples.estimate([0.0; 2]), steps)
+        });
         let steps = found.iter().map(|(_, steps)| steps).sum();
         (found.into_iter().map(|(estimate, _)| estimate).collect(), steps)
+    }
+
+    /// One walk; a random word of 32 bits is a place on the sum of the weights and the one that stops.
+    fn walk(&self, start: usize, path: usize, steps: &mut usize) -> Stop {
+        const SCALE: f64 = 1.0 / 4_294_967_296.0;
+        let Self { problem, nodes, periodic } = self;
+        let mut stream = problem.random.stream(problem.step, start as u32, path as u32);
+        let mut at = [start / nodes[1], start % nodes[1]];
+        let mut turns = [0; 2];
+        loop {
+            *steps += 1;
+            let node = at[0] * nodes[1] + at[1];
+            let word = stream.word();
+            if (0..2).any(|d| !periodic[d] && (at[d] == 0 || at[d] + 1 == nodes[d])) {
+                return Stop { node, turns };
+            }
+            let [[below, above], [left, right]] = problem.operator.weights()[node];
+            let sums = [below, below + above, below + above + left, below + above + left + right];
+            let place = f64::from(word) * SCALE * (1.0 + sums[3]);
+            let exit = sums.iter().map(|&sum| usize::from(place >= sum)).sum::<usize>();
+            if exit == 4 {
+                return Stop { node, turns };
+            }
+            let (d, up) = (exit / 2, exit % 2 == 1);
+            if up {
+                at[d] += 1;
+                if at[d] == nodes[d] {
+                    (at[d], turns[d]) = (0, turns[d] + 1);
+                }
+            } else if at[d] == 0 {
+                (at[d], turns[d]) = (nodes[d] - 1, turns[d] - 1);
+            } else {
+                at[d] -= 1;
+            }
+        }
     }
 }
 

@@ -1,14 +1,23 @@
-//! Stochastic domain decomposition: random walks give the values between the subdomains, then each is solved alone.
+//! Stochastic domain decomposition: the values between the subdomains are estimated, then each is solved alone.
 
+mod coarse;
 mod interpolation;
 mod lattice_walk;
 mod monte_carlo;
 mod paths;
+mod residual_walk;
+mod strip;
+mod strips;
 mod surface;
 
 pub use interpolation::{Interpolation, Placement};
-pub use lattice_walk::{GridWalk, ResidualWalk};
+pub use lattice_walk::GridWalk;
 pub use monte_carlo::MonteCarlo;
+pub use residual_walk::ResidualWalk;
+pub use strip::Strip;
+pub use strips::Strips;
+
+use strips::Corrected;
 
 use super::sides::{jump, size};
 use super::{Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
@@ -27,8 +36,10 @@ use std::time::Instant;
 
 /// Stochastic domain decomposition
 ///
-/// The new mesh at every node between the S_ξ × S_η subdomains is estimated by random walks, each node by itself; with
-/// these values each subdomain is one solve of its own. Nothing is iterated, and subdomains exchange nothing else.
+/// The new mesh at every node between the S_ξ × S_η subdomains is estimated, each node by itself: by random walks, or
+/// by strips around the cuts. With these values each subdomain is one solve of its own. Estimators that look at strips
+/// read them from the neighbours in one exchange a step, more only in steps that are long for the mesh, and gather the
+/// right-hand sides of a coarse lattice where they have one; how much that is, is counted.
 ///
 /// # Source
 /// Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation* (2015).
@@ -63,6 +74,7 @@ struct Parts {
     decomposition: Decomposition,
     points: Vec<usize>,
     patches: Vec<(Patch<2>, Robust<2>)>,
+    strips: Strips,
 }
 
 /// One mesh step, as an estimator sees it.
@@ -109,9 +121,9 @@ impl<'a> Problem<'a> {
 /// The new position of one node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Mean over the samples.
+    /// Mean over the samples, if there are any.
     pub x: [f64; 2],
-    /// Its standard error; NaN where there was one sample only.
+    /// Its standard error; NaN where there was one sample only, or none.
     pub standard_error: [f64; 2],
 }
 
@@ -124,23 +136,47 @@ pub struct Estimates {
     pub guess: Vec<[f64; 2]>,
     /// What it cost.
     pub work: Work,
-    /// Relaxation sweeps over the whole lattice.
+    /// Relaxation sweeps in strips.
     pub sweeps: usize,
+    /// Samples from each point; none of a deterministic estimator, and where strips alone are better.
+    pub walks: usize,
+    /// Exchanges of strips between neighbours.
+    pub exchanges: usize,
+    /// Walks that ended beyond the nearer half of a strip, where another subdomain pays.
+    pub handed_on: usize,
+}
+
+impl Estimates {
+    /// Means over `walks` samples, with a guess for all nodes.
+    fn sampled(points: Vec<Estimate>, guess: Vec<[f64; 2]>, walks: usize) -> Self {
+        Self { points, guess, work: Work::default(), sweeps: 0, walks, exchanges: 0, handed_on: 0 }
+    }
+
+    /// What strips say by themselves.
+    fn of_strips(found: &Corrected, points: &[usize]) -> Self {
+        let moved = |k: usize| [0, 1].map(|c| found.base[k][c] + found.correction[k][c]);
+        let guess: Vec<[f64; 2]> = (0..found.base.len()).map(moved).collect();
+        let at = |&k: &usize| Estimate { x: guess[k], standard_error: [f64::NAN; 2] };
+        let points = points.iter().map(at).collect();
+        Self { work: found.work, exchanges: found.exchanges, ..Self::sampled(points, guess, 0) }
+    }
 }
 
 /// A way to compute the solution of a mesh step at single nodes.
 pub trait Estimator: Sync {
-    /// The new positions of `points`, each by itself.
+    /// The new positions of `points`, each by itself. `strips` are those around the cuts on which the points lie, with
+    /// what is kept of them from step to step.
     ///
     /// # Errors
     /// [`Failure::SteepDensity`] where the operator's weights are no probabilities.
-    fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure>;
+    fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure>;
 }
 
 kinds! {
     /// `mesh.generator.estimator` of a study.
     EstimatorKind {
-        "residual-walk" = ResidualWalk: "sweeps of relaxation, then random walks on the lattice for what they leave",
+        "residual-walk" = ResidualWalk: "strips around the interfaces, then random walks on the lattice for what they leave",
+        "strip" = Strip: "every subdomain solved once with a strip of its neighbours, after a coarse lattice; no walks",
         "grid-walk" = GridWalk: "random walks on the lattice, unbiased for the discrete equation",
         "monte-carlo" = MonteCarlo: "as published: Euler-Maruyama paths with a Brownian-bridge exit test",
     }
@@ -153,13 +189,14 @@ impl Default for EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// Refuses settings out of range.
+    /// Refuses settings out of range for a decomposition.
     ///
     /// # Errors
     /// [`Error::Invalid`].
-    pub fn check(&self) -> Result<()> {
+    pub fn check(&self, decomposition: &Decomposition) -> Result<()> {
         match self {
             Self::ResidualWalk(walk) => walk.check(),
+            Self::Strip(strip) => strip.check(decomposition),
             Self::GridWalk(walk) => walk.check(),
             Self::MonteCarlo(paths) => paths.check(),
         }
@@ -169,6 +206,7 @@ impl EstimatorKind {
     pub fn estimator(&self) -> &dyn Estimator {
         match self {
             Self::ResidualWalk(walk) => walk,
+            Self::Strip(strip) => strip,
             Self::GridWalk(walk) => walk,
             Self::MonteCarlo(paths) => paths,
         }
@@ -186,11 +224,11 @@ impl Stochastic {
     /// # Errors
     /// [`Error::Invalid`].
     pub fn check(&self, lattice: &Lattice<2>) -> Result<()> {
-        Decomposition::new(lattice, self.subdomains)?;
+        let decomposition = Decomposition::new(lattice, self.subdomains)?;
         if self.seed > i64::MAX as u64 {
             return Err(Error::invalid("seed", self.seed, "must be a whole number from 0 to 2^63 - 1"));
         }
-        self.estimator.check().map_err(|error| error.within("estimator"))?;
+        self.estimator.check(&decomposition).map_err(|error| error.within("estimator"))?;
         self.interface.as_ref().map_or(Ok(()), |interface| interface.check().map_err(|error| error.within("interface")))
     }
 }
@@ -200,7 +238,8 @@ impl Parts {
         let decomposition = Decomposition::new(lattice, subdomains)
             .map_err(|_| Failure::Subdomains { subdomains, cells: lattice.cells() })?;
         let patches = decomposition.patches().into_iter().map(|patch| (patch, Robust::default())).collect();
-        Ok(Self { lattice: *lattice, points: decomposition.points(), decomposition, patches })
+        let (points, strips) = (decomposition.points(), Strips::new(&decomposition));
+        Ok(Self { lattice: *lattice, points, decomposition, patches, strips })
     }
 }
 
@@ -219,20 +258,20 @@ impl MeshGenerator for Stochastic {
         let started = Instant::now();
         let problem = Problem::new(equation, &operator, mesh, rho, dt, &x, self.seed, self.steps);
         self.steps = self.steps.wrapping_add(1);
-        let estimator = self.estimator.estimator();
         let sample = self.interface.as_ref().map(|i| i.sample(&parts.decomposition, rho));
         let points = sample.as_ref().unwrap_or(&parts.points);
-        let Estimates { points: estimates, guess, work: cost, sweeps } = estimator.estimate(&problem, points)?;
-        work += cost;
-        let stiffness = problem.stiffness();
-        x.copy_from_slice(&guess);
-        points.iter().zip(&estimates).for_each(|(&k, estimate)| x[k] = estimate.x);
-        if sample.is_some() {
-            interpolation::fill(&parts.decomposition, mesh, points, &guess, &mut x);
+        let mut interface = None;
+        if !points.is_empty() {
+            let found = self.estimator.estimator().estimate(&problem, points, &mut parts.strips)?;
+            work += found.work;
+            interface = Some(summary(mesh, parts.points.len(), &found, &parts.strips, problem.stiffness())?);
+            x.copy_from_slice(&found.guess);
+            points.iter().zip(&found.points).for_each(|(&k, estimate)| x[k] = estimate.x);
+            if sample.is_some() {
+                interpolation::fill(&parts.decomposition, mesh, points, &found.guess, &mut x);
+            }
         }
-        let mut interface = summary(mesh, parts.points.len(), &estimates, stiffness)?;
-        interface.sweeps = sweeps;
-        interface.seconds = started.elapsed().as_secs_f64();
+        let seconds = started.elapsed().as_secs_f64();
 
         let (jump, size) = (jump(mesh), size(mesh));
         let solved = parallel::map_mut(&mut parts.patches, |(patch, solver)| {
@@ -243,6 +282,7 @@ impl MeshGenerator for Stochastic {
             work += cost;
             patch.scatter(lattice, &inside, &mut x, jump);
         }
+        let interface = Interface { seconds, ..interface.unwrap_or_default() };
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: Some(interface) })
     }
 
@@ -256,21 +296,35 @@ impl MeshGenerator for Stochastic {
     }
 }
 
-/// The noise of all estimates together; a failure where it is as large as an edge of the mesh.
-fn summary(mesh: &Mesh<2>, points: usize, estimates: &[Estimate], stiffness: [f64; 2]) -> Result<Interface, Failure> {
-    let squares = estimates.iter().flat_map(|e| e.standard_error).map(|s| s * s);
-    let rms = (squares.sum::<f64>() / (2 * estimates.len()).max(1) as f64).sqrt();
+/// What is known of the estimates together; a failure where their noise is as large as an edge of the mesh.
+fn summary(
+    mesh: &Mesh<2>,
+    points: usize,
+    found: &Estimates,
+    strips: &Strips,
+    stiffness: [f64; 2],
+) -> Result<Interface, Failure> {
+    let squares = found.points.iter().flat_map(|e| e.standard_error).map(|s| s * s);
+    let rms = (squares.sum::<f64>() / (2 * found.points.len()).max(1) as f64).sqrt();
     let edge = mesh.shortest_edge();
     if rms > edge {
         return Err(Failure::NoisyInterface { noise: rms, edge, stiffness: stiffness[0].max(stiffness[1]) });
     }
-    let known = rms.is_finite() && !estimates.is_empty();
+    let known = rms.is_finite();
+    let exchanged = found.exchanges > 0;
     Ok(Interface {
         points,
         standard_error: known.then_some(rms),
         noise: known.then_some(rms / edge),
-        sweeps: 0,
-        contraction: None,
-        seconds: 0.0,
+        sweeps: found.sweeps,
+        walks: found.walks,
+        exchanges: found.exchanges,
+        read: if exchanged { strips.read() } else { 0 },
+        gathered: if exchanged { strips.gathered() } else { 0 },
+        handed_on: found.handed_on,
+        ..Interface::default()
     })
 }
+
+#[cfg(test)]
+mod tests;

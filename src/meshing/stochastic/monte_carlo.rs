@@ -1,6 +1,6 @@
 use super::lattice_walk::Samples;
 use super::paths::{Domain, LANES, Lanes};
-use super::{Estimate, Estimates, Estimator, Problem};
+use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
 use crate::parallel;
 use crate::random::normals;
@@ -91,17 +91,14 @@ impl MonteCarlo {
 }
 
 impl Estimator for MonteCarlo {
-    fn estimate(&self, problem: &Problem<'_>, points: &[usize]) -> Result<Estimates, Failure> {
+    fn estimate(&self, problem: &Problem<'_>, points: &[usize], _strips: &mut Strips) -> Result<Estimates, Failure> {
         let domain = Domain::new(problem, self);
         let bridge = Bridge::new(self.substeps);
         let found = parallel::map(points, |&k| self.point(problem, &domain, &bridge, k));
         let path_steps = found.iter().map(|(_, steps)| steps).sum();
-        Ok(Estimates {
-            points: found.into_iter().map(|(estimate, _)| estimate).collect(),
-            guess: problem.new.to_vec(),
-            work: Work { path_steps, ..Work::default() },
-            sweeps: 0,
-        })
+        let estimates = found.into_iter().map(|(estimate, _)| estimate).collect();
+        let work = Work { path_steps, ..Work::default() };
+        Ok(Estimates { work, ..Estimates::sampled(estimates, problem.new.to_vec(), self.paths) })
     }
 }
 

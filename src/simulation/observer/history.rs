@@ -85,7 +85,7 @@ impl Observer for History {
             interface_standard_error: snapshot.interface.and_then(|i| i.standard_error),
             interface_noise: snapshot.interface.and_then(|i| i.noise),
             contraction_observed: contraction.map(|c| c.observed),
-            contraction_predicted: contraction.map(|c| c.predicted),
+            contraction_predicted: contraction.and_then(|c| c.predicted),
             rejected_steps: snapshot.work.rejected_steps,
             seconds: snapshot.seconds,
         };

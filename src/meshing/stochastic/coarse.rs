@@ -1,0 +1,236 @@
+use super::super::Form;
+use super::super::mmpde::exactness;
+use super::super::overlap::share_of_largest;
+use super::Problem;
+use crate::error::Failure;
+use crate::geometry::{Lattice, Patch};
+use crate::numerics::larger;
+use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
+use crate::parallel;
+use crate::work::Work;
+
+/// The part of a correction that coarser lattices can see
+///
+/// ```text
+/// M_H c_H = R r on the whole coarse lattice,   c ≈ P (c_H + q (c_H − P c_2H)),   q = (H² − h²) / ((2H)² − H²)
+/// ```
+///
+/// R weighs fine values by the hat function of a coarse node, P is the cubic through four coarse nodes along each axis.
+/// M_H is the mesh equation itself on the coarse lattice with the mean density. Its error grows like H², and a second
+/// lattice of twice the spacing says how much it is: Richardson's extrapolation to the spacing h of the fine lattice,
+/// for which the right-hand sides need to be gathered only once.
+#[derive(Debug, Clone)]
+pub(super) struct Coarse {
+    near: Level,
+    far: Level,
+    /// q.
+    gain: f64,
+}
+
+/// A coarse lattice, and the ways between it and the next finer one.
+#[derive(Debug, Clone)]
+struct Level {
+    lattice: Lattice<2>,
+    down: Transfer,
+    up: Transfer,
+    matrix: LatticeMatrix<2, 5>,
+    plane: Robust<2>,
+}
+
+/// Fewest cells of a coarse axis: the cubic has four nodes.
+pub(super) const FEWEST_CELLS: usize = 4;
+/// Residual at which coarse lattices and strips count as solved, as a share of the largest that they start with. With
+/// much more, what is left of it is round-off blown up: ten times the density would give another mesh.
+pub(super) const SOLVED: f64 = 1e-7;
+
+impl Coarse {
+    /// Lattices with one cell for `ratio` and for twice as many cells of the fine one along each axis; none where no
+    /// axis has that many.
+    pub fn new(fine: &Lattice<2>, ratio: usize) -> Option<Self> {
+        let near = Level::new(fine, ratio)?;
+        let far = Level::new(&near.lattice, 2)?;
+        let square = |lattice: &Lattice<2>| lattice.spacing().iter().map(|h| h * h).sum::<f64>();
+        let [h, near_h, far_h] = [fine, &near.lattice, &far.lattice].map(square);
+        let gain = (near_h - h) / (far_h - near_h);
+        Some(Self { near, far, gain })
+    }
+
+    /// Numbers that are gathered for the coarse right-hand side, one a coarse node for each coordinate.
+    pub fn len(&self) -> usize {
+        Patch::whole(&self.near.lattice).len()
+    }
+
+    /// Sets up the equation of a step.
+    pub fn prepare(&mut self, problem: &Problem<'_>) -> Result<(), Failure> {
+        let rho: Vec<[f64; 1]> = problem.rho.iter().map(|&rho| [rho]).collect();
+        let near = self.near.prepare(problem, &rho)?;
+        self.far.prepare(problem, &near).map(|_| ())
+    }
+
+    /// The correction at all fine nodes for a residual there, zero on bounded sides, and the largest of what the
+    /// extrapolation changed. `size` is the largest coordinate along each axis.
+    pub fn correction(&mut self, residual: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, f64, Work), Failure> {
+        let near = self.near.down.apply(residual);
+        let far = self.far.down.apply(&near);
+        let (mut c, mut work) = self.near.solve(&near, size)?;
+        let (rough, cost) = self.far.solve(&far, size)?;
+        work += cost;
+        let mut changed = 0.0;
+        for (c, rough) in c.iter_mut().zip(self.far.up.apply(&rough)) {
+            let change = [0, 1].map(|k| self.gain * (c[k] - rough[k]));
+            changed = change.into_iter().fold(changed, larger);
+            (0..2).for_each(|k| c[k] += change[k]);
+        }
+        Ok((self.near.up.apply(&c), changed, work))
+    }
+}
+
+impl Level {
+    fn new(fine: &Lattice<2>, ratio: usize) -> Option<Self> {
+        let cells = fine.cells().map(|n| n.div_ceil(ratio).max(FEWEST_CELLS.min(n)));
+        if cells == fine.cells() {
+            return None;
+        }
+        let lattice = Lattice::new(cells, fine.periodic()).ok()?;
+        let down = Transfer::new([0, 1].map(|d| hats(fine, &lattice, d)), fine.nodes()[1]);
+        let up = Transfer::new([0, 1].map(|d| cubics(fine, &lattice, d)), lattice.nodes()[1]);
+        let matrix = LatticeMatrix::zero(Patch::whole(&lattice));
+        Some(Self { lattice, down, up, matrix, plane: Robust::default() })
+    }
+
+    /// Takes the density of the next finer lattice and returns the one here.
+    fn prepare(&mut self, problem: &Problem<'_>, rho: &[[f64; 1]]) -> Result<Vec<[f64; 1]>, Failure> {
+        let rho = self.down.apply(rho);
+        let flat: Vec<f64> = rho.as_flattened().to_vec();
+        let mut equation = *problem.equation;
+        let mut operator = equation.operator(&self.lattice, &flat, problem.dt)?;
+        if operator.negative_weight().is_some() {
+            // too steep for the coarse cells in this form, never in the other one of the same equation
+            equation.form = Form::Conservative;
+            operator = equation.operator(&self.lattice, &flat, problem.dt)?;
+        }
+        self.matrix = operator.matrix(Patch::whole(&self.lattice));
+        Ok(rho)
+    }
+
+    fn solve(&mut self, right: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, Work), Failure> {
+        let (patch, none) = (self.matrix.patch, [[0.0; 2]; 2]);
+        let right: Vec<[f64; 2]> = patch.nodes(&self.lattice).map(|k| right[k]).collect();
+        let mut c = vec![[0.0; 2]; patch.padded_len()];
+        let tolerance = share_of_largest(&right, SOLVED, exactness(&self.matrix, size));
+        let linear_iterations = self.plane.solve(&self.matrix, &right, &mut c, tolerance)?;
+        let mut all = vec![[0.0; 2]; self.lattice.len()];
+        patch.scatter(&self.lattice, &c, &mut all, none);
+        Ok((all, Work { linear_solves: 2, linear_iterations, ..Work::default() }))
+    }
+}
+
+/// Where a value along an axis comes from: nodes and weights.
+type Sources = Vec<(usize, f64)>;
+
+/// A linear map between two lattices that acts along one axis after the other.
+#[derive(Debug, Clone)]
+struct Transfer {
+    /// For each node along each axis of the lattice it maps to.
+    rows: [Vec<Sources>; 2],
+    /// Nodes along the second axis of the lattice it maps from.
+    width: usize,
+}
+
+impl Transfer {
+    fn new(rows: [Vec<Sources>; 2], width: usize) -> Self {
+        Self { rows, width }
+    }
+
+    fn apply<const K: usize>(&self, v: &[[f64; K]]) -> Vec<[f64; K]> {
+        let [across, along] = &self.rows;
+        let mut half = vec![[0.0; K]; across.len() * self.width];
+        parallel::for_each_row(&mut half, self.width, |i, row| {
+            for &(from, weight) in &across[i] {
+                for (sum, v) in row.iter_mut().zip(&v[from * self.width..]) {
+                    (0..K).for_each(|c| sum[c] += weight * v[c]);
+                }
+            }
+        });
+        let mut out = vec![[0.0; K]; across.len() * along.len()];
+        parallel::for_each_row(&mut out, along.len(), |i, row| {
+            let half = &half[i * self.width..][..self.width];
+            for (sum, sources) in row.iter_mut().zip(along) {
+                for &(from, weight) in sources {
+                    (0..K).for_each(|c| sum[c] += weight * half[from][c]);
+                }
+            }
+        });
+        out
+    }
+}
+
+/// For each coarse node the mean over the fine nodes nearer than a coarse cell, weighted by its hat function.
+fn hats(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
+    let (cells, nodes, periodic) = (fine.cells()[d], fine.nodes()[d], fine.periodic()[d]);
+    let ratio = cells as f64 / coarse.cells()[d] as f64;
+    let reach = ratio.ceil() as isize;
+    let row = |at: f64| -> Sources {
+        let middle = at.round() as isize;
+        let near = (middle - reach..=middle + reach).filter(|f| periodic || (0..nodes as isize).contains(f));
+        let hats = near.map(|f| (f.rem_euclid(nodes as isize) as usize, 1.0 - (f as f64 - at).abs() / ratio));
+        let hats: Sources = hats.filter(|(_, weight)| *weight > 0.0).collect();
+        let total: f64 = hats.iter().map(|(_, weight)| weight).sum();
+        hats.into_iter().map(|(f, weight)| (f, weight / total)).collect()
+    };
+    (0..coarse.nodes()[d]).map(|i| row(i as f64 * ratio)).collect()
+}
+
+/// For each fine node the cubic through the four nearest coarse nodes, fewer where there are fewer.
+fn cubics(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
+    let (nodes, periodic) = (coarse.nodes()[d], coarse.periodic()[d]);
+    let ratio = fine.cells()[d] as f64 / coarse.cells()[d] as f64;
+    let count = nodes.min(4) as isize;
+    let row = |at: f64| -> Sources {
+        let below = at.floor() as isize - (count - 1) / 2;
+        let first = if periodic { below } else { below.clamp(0, nodes as isize - count) };
+        let points = first..first + count;
+        let weight = |p: isize| {
+            let others = points.clone().filter(|&q| q != p);
+            others.map(|q| (at - q as f64) / (p - q) as f64).product::<f64>()
+        };
+        points.clone().map(|p| (p.rem_euclid(nodes as isize) as usize, weight(p))).collect()
+    };
+    (0..fine.nodes()[d]).map(|f| row(f as f64 / ratio)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cubics along both axes come back from their values on a coarse lattice, on bounded axes and any ratio; constants
+    /// go down as they are; a periodic axis has no seam.
+    #[test]
+    fn transfers_are_exact_for_cubics() {
+        for (fine, coarse) in [([24, 17], [12, 9]), ([40, 12], [10, 4]), ([9, 30], [5, 7])] {
+            let [fine, coarse] = [fine, coarse].map(|cells| Lattice::bounded(cells).unwrap());
+            let values = |lattice: &Lattice<2>| -> Vec<[f64; 1]> {
+                let at = |k: usize| [0, 1].map(|d| lattice.node(k)[d] as f64 * lattice.spacing()[d]);
+                let f = |[s, r]: [f64; 2]| (1.0 + s - 2.0 * s.powi(3)) * (0.5 + r.powi(2) - r.powi(3));
+                (0..lattice.len()).map(|k| [f(at(k))]).collect()
+            };
+            let up = Transfer::new([0, 1].map(|d| cubics(&fine, &coarse, d)), coarse.nodes()[1]);
+            for (found, [exact]) in up.apply(&values(&coarse)).iter().zip(values(&fine)) {
+                assert!((found[0] - exact).abs() < 1e-13, "{found:?} {exact}");
+            }
+            let down = Transfer::new([0, 1].map(|d| hats(&fine, &coarse, d)), fine.nodes()[1]);
+            assert!(down.apply(&vec![[3.0]; fine.len()]).iter().all(|[v]| (v - 3.0).abs() < 1e-14));
+        }
+        let [fine, coarse] = [24, 12].map(|n| Lattice::new([n, n], [true; 2]).unwrap());
+        let wave = |lattice: &Lattice<2>, shift: usize| -> Vec<[f64; 1]> {
+            let at = |k: usize| (lattice.node(k)[0] + shift) as f64 * lattice.spacing()[0];
+            (0..lattice.len()).map(|k| [(std::f64::consts::TAU * at(k)).sin()]).collect()
+        };
+        let up = Transfer::new([0, 1].map(|d| cubics(&fine, &coarse, d)), coarse.nodes()[1]);
+        let (plain, shifted) = (up.apply(&wave(&coarse, 0)), up.apply(&wave(&coarse, 1)));
+        for k in 0..fine.len() {
+            let [i, j] = fine.node(k);
+            assert!((plain[fine.index([(i + 2) % 24, j])][0] - shifted[k][0]).abs() < 1e-14);
+        }
+    }
+}

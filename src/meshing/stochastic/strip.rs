@@ -1,0 +1,105 @@
+use super::coarse::FEWEST_CELLS;
+use super::coarse::SOLVED;
+use super::strips::{Reach, Strips};
+use super::{Estimates, Estimator, Problem};
+use crate::error::{Error, Failure, Result};
+use crate::meshing::Decomposition;
+use crate::meshing::overlap::Local;
+use crate::setting::Auto;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Every subdomain is solved with a strip of its neighbours, once: the deterministic opponent of the walks
+///
+/// An overlapping Schwarz iteration stopped after its first sweep, which starts from a coarse lattice where the influence
+/// e^(−d/ℓ), ℓ = √(Δt/τ), of what lies a strip away is not small: see [`Strips`]. One exchange with the neighbours and
+/// one gathering of the coarse right-hand sides make a step. Its error has a sign, which walks would take away.
+///
+/// Left to the program: as many nodes as leave an influence of a thousandth, where ten are enough without a coarse
+/// lattice; else a coarse lattice with one cell for 2 × 2 and strips of eight nodes. Where subdomains are narrower than
+/// that, strips reach over more than one. What the coarse lattice says of its own error tells about what is left: where
+/// that may be more than a hundredth of the shortest edge of the mesh, further exchanges follow.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Strip {
+    /// Nodes of the neighbours that a subdomain sees beyond each cut, from 1 to the cells of the narrowest subdomain.
+    pub width: Auto<usize>,
+    /// Cells along each axis to one of the coarse lattice; 1 for no coarse lattice.
+    pub coarse: Auto<usize>,
+    /// Exchanges in a step.
+    pub exchanges: Auto<usize>,
+}
+
+const MAX_EXCHANGES: usize = 1000;
+
+impl Strip {
+    /// One exchange of strips of so many nodes, without a coarse lattice.
+    pub fn plain(width: usize) -> Self {
+        Self { width: Auto::Value(width), coarse: Auto::Value(1), exchanges: Auto::Value(1) }
+    }
+
+    /// Refuses settings out of range for a decomposition.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub fn check(&self, decomposition: &Decomposition) -> Result<()> {
+        let (narrowest, cells) = (decomposition.narrowest(), decomposition.lattice().cells());
+        let coarsest = cells[0].max(cells[1]) / FEWEST_CELLS;
+        match *self {
+            Self { width: Auto::Value(0), .. } => Err(Error::invalid(
+                "width",
+                0,
+                "a strip needs 1 node or more; \"auto\" takes as many as ℓ = √(Δt/τ) asks for",
+            )),
+            Self { width: Auto::Value(width), .. } if width > narrowest => {
+                let rule = format!(
+                    "must be at most the {narrowest} cells of the narrowest subdomain; lower it, or give fewer subdomains"
+                );
+                Err(Error::invalid("width", width, rule))
+            }
+            Self { coarse: Auto::Value(0), .. } => Err(Error::invalid(
+                "coarse",
+                0,
+                "must be 2 or more cells to a coarse one, 1 for no coarse lattice, or \"auto\"",
+            )),
+            Self { coarse: Auto::Value(coarse), .. } if coarse > 1 && coarse > coarsest => {
+                let rule =
+                    format!("must leave {FEWEST_CELLS} coarse cells along an axis, that is be at most {coarsest} here");
+                Err(Error::invalid("coarse", coarse, rule))
+            }
+            Self { exchanges: Auto::Value(n), .. } if !(1..=MAX_EXCHANGES).contains(&n) => {
+                Err(Error::invalid("exchanges", n, format!("must be between 1 and {MAX_EXCHANGES}, or \"auto\"")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What is given, and the rest as it fits.
+    fn reach(&self, problem: &Problem<'_>, decomposition: &Decomposition) -> Reach {
+        let by_itself = Reach::of(problem, decomposition);
+        let width = match (self.width, self.coarse) {
+            (Auto::Value(width), _) => width,
+            (Auto::Auto, Auto::Auto) => by_itself.width,
+            (Auto::Auto, Auto::Value(1)) => Reach::alone(problem, decomposition),
+            (Auto::Auto, Auto::Value(coarse)) => Reach::alone(problem, decomposition).min(4 * coarse),
+        };
+        let coarse = match self.coarse {
+            Auto::Value(coarse) => coarse,
+            Auto::Auto if width >= Reach::alone(problem, decomposition) => 1,
+            Auto::Auto => by_itself.coarse,
+        };
+        Reach { width, coarse }
+    }
+}
+
+impl Estimator for Strip {
+    fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure> {
+        let reach = self.reach(problem, strips.decomposition());
+        let exchanges = match self.exchanges {
+            Auto::Auto => None,
+            Auto::Value(exchanges) => Some(exchanges),
+        };
+        let found = strips.correct(problem, reach, Local::Solve { share: SOLVED }, exchanges)?;
+        Ok(Estimates::of_strips(&found, points))
+    }
+}
