@@ -101,3 +101,25 @@ fn iterations_converge_to_the_simultaneous_solution() {
     assert!(changes[0] > 1e-4, "the coupling does nothing: {changes:?}");
     assert!(changes[1] < changes[0] && changes[2] < 0.25 * changes[0], "{changes:?}");
 }
+
+/// With a tolerance rounds end when the mesh no longer changes, well before the most, and the mesh is that of many rounds;
+/// sub-steps are doubled no further than the mesh needs.
+#[test]
+fn a_tolerance_ends_rounds_and_doubling() {
+    let run = |coupling| {
+        let physics = Box::new(Burgers::new(0.02, Convection::Conservative).unwrap());
+        let (state, record) = simulate(physics, Box::new(Arclength::default()), coupling, 0.25, 0.35, 0.01);
+        (state, record.work.work.linear_solves)
+    };
+    let (settled, solves) = run(Coupling { iterations: 100, tolerance: 1e-8, ..Coupling::default() });
+    let (many, most) = run(Coupling { iterations: 30, ..Coupling::default() });
+    let (one, _) = run(Coupling::default());
+    assert!(largest_difference(&settled, &many) < 1e-7, "{:e}", largest_difference(&settled, &many));
+    assert!(largest_difference(&one, &many) > 1e-4 && solves < most, "{solves} against {most}");
+    let (rough, few) = run(Coupling { mesh_steps: 64, tolerance: 1e-2, ..Coupling::default() });
+    let (fine, more) = run(Coupling { mesh_steps: 64, tolerance: 1e-4, ..Coupling::default() });
+    let (finest, _) = run(Coupling { mesh_steps: 64, ..Coupling::default() });
+    assert!(few < more, "{few} against {more}");
+    let [far, near] = [&rough, &fine].map(|state| largest_difference(state, &finest));
+    assert!(near < far && near < 1e-3, "{far:e}, {near:e}");
+}

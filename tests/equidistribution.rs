@@ -142,8 +142,10 @@ fn thin_layers() {
 
 #[test]
 fn subdomains() {
-    let (_, summary) = run("schwarz-coarse", &[]);
-    assert!(summary["iterations_to_tolerance"].as_u64().unwrap().abs_diff(9) <= 1);
+    for (coarse, expected) in [("integral", 2), ("galerkin", 9)] {
+        let (_, summary) = run("schwarz-coarse", &[&format!("schwarz.coarse={coarse}")]);
+        assert!(summary["iterations_to_tolerance"].as_u64().unwrap().abs_diff(expected) <= 1, "{coarse}");
+    }
     let (_, summary) = run("schwarz-robin", &[]);
     assert!(summary["iterations_to_tolerance"].as_u64().unwrap() <= 20);
     // every way to divide the same line

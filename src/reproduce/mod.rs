@@ -152,3 +152,52 @@ impl Item {
         (self.run)(options)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Items that take seconds: every row is as long as its head, no cell is NaN, a verdict has its rule and each erratum its
+    /// check.
+    #[test]
+    fn every_verdict_says_its_rule() {
+        let mut names: Vec<&str> = ITEMS.iter().map(|item| item.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), ITEMS.len());
+        let short = |item: &&Item| {
+            item.of == Document::Schwarz && !["coupled", "coarse"].contains(&item.name)
+                || item.name.starts_with("errata")
+        };
+        for item in ITEMS.iter().filter(short) {
+            let rerun = item.run(Options { quick: true }).unwrap_or_else(|error| panic!("{}: {error}", item.name));
+            for table in rerun.tables {
+                let judged = table.columns.iter().any(|head| head.starts_with("verdict"));
+                assert_eq!(judged, !table.rule.is_empty(), "{}", table.title);
+                for row in &table.rows {
+                    assert_eq!(row.len(), table.columns.len(), "{row:?}");
+                    assert!(row.iter().all(|cell| !cell.contains("NaN")), "{row:?}");
+                    if item.name.starts_with("errata") {
+                        let said = &row[row.len() - 1];
+                        assert!(said == "erratum" || said.starts_with("misprint"), "{row:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Table 8.1 to the paper's digits but in one place, and the counts of its first two rows.
+    #[test]
+    fn table_8_1_is_the_papers() {
+        let table = schwarz::table_8_1().unwrap().tables.remove(0);
+        let said = |method: &str, what: &str| {
+            let row = table.rows.iter().find(|row| row[0].starts_with(method) && row[1] == what).unwrap();
+            row[row.len() - 1].clone()
+        };
+        for method in ["nonlinear", "linearised"] {
+            assert_eq!([said(method, "ours"), said(method, "solves, counted so")], ["agrees", "agrees"]);
+        }
+        assert_eq!(said("optimal", "ours"), "agrees");
+        assert_eq!(said("optimised", "ours"), "n = 4: 0.0366, not 0.0367");
+    }
+}

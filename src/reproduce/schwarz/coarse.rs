@@ -1,7 +1,7 @@
 //! A coarse correction for any number of subdomains, which the paper leaves to the future.
 
 use super::{NONLINEAR, from_uniform, layer, square, until, valley};
-use crate::equidistribution::{Coarse, Line, LineDensity, Method, Sweep};
+use crate::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Method, Sweep};
 use crate::error::{Error, Failure, Result};
 use crate::reproduce::{Options, Rerun, Table};
 use crate::simulation::{Curve, Figure};
@@ -19,6 +19,11 @@ fn thin(cells: usize) -> Result<Line> {
     Ok(Line::new(LineDensity::arclength("tanh(1000*(x - 0.37))")?, cells))
 }
 
+/// The same with exact averages: the discrete problem is then the continuous one, and no cell is too wide for its layer.
+fn thin_exact(cells: usize) -> Result<Line> {
+    Ok(Line { face: FaceDensity::Exact, ..thin(cells)? })
+}
+
 pub fn coarse(options: Options) -> Result<Rerun> {
     let counts: &[usize] = if options.quick { &[2, 4, 8, 16] } else { &[2, 4, 8, 16, 32, 64] };
     let heads = ["M", "correction"].into_iter().map(String::from);
@@ -30,12 +35,13 @@ pub fn coarse(options: Options) -> Result<Rerun> {
     .ruled("“independent of I” where no count is above 1.5 times that of 2 subdomains; else “grows”, with the largest count");
     let correction = |coarse| Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse };
     let (galerkin, integral) = (correction(Coarse::Galerkin), correction(Coarse::Integral));
-    let problems: [(&str, Problem); 5] = [
+    let problems: [(&str, Problem); 6] = [
         ("x² + 1", square),
         ("layer", layer),
         ("C = 300", |cells| valley(300.0, cells)),
         ("spike", spike),
         ("thin layer", thin),
+        ("thin layer, exact faces", thin_exact),
     ];
     let mut rows: Vec<(&str, Problem, &str, Method)> = vec![("x² + 1", square, "none", NONLINEAR)];
     for (name, method) in [("galerkin", galerkin), ("integral", integral)] {

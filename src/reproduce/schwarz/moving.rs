@@ -16,7 +16,7 @@ pub fn figure_8_6() -> Result<Rerun> {
         "Figure 8.6: a front that steepens and moves, 100 cells, 100 steps, to 1e-10 in each",
         &["subdomains", "iterations a step", "t", "x(.45)", "x(.55)", "shortest cell over the mean", "verdict"],
     )
-    .ruled("the paper prints no number. “holds” where the mesh is monotone, and its subdomains move to the right with the front");
+    .ruled("the paper prints no number. “holds” where the mesh is monotone, and x(.45) and x(.55) have moved to the right with the front");
     let mut pictures = Vec::new();
     let cases: [Case; 2] = [
         ("two", "overlap = [0.45, 0.55]", &[[0, 55], [45, 100]]),

@@ -50,7 +50,7 @@ fn sign() -> Vec<String> {
             "… − ν(u_xx + u_yy) = 0",
             "the exact solution at x + y − t = .007: residual over u_t is 0",
         ],
-        [format!("{printed:.3}"), format!("{right:.0e}")],
+        [format!("{printed:.3}"), format!("{:.0e}", right.abs())],
         [printed.abs() < 1e-12, right.abs() < 1e-12],
     )
 }
@@ -67,7 +67,7 @@ fn time() -> Vec<String> {
             "exp((x + y − t)/(2ν))",
             "residual of Burgers' equation over u_x is 0",
         ],
-        [format!("{printed:.3}"), format!("{right:.0e}")],
+        [format!("{printed:.3}"), format!("{:.0e}", right.abs())],
         [printed.abs() < 1e-12, right.abs() < 1e-12],
     )
 }
@@ -87,7 +87,7 @@ fn displacement() -> Vec<String> {
             "… + (ρ_ξ/ρ) L_x",
             "X = .1 sin 2πξ, b = cos 2πξ, L = 2π: difference to (2.4) is 0",
         ],
-        [format!("{printed:.3}"), format!("{right:.0e}")],
+        [format!("{printed:.3}"), format!("{:.0e}", right.abs())],
         [printed.abs() < 1e-12, right.abs() < 1e-12],
     )
 }

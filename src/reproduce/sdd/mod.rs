@@ -122,7 +122,7 @@ const COLUMNS: [&str; 10] = [
 /// How far two ratios may be apart that count as the same: the paper's own are within this of 1 nearly everywhere; and the
 /// half digit that they are rounded to.
 const SAME: f64 = 0.01;
-const ROUNDED: f64 = 0.005;
+const ROUNDED: f64 = 0.005 + 1e-9;
 const RULE: &str = "“agrees” where |R − R of the paper| ≤ .01, plus the half digit that the paper's is rounded to. Where not, \
      what counts is the distance to 1, on either side: “nearer to 1” or “farther from 1” than the paper's, and by how much. A run \
      that ends early has the name of its failure";
