@@ -449,7 +449,7 @@ impl Failure {
             }
             Self::NotConverged { remedy, .. } if !remedy.is_empty() => remedy,
             Self::NotConverged { .. } => {
-                "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"galerkin\""
+                "raise stop.iterations where it converges slowly; else give more overlap, set schwarz.linearized to false, schwarz.sweep to \"alternating\", or schwarz.coarse to \"integral\""
             }
             Self::SelfTouching { .. } => "mend domain.map, or lower domain.distort",
             Self::DegenerateStencil { .. } => {

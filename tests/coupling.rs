@@ -66,7 +66,7 @@ fn largest_difference(a: &State, b: &State) -> f64 {
 #[test]
 fn mesh_sub_steps_follow_the_density_in_x() {
     let run = |mesh_steps, dt| {
-        let coupling = Coupling { mesh_steps, iterations: 1 };
+        let coupling = Coupling { mesh_steps, ..Coupling::default() };
         simulate(Box::new(Still), Box::new(Bump), coupling, 0.0, 0.02, dt).0
     };
     let reference = run(1, 1e-5);
@@ -78,7 +78,7 @@ fn mesh_sub_steps_follow_the_density_in_x() {
 #[test]
 fn work_counts_sub_steps_and_iterations() {
     let solves = |mesh_steps, iterations| {
-        let coupling = Coupling { mesh_steps, iterations };
+        let coupling = Coupling { mesh_steps, iterations, tolerance: 0.0 };
         simulate(Box::new(Still), Box::new(Bump), coupling, 0.0, 0.05, 0.01).1.work.work.linear_solves
     };
     // five steps, each four sides and two coordinates
@@ -92,7 +92,7 @@ fn work_counts_sub_steps_and_iterations() {
 #[test]
 fn iterations_converge_to_the_simultaneous_solution() {
     let run = |iterations| {
-        let coupling = Coupling { mesh_steps: 1, iterations };
+        let coupling = Coupling { iterations, ..Coupling::default() };
         let physics = Box::new(Burgers::new(0.02, Convection::Conservative).unwrap());
         simulate(physics, Box::new(Arclength::default()), coupling, 0.25, 0.35, 0.01).0
     };
@@ -100,4 +100,26 @@ fn iterations_converge_to_the_simultaneous_solution() {
     let changes: Vec<f64> = states.windows(2).map(|pair| largest_difference(&pair[0], &pair[1])).collect();
     assert!(changes[0] > 1e-4, "the coupling does nothing: {changes:?}");
     assert!(changes[1] < changes[0] && changes[2] < 0.25 * changes[0], "{changes:?}");
+}
+
+/// With a tolerance rounds end when the mesh no longer changes, well before the most, and the mesh is that of many rounds;
+/// sub-steps are doubled no further than the mesh needs.
+#[test]
+fn a_tolerance_ends_rounds_and_doubling() {
+    let run = |coupling| {
+        let physics = Box::new(Burgers::new(0.02, Convection::Conservative).unwrap());
+        let (state, record) = simulate(physics, Box::new(Arclength::default()), coupling, 0.25, 0.35, 0.01);
+        (state, record.work.work.linear_solves)
+    };
+    let (settled, solves) = run(Coupling { iterations: 100, tolerance: 1e-8, ..Coupling::default() });
+    let (many, most) = run(Coupling { iterations: 30, ..Coupling::default() });
+    let (one, _) = run(Coupling::default());
+    assert!(largest_difference(&settled, &many) < 1e-7, "{:e}", largest_difference(&settled, &many));
+    assert!(largest_difference(&one, &many) > 1e-4 && solves < most, "{solves} against {most}");
+    let (rough, few) = run(Coupling { mesh_steps: 64, tolerance: 1e-2, ..Coupling::default() });
+    let (fine, more) = run(Coupling { mesh_steps: 64, tolerance: 1e-4, ..Coupling::default() });
+    let (finest, _) = run(Coupling { mesh_steps: 64, ..Coupling::default() });
+    assert!(few < more, "{few} against {more}");
+    let [far, near] = [&rough, &fine].map(|state| largest_difference(state, &finest));
+    assert!(near < far && near < 1e-3, "{far:e}, {near:e}");
 }

@@ -142,8 +142,10 @@ fn thin_layers() {
 
 #[test]
 fn subdomains() {
-    let (_, summary) = run("schwarz-coarse", &[]);
-    assert!(summary["iterations_to_tolerance"].as_u64().unwrap().abs_diff(9) <= 1);
+    for (coarse, expected) in [("integral", 2), ("galerkin", 9)] {
+        let (_, summary) = run("schwarz-coarse", &[&format!("schwarz.coarse={coarse}")]);
+        assert!(summary["iterations_to_tolerance"].as_u64().unwrap().abs_diff(expected) <= 1, "{coarse}");
+    }
     let (_, summary) = run("schwarz-robin", &[]);
     assert!(summary["iterations_to_tolerance"].as_u64().unwrap() <= 20);
     // every way to divide the same line
@@ -287,8 +289,10 @@ fn bad_settings_are_refused() {
         ),
         (schwarz("overlap = [0.4, 0.6]\n[start]\nmesh = { formula = \"xi + sin(2*pi*xi)\" }"), &["start.mesh.formula"]),
         (
-            schwarz("method = \"optimal\"\ncut = 0.5\n[time]\nstart = 0.0\nend = 1.0\nstep = 0.1\nrelaxation = 1.0"),
-            &["schwarz.method", "knows no time"],
+            schwarz(
+                "method = \"optimal\"\ncut = 0.5\nintegral = { trapezoid = 20 }\n[time]\nstart = 0.0\nend = 1.0\nstep = 0.1\nrelaxation = 1.0",
+            ),
+            &["schwarz.integral", "no integral"],
         ),
         (format!("{M}[time]\nstart = 0.0\nend = 1.0\nstep = 0.1\nrelaxation = 0.0"), &["time.relaxation", "above 0"]),
         (format!("{M}[time]\nstart = 0.0\nend = 1.0\nstep = -0.1\nrelaxation = 1.0"), &["time.step", "above 0"]),

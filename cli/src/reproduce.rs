@@ -1,16 +1,20 @@
 use crate::terminal::{say, use_threads};
 use clap::Args;
 use driftmesh::Error;
-use driftmesh::reproduce::{ITEMS, Options, Rerun};
+use driftmesh::reproduce::{Done, ITEMS, Item, Options, Rerun, page};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 #[derive(Args)]
 pub struct Reproduce {
     /// What to rerun; everything where nothing is named.
     #[arg(value_name = "ITEM", value_parser = clap::builder::PossibleValuesParser::new(ITEMS.iter().map(|item| item.name)))]
     items: Vec<String>,
-    /// Fewer rows and samples: everything in a minute or two.
+    /// Everything, and one page of it that stands alone: index.html in the directory.
+    #[arg(long, conflicts_with = "items")]
+    all: bool,
+    /// Fewer rows and samples: everything in five minutes.
     #[arg(long)]
     quick: bool,
     /// Threads to use; all cores where nothing is said.
@@ -26,18 +30,43 @@ impl Reproduce {
         use_threads(self.threads)?;
         std::fs::create_dir_all(&self.out)
             .map_err(|error| Error::Unwritable { path: self.out.clone(), reason: error.to_string() })?;
+        let mut done = Vec::new();
         for item in ITEMS.iter().filter(|item| self.items.is_empty() || self.items.iter().any(|name| name == item.name))
         {
-            let Rerun { tables, pictures } = item.run(Options { quick: self.quick })?;
-            let text = tables.iter().map(|table| table.to_string()).collect::<Vec<_>>().join("\n");
-            say(&text);
-            self.write(&format!("{}.md", item.name), text.as_bytes())?;
-            for (name, picture) in pictures {
-                self.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
-                self.write(&format!("{name}.png"), &picture.png)?;
+            let started = Instant::now();
+            let outcome = self.rerun(item);
+            let seconds = started.elapsed().as_secs_f64();
+            match outcome {
+                Ok(rerun) if self.all => done.push(Done { item, outcome: Ok(rerun), seconds }),
+                Ok(_) => {}
+                // one item that ends takes no other with it where there is a page to say so
+                Err(error) if self.all && !matches!(error, Error::Unwritable { .. }) => {
+                    say(&format!("{}: {error}", item.name));
+                    done.push(Done { item, outcome: Err(error.to_string()), seconds });
+                }
+                Err(error) => return Err(error),
             }
         }
-        Ok(ExitCode::SUCCESS)
+        if !self.all {
+            return Ok(ExitCode::SUCCESS);
+        }
+        self.write("index.html", page(&done, self.quick).as_bytes())?;
+        say(&format!("{}", self.out.join("index.html").display()));
+        let failed = done.iter().any(|done| done.outcome.is_err());
+        Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    }
+
+    /// Reruns an item, prints its tables and writes them with its pictures.
+    fn rerun(&self, item: &Item) -> driftmesh::Result<Rerun> {
+        let rerun = item.run(Options { quick: self.quick })?;
+        let text = rerun.tables.iter().map(|table| table.to_string()).collect::<Vec<_>>().join("\n");
+        say(&text);
+        self.write(&format!("{}.md", item.name), text.as_bytes())?;
+        for (name, picture) in &rerun.pictures {
+            self.write(&format!("{name}.svg"), picture.svg.as_bytes())?;
+            self.write(&format!("{name}.png"), &picture.png)?;
+        }
+        Ok(rerun)
     }
 
     fn write(&self, name: &str, bytes: &[u8]) -> driftmesh::Result<()> {

@@ -515,3 +515,17 @@ fn help_shows_an_example() {
         assert!(help.contains(&format!("Example:\n  driftmesh {verb} ")), "{help}");
     }
 }
+
+/// One item is rerun with its rules and verdicts; everything at once takes no names beside it.
+#[test]
+fn papers_are_rerun() {
+    let sandbox = Sandbox::new();
+    let out = sandbox.call(&["reproduce", "errata-sdd", "--out", "papers"]);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(out.status.success() && text.contains("verdict: ") && text.contains("| erratum"), "{text}");
+    let written = std::fs::read_to_string(sandbox.path("papers/errata-sdd.md")).unwrap();
+    assert_eq!(written.trim_end(), text.trim_end());
+    assert!(!sandbox.path("papers/index.html").exists());
+    let both = sandbox.call(&["reproduce", "errata-sdd", "--all"]);
+    assert_eq!(both.status.code(), Some(2));
+}

@@ -123,7 +123,7 @@ def schwarz(
     overlap_cells: int | None = None,
     sweep: Literal["parallel", "alternating"] | None = None,
     linearized: bool | None = None,
-    coarse: Literal["none", "galerkin"] | None = None,
+    coarse: Literal["none", "galerkin", "integral"] | None = None,
     robin: float | Literal["auto", "lagged"] | None = None,
     integral: Literal["exact"] | Mapping[str, int] | None = None,
     iterations: int | None = None,
@@ -149,7 +149,8 @@ def schwarz(
         overlap_cells: Goes with ``subdomains``.
         sweep: Classical: ``"parallel"`` or ``"alternating"``.
         linearized: Classical: M of the iterate before, one linear solve a subdomain.
-        coarse: Classical: ``"galerkin"`` makes the count independent of the number of subdomains.
+        coarse: Classical: ``"integral"`` makes the count independent of the number of subdomains; ``"galerkin"`` does where
+            the density varies little within a cell.
         robin: Optimized: p, ``"auto"`` or ``"lagged"``.
         integral: Optimal: ``"exact"`` or ``{"trapezoid": panels}``.
         iterations: So many; at most so many with a tolerance, 500 where nothing is said.

@@ -1,4 +1,5 @@
 use super::LineDensity;
+use super::beyond::Beyond;
 use super::cumulative::Cumulative;
 use super::path::Path;
 use crate::error::Failure;
@@ -27,21 +28,23 @@ struct Face {
 
 /// A law at an end: g + φ(x) is the flux there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Law {
+pub(super) enum Law<'a> {
     /// φ = slope · x.
     Robin { slope: f64 },
     /// φ = ∫ M from x to `to`, over `length`: the flux of the rest of the domain, which begins at x. With panels the
     /// integral is that of the trapezoidal rule.
     Rest { to: f64, length: f64, panels: Option<usize> },
+    /// φ = the flux into what lies beyond, over a step in time.
+    Beyond(Beyond<'a>),
 }
 
 /// What is known at an end of a piece of the line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum End {
+pub(super) enum End<'a> {
     /// The node.
     Value(f64),
     /// The flux, F = g + φ(x).
-    Flux { g: f64, law: Law },
+    Flux { g: f64, law: Law<'a> },
 }
 
 /// The backward Euler step of x_t = (1/τ) (M x_ξ)_ξ.
@@ -51,6 +54,14 @@ pub(super) struct Step<'a> {
     pub old: &'a [f64],
     /// τ/Δt.
     pub ratio: f64,
+}
+
+impl Step<'_> {
+    /// By how much the flux grows over half a cell beside node i, which is at x; and by how much for each x.
+    pub fn half(&self, h: f64, i: usize, x: f64) -> [f64; 2] {
+        let slope = 0.5 * self.ratio * h;
+        [slope * (x - self.old[i]), slope]
+    }
 }
 
 /// (M x_ξ)_ξ = 0 on nodes ξ_i a distance `h` apart, as F_{i+½} = F_{i−½} with F_{i+½} = M̄ (x_{i+1} − x_i)/h.
@@ -92,12 +103,13 @@ fn ways(free: bool) -> impl Iterator<Item = (bool, Way, f64)> {
         .chain(halved(false, Way::Straight, 0..if free { HALVINGS } else { 0 }))
 }
 
-impl Law {
+impl Law<'_> {
     /// φ and φ′.
     fn at(self, chain: &Chain<'_>, x: f64) -> Result<[f64; 2], Failure> {
         let (density, t) = (chain.density, chain.t);
         match self {
             Self::Robin { slope } => Ok([slope * x, slope]),
+            Self::Beyond(beyond) => beyond.flux(chain, x),
             Self::Rest { to, length, panels: None } => {
                 Ok([chain.integral(x, to)? / length, -density.at(t, x)?[0] / length])
             }
@@ -143,10 +155,10 @@ impl Chain<'_> {
     ///
     /// by what the law is. The left side falls with F, so that there is one solution. None where ∫M is not known, or a law is
     /// none of these.
-    fn even(&self, guess: &[f64], ends: [End; 2]) -> Option<Vec<f64>> {
+    fn even(&self, guess: &[f64], ends: [End<'_>; 2]) -> Option<Vec<f64>> {
         let (cumulative, n) = (self.cumulative?, guess.len() - 1);
         let length = n as f64 * self.h;
-        let place = |end: End, flux: f64| match end {
+        let place = |end: End<'_>, flux: f64| match end {
             End::Value(x) => Some([cumulative.up_to(x), 0.0]),
             End::Flux { g, law: Law::Robin { slope } } => {
                 let [y, m] = cumulative.at((flux - g) / slope);
@@ -223,8 +235,14 @@ impl Chain<'_> {
         Ok(self.fluxes(&[left, right])?[0])
     }
 
+    /// The flux of one cell, and its derivatives by the nodes at its ends.
+    pub fn flux_of_cell(&self, left: f64, right: f64) -> Result<[f64; 3], Failure> {
+        let (face, width) = (self.faces(&[left, right])?[0], right - left);
+        Ok([face.mean * width, face.by[0] * width - face.mean, face.by[1] * width + face.mean].map(|v| v / self.h))
+    }
+
     /// φ of a law, at a place.
-    pub fn law(&self, law: Law, x: f64) -> Result<f64, Failure> {
+    pub fn law(&self, law: Law<'_>, x: f64) -> Result<f64, Failure> {
         Ok(law.at(self, x)?[0])
     }
 
@@ -232,7 +250,7 @@ impl Chain<'_> {
     pub fn linearised(
         &self,
         x: &[f64],
-        ends: [End; 2],
+        ends: [End<'_>; 2],
         step: Option<Step<'_>>,
     ) -> Result<(Vec<f64>, Vec<[f64; 3]>), Failure> {
         let faces = self.faces(x)?;
@@ -258,8 +276,12 @@ impl Chain<'_> {
         for (end, i) in ends.into_iter().zip([0, n]) {
             if let End::Flux { g, law } = end {
                 let ([f, by_left, by_right], [phi, slope]) = (flux(i.min(n - 1)), law.at(self, x[i])?);
-                residual[i] = f - g - phi;
-                rows[i] = if i == 0 { [0.0, by_left - slope, by_right] } else { [by_left, by_right - slope, 0.0] };
+                // the flux at the node itself, half a cell further
+                let [more, by_node] = step.map_or([0.0; 2], |step| step.half(self.h, i, x[i]));
+                let sign = if i == 0 { -1.0 } else { 1.0 };
+                residual[i] = f + sign * more - g - phi;
+                let own = sign * by_node - slope;
+                rows[i] = if i == 0 { [0.0, by_left + own, by_right] } else { [by_left, by_right + own, 0.0] };
             }
         }
         Ok((residual, rows))
@@ -270,7 +292,12 @@ impl Chain<'_> {
     ///
     /// # Errors
     /// [`Failure::LineDensity`], [`Failure::LineStalled`].
-    pub fn solve(&self, guess: &[f64], ends: [End; 2], step: Option<Step<'_>>) -> Result<(Vec<f64>, usize), Failure> {
+    pub fn solve(
+        &self,
+        guess: &[f64],
+        ends: [End<'_>; 2],
+        step: Option<Step<'_>>,
+    ) -> Result<(Vec<f64>, usize), Failure> {
         if self.face == FaceDensity::Exact
             && step.is_none()
             && let Some(nodes) = self.even(guess, ends)
@@ -287,7 +314,12 @@ impl Chain<'_> {
     }
 
     /// Newton's method, damped so that nodes keep their order.
-    pub fn newton(&self, guess: &[f64], ends: [End; 2], step: Option<Step<'_>>) -> Result<(Vec<f64>, usize), Failure> {
+    pub fn newton(
+        &self,
+        guess: &[f64],
+        ends: [End<'_>; 2],
+        step: Option<Step<'_>>,
+    ) -> Result<(Vec<f64>, usize), Failure> {
         let mut x = stretched(guess, ends);
         let size = x.iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
         let (mut residual, mut rows) = self.linearised(&x, ends, step)?;
@@ -327,7 +359,11 @@ impl Chain<'_> {
                     }
                 }
                 if !ordered || tried.windows(2).all(|x| x[1] > x[0]) || free && tried.windows(2).all(|x| x[1] < x[0]) {
-                    let (r, m) = self.linearised(&tried, ends, step)?;
+                    let (r, m) = match self.linearised(&tried, ends, step) {
+                        // no rest of the line lies beyond its own end
+                        Err(Failure::LineStalled { .. }) => continue,
+                        other => other?,
+                    };
                     if norm(&r) < before.max(rounding) || largest <= 1e-9 * size {
                         found = Some((tried, r, m, share));
                         break;
@@ -407,7 +443,7 @@ fn falling_root(first: f64, size: f64, f: impl Fn(f64) -> Option<[f64; 2]>) -> O
 }
 
 /// A guess with new end values: the whole piece stretched, so that nodes keep their order.
-fn stretched(guess: &[f64], ends: [End; 2]) -> Vec<f64> {
+fn stretched(guess: &[f64], ends: [End<'_>; 2]) -> Vec<f64> {
     let (first, last) = (guess[0], guess[guess.len() - 1]);
     let [left, right] = [(ends[0], first), (ends[1], last)].map(|(end, own)| match end {
         End::Value(x) => x,
@@ -424,7 +460,7 @@ fn norm(residual: &[f64]) -> f64 {
 }
 
 /// Tridiagonal elimination.
-pub(super) fn thomas(rows: &[[f64; 3]], right: &[f64]) -> Vec<f64> {
+pub(crate) fn thomas(rows: &[[f64; 3]], right: &[f64]) -> Vec<f64> {
     let n = rows.len();
     let mut above = vec![0.0; n];
     let mut x = vec![0.0; n];

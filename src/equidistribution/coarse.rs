@@ -1,7 +1,8 @@
 //! A correction between sweeps that reaches all pieces at once: their number no longer matters.
 
 use super::chain::{End, Step, thomas};
-use super::schwarz::{Iteration, owner};
+use super::cumulative::Cumulative;
+use super::schwarz::{Coarse, Iteration, owner};
 use crate::error::Failure;
 
 /// A correction shorter than this share of the whole one is left out.
@@ -15,7 +16,11 @@ const SHORTEST: f64 = 1e-3;
 ///
 /// with a coarse node on each side of every cut, where the glued mesh jumps. J is tridiagonal and a node lies under two
 /// hats, so that the coarse system is tridiagonal too. The step is halved until nodes keep their order.
-pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>) -> Result<Vec<f64>, Failure> {
+///
+/// Σ c_j hat_j is the change of ∫M up to a node. [`Coarse::Galerkin`] divides it by M at the old node, which is right for small
+/// changes only: where M varies over the way of a node, nodes pass each other, and halved steps are taken over and over.
+/// [`Coarse::Integral`] moves each node to where ∫M has changed by so much, which is right for changes of any size.
+pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coarse) -> Result<Vec<f64>, Failure> {
     let (chain, n) = (&iteration.chain, iteration.cells);
     let mut nodes = vec![0];
     for pair in iteration.ranges.windows(2) {
@@ -45,27 +50,43 @@ pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>) -> Result<Vec
         let (k, along) = places[i];
         [(k, 1.0 - along), (k + 1, along)].into_iter().filter(move |&(j, hat)| hat > 0.0 && j > 0 && j <= inner)
     };
-    let mut coarse = vec![[0.0; 3]; inner];
+    let mut system = vec![[0.0; 3]; inner];
     let mut right = vec![0.0; inner];
     for i in 1..n {
         for (row, test) in hats(i) {
             right[row - 1] -= test * residual[i];
             for (beside, coupling) in (i - 1..).zip(rows[i]) {
                 for (column, trial) in hats(beside) {
-                    coarse[row - 1][column + 1 - row] += test * coupling * trial / m[beside][0];
+                    system[row - 1][column + 1 - row] += test * coupling * trial / m[beside][0];
                 }
             }
         }
     }
-    let c = thomas(&coarse, &right);
-    let change: Vec<f64> = (0..=n).map(|i| hats(i).map(|(j, hat)| hat * c[j - 1]).sum::<f64>() / m[i][0]).collect();
+    let c = thomas(&system, &right);
+    // of ∫M up to each node
+    let change: Vec<f64> = (0..=n).map(|i| hats(i).map(|(j, hat)| hat * c[j - 1]).sum()).collect();
+    let integral = chain.cumulative.filter(|_| coarse == Coarse::Integral);
     let mut share = 1.0;
     while share >= SHORTEST {
-        let moved: Vec<f64> = mesh.iter().zip(&change).map(|(x, change)| x + share * change).collect();
-        if moved.windows(2).all(|x| x[1] > x[0]) {
-            return Ok(moved);
+        let moved = match integral {
+            Some(integral) => along(integral, &mesh, &change, share),
+            None => Some((0..=n).map(|i| mesh[i] + share * change[i] / m[i][0]).collect()),
+        };
+        match moved {
+            Some(moved) if moved.windows(2).all(|x| x[1] > x[0]) => return Ok(moved),
+            _ => share *= 0.5,
         }
-        share *= 0.5;
     }
     Ok(mesh)
+}
+
+/// The nodes where ∫M has changed by a share of so much; none where that is no order of nodes on the line.
+fn along(integral: &Cumulative, mesh: &[f64], change: &[f64], share: f64) -> Option<Vec<f64>> {
+    let n = mesh.len() - 1;
+    let wanted: Vec<f64> = mesh.iter().zip(change).map(|(x, change)| integral.up_to(*x) + share * change).collect();
+    wanted.windows(2).all(|g| g[1] > g[0]).then(|| {
+        let mut moved = integral.inverted(wanted.into_iter());
+        (moved[0], moved[n]) = (mesh[0], mesh[n]);
+        moved
+    })
 }

@@ -8,8 +8,10 @@
 //! (2012). Its theorem 3.4, that linearised Schwarz always converges, does not hold: for M = 300 (x − ½)² + 1 and pieces
 //! that overlap in (.48, .52) the iteration oscillates for ever.
 
+mod beyond;
 mod chain;
 mod coarse;
+mod counts;
 mod cumulative;
 mod density;
 mod path;
@@ -21,6 +23,7 @@ mod schwarz;
 mod tests;
 
 pub use chain::FaceDensity;
+pub(crate) use chain::thomas;
 pub use density::{LineDensity, check_ends};
 pub use predict::Prediction;
 pub use schwarz::{Coarse, Method, Robin, Sweep};
@@ -118,6 +121,9 @@ pub struct History {
     /// there is room.
     #[serde(skip)]
     pub path: Vec<(usize, Vec<f64>)>,
+    /// Errors of the first piece alone.
+    #[serde(skip)]
+    pub first: Vec<f64>,
     /// The discrete single-domain mesh.
     pub reference: Vec<f64>,
     /// Contraction in two iterations: the geometric mean of the last ten above rounding, or of the last half of fewer.
@@ -198,8 +204,8 @@ impl History {
             }
             _ if converges => "raise stop.iterations",
             Method::Classical { linearized: true, .. } => "set schwarz.linearized to false",
-            Method::Classical { coarse: Coarse::None, sweep: Sweep::Parallel, .. } => {
-                "give more overlap, or set schwarz.coarse to \"galerkin\""
+            Method::Classical { coarse: Coarse::None | Coarse::Galerkin, sweep: Sweep::Parallel, .. } => {
+                "give more overlap, or set schwarz.coarse to \"integral\""
             }
             Method::Classical { .. } => "give more overlap, or more grid.cells",
             Method::Optimized { robin: Robin::Value(_) } => "set schwarz.robin to \"auto\" or \"lagged\"",
@@ -384,11 +390,12 @@ impl Line {
         let iteration = Iteration { chain, ranges, method, old: before, cells: self.cells };
         let exact = iteration.cut(&reference);
         let mut pieces = iteration.cut(start);
-        let mut path = Path::default();
+        let (mut path, mut first) = (Path::default(), Vec::new());
         let mut tell = |pieces: &Pieces, increment: f64, solves: usize| {
             let glued = iteration.glue(pieces);
             let iterate = self.measured(t, pieces, &exact, &glued, increment, solves);
             path.take(glued);
+            first.push(distance(&pieces[..1], &exact[..1]));
             iterate
         };
         let mut iterates = vec![tell(&pieces, 0.0, 0)];
@@ -412,7 +419,7 @@ impl Line {
         let prediction = Prediction::of(self, t, ranges, method, &reference, before.map(|b| b.1))?;
         let converged = converged || stop.tolerance.is_none();
         let (path, mesh) = (path.meshes, iteration.glue(&pieces));
-        Ok(History { iterates, mesh, path, reference, observed, prediction, converged })
+        Ok(History { iterates, mesh, path, first, reference, observed, prediction, converged })
     }
 
     /// Refuses what is no mesh of the line: as many nodes as it has, from end to end, in order.
@@ -508,7 +515,7 @@ impl Path {
     }
 }
 
-fn distance(a: &Pieces, b: &Pieces) -> f64 {
+fn distance(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     let nodes = a.iter().flatten().zip(b.iter().flatten());
     nodes.fold(0.0, |m, (a, b)| if (a - b).is_nan() { f64::INFINITY } else { m.max((a - b).abs()) })
 }

@@ -1,3 +1,4 @@
+use super::beyond::Beyond;
 use super::chain::{Chain, End, Law, Step};
 use super::coarse;
 use crate::error::Failure;
@@ -21,7 +22,7 @@ pub enum Method {
     },
     /// Pieces that meet, with the flux of the rest of the domain as the law at their ends: I iterations.
     Optimal {
-        /// Panels of the trapezoidal rule for the integrals; exact where there are none.
+        /// Panels of the trapezoidal rule for the integrals; exact where there are none. In time there are no integrals.
         panels: Option<usize>,
     },
     /// Pieces that meet, with F ± p x as the law at their ends.
@@ -51,6 +52,8 @@ pub enum Coarse {
     None,
     /// A correction of the glued mesh on two coarse nodes an interface.
     Galerkin,
+    /// The same, as a change of ∫M instead of x: nothing overshoots, however M varies.
+    Integral,
 }
 
 /// p of Robin conditions.
@@ -60,7 +63,7 @@ pub enum Robin {
     Value(f64),
     /// M̃/α for two pieces, M̃ = M at the mean of both sides' last values; `Lagged` for more.
     Auto,
-    /// M̃/(1 − ξ) at the right end of a piece, M̃/ξ at the left end.
+    /// M̃/(1 − ξ) at the right end of a piece, M̃/ξ at the left end. In time M̃ √θ coth(√θ L), θ = τ/(Δt M̃), for M̃/L.
     Lagged,
 }
 
@@ -166,9 +169,9 @@ impl Iteration<'_> {
                 }
                 Ok((pieces, solves))
             }
-            Method::Classical { coarse: Coarse::Galerkin, .. } => {
+            Method::Classical { coarse: coarse @ (Coarse::Galerkin | Coarse::Integral), .. } => {
                 let (next, solves) = self.sweep(pieces)?;
-                let mesh = coarse::corrected(self, self.glue(&next))?;
+                let mesh = coarse::corrected(self, self.glue(&next), coarse)?;
                 Ok((self.cut(&mesh), solves + 1))
             }
             _ => self.sweep(pieces),
@@ -188,36 +191,50 @@ impl Iteration<'_> {
         Ok((next, solves))
     }
 
+    /// What a piece is told at its left end.
+    fn left_end(&self, pieces: &[Vec<f64>], s: usize) -> Result<End<'_>, Failure> {
+        let first = self.ranges[s][0];
+        match self.method {
+            _ if s == 0 => Ok(End::Value(pieces[0][0])),
+            Method::Classical { .. } => Ok(End::Value(pieces[s - 1][first - self.ranges[s - 1][0]])),
+            _ => self.end(pieces, s - 1, Side::Left),
+        }
+    }
+
+    /// What a piece is told at its right end.
+    pub fn right_end(&self, pieces: &[Vec<f64>], s: usize) -> Result<End<'_>, Failure> {
+        let [first, last] = self.ranges[s];
+        match (self.method, self.ranges.get(s + 1)) {
+            (_, None) => Ok(End::Value(pieces[s][last - first])),
+            (Method::Classical { .. }, Some(next)) => Ok(End::Value(pieces[s + 1][last - next[0]])),
+            _ => self.end(pieces, s, Side::Right),
+        }
+    }
+
     /// One piece from all.
     fn solve(&self, pieces: &[Vec<f64>], s: usize) -> Result<(Vec<f64>, usize), Failure> {
-        let [first, last] = self.ranges[s];
-        if let Method::Classical { linearized, .. } = self.method {
-            let own = &pieces[s];
-            let left = if s == 0 { own[0] } else { pieces[s - 1][first - self.ranges[s - 1][0]] };
-            let right = match self.ranges.get(s + 1) {
-                None => own[last - first],
-                Some(next) => pieces[s + 1][last - next[0]],
-            };
-            return match linearized {
-                true => Ok((self.chain.frozen(own, [left, right], self.step(s))?, 1)),
-                false => self.chain.solve(own, [End::Value(left), End::Value(right)], self.step(s)),
-            };
+        let ends = [self.left_end(pieces, s)?, self.right_end(pieces, s)?];
+        match (self.method, ends) {
+            (Method::Classical { linearized: true, .. }, [End::Value(left), End::Value(right)]) => {
+                Ok((self.chain.frozen(&pieces[s], [left, right], self.step(s))?, 1))
+            }
+            _ => self.chain.solve(&pieces[s], ends, self.step(s)),
         }
-        let ends = [
-            if s == 0 { End::Value(pieces[s][0]) } else { self.end(pieces, s - 1, Side::Left)? },
-            if s + 1 == pieces.len() { End::Value(pieces[s][last - first]) } else { self.end(pieces, s, Side::Right)? },
-        ];
-        self.chain.solve(&pieces[s], ends, self.step(s))
     }
 
     /// The law where pieces j and j + 1 meet, for the `Right` end of the left one or the `Left` end of the right one, with
     /// what the other knows.
-    fn end(&self, pieces: &[Vec<f64>], j: usize, side: Side) -> Result<End, Failure> {
-        let xi = self.ranges[j][1] as f64 / self.cells as f64;
+    fn end(&self, pieces: &[Vec<f64>], j: usize, side: Side) -> Result<End<'_>, Failure> {
+        let cut = self.ranges[j][1];
+        let xi = cut as f64 / self.cells as f64;
         let (left, right) = (&pieces[j], &pieces[j + 1]);
         let n = left.len() - 1;
-        let law = match self.method {
-            Method::Optimal { panels } => match side {
+        let law = match (self.method, self.old) {
+            (Method::Optimal { .. }, Some((old, ratio))) => Law::Beyond(match side {
+                Side::Right => Beyond { old: &old[cut..], ratio, cut_at_left: true },
+                Side::Left => Beyond { old: &old[..=cut], ratio, cut_at_left: false },
+            }),
+            (Method::Optimal { panels }, None) => match side {
                 Side::Right => Law::Rest { to: self.chain.ends[1], length: 1.0 - xi, panels },
                 Side::Left => Law::Rest { to: self.chain.ends[0], length: -xi, panels },
             },
@@ -226,22 +243,35 @@ impl Iteration<'_> {
                 Law::Robin { slope: if side == Side::Right { -p } else { p } }
             }
         };
-        let (flux, x) = match side {
-            Side::Right => (self.chain.flux(right[0], right[1])?, right[0]),
-            Side::Left => (self.chain.flux(left[n - 1], left[n])?, left[n]),
+        let (flux, x, sign) = match side {
+            Side::Right => (self.chain.flux(right[0], right[1])?, right[0], -1.0),
+            Side::Left => (self.chain.flux(left[n - 1], left[n])?, left[n], 1.0),
         };
-        Ok(End::Flux { g: flux - self.chain.law(law, x)?, law })
+        // in time the flux at the cut is that of the cell beside it, and what half a cell adds
+        let more = self.old.map_or(0.0, |(old, ratio)| Step { old, ratio }.half(self.chain.h, cut, x)[0]);
+        Ok(End::Flux { g: flux + sign * more - self.chain.law(law, x)?, law })
     }
 
+    /// p: for a flux that answers a node like that of the rest, M̃/L without time and M̃ √θ coth(√θ L), θ = τ/(Δt M̃), with it,
+    /// L the length of the rest.
     fn robin(&self, xi: f64, x: f64, side: Side) -> Result<f64, Failure> {
         let Method::Optimized { robin } = self.method else { return Ok(0.0) };
-        let m = || Ok(self.chain.density.at(self.chain.t, x)?[0]);
-        Ok(match (robin, side) {
-            (Robin::Value(p), _) => p,
-            (Robin::Auto, _) if self.ranges.len() == 2 => m()? / xi,
-            (_, Side::Right) => m()? / (1.0 - xi),
-            (_, Side::Left) => m()? / xi,
-        })
+        let like_rest = |length: f64| -> Result<f64, Failure> {
+            let m = self.chain.density.at(self.chain.t, x)?[0];
+            Ok(match self.old {
+                None => m / length,
+                Some((_, ratio)) => {
+                    let root = (ratio / m).sqrt();
+                    m * root / (root * length).tanh()
+                }
+            })
+        };
+        match (robin, side) {
+            (Robin::Value(p), _) => Ok(p),
+            (Robin::Auto, _) if self.ranges.len() == 2 => like_rest(xi),
+            (_, Side::Right) => like_rest(1.0 - xi),
+            (_, Side::Left) => like_rest(xi),
+        }
     }
 }
 

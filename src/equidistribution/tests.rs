@@ -301,3 +301,57 @@ fn coarse_correction() {
         }
     }
 }
+
+/// The correction of ∫M: no density makes it take many more iterations for many pieces than for two, not even one for which
+/// the correction of x takes more than a hundred.
+#[test]
+fn coarse_correction_of_the_integral() {
+    let method = |coarse| Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse };
+    let count = |text: &str, pieces: usize, coarse| {
+        let density = LineDensity::formula(text).unwrap();
+        let line = line(density, 8 * pieces + 2, FaceDensity::Trapezoid);
+        let ranges: Vec<[usize; 2]> = (0..pieces).map(|s| [8 * s, 8 * s + 10]).collect();
+        let history = iterate(&line, &ranges, method(coarse), until(1e-8));
+        assert!(history.converged, "{text}, {pieces} pieces");
+        history.count()
+    };
+    let spike = "1 + 100*exp(-1000*(x - 0.5)^2)";
+    assert!(count(spike, 16, Coarse::Galerkin) > 100);
+    for text in [spike, "x^2 + 1", "300*(x - 0.5)^2 + 1", "1 + 30*sin(pi*x)^2", "exp(-6*x)"] {
+        let counts = [2, 4, 8, 16, 32, 64].map(|pieces| count(text, pieces, Coarse::Integral));
+        assert!(counts.iter().all(|n| 2 * n <= 3 * counts[0].max(8)), "{text}: {counts:?}");
+    }
+}
+
+/// Optimal conditions in time end after as many iterations as pieces, optimised ones find the same mesh without a number
+/// set, and both find that of one domain: half cells at the cuts count.
+#[test]
+fn conditions_in_time() {
+    let line = line(square(), 96, FaceDensity::Trapezoid);
+    let old = line.mapped(|xi| xi * xi);
+    for ratio in [1.0, 100.0, 1e4] {
+        for pieces in [2, 3, 4] {
+            let cuts: Vec<[usize; 2]> = (0..pieces).map(|s| [s * 96 / pieces, (s + 1) * 96 / pieces]).collect();
+            let run = |method, stop| line.iterate(0.0, &cuts, method, &old, Some((&old, ratio)), stop).unwrap();
+            let optimal = run(Method::Optimal { panels: None }, exactly(pieces));
+            assert!(optimal.iterates[pieces].error < 1e-11, "{ratio}, {pieces}: {:e}", optimal.iterates[pieces].error);
+            let lagged = run(Method::Optimized { robin: Robin::Lagged }, until(1e-10));
+            assert!(lagged.converged && lagged.count() <= 2 * pieces + 8, "{ratio}, {pieces}: {}", lagged.count());
+        }
+    }
+}
+
+/// The bound of theorem 7.2 is of the parallel sweep: alternating, its square bounds two iterations.
+#[test]
+fn alternating_in_time_contracts_by_the_square() {
+    let line = line(square(), 100, FaceDensity::Trapezoid);
+    let old = line.mapped(|xi| xi * xi);
+    let run = |sweep| {
+        line.iterate(0.0, &two(45, 55), classical(sweep, false), &old, Some((&old, 1.0)), until(1e-11)).unwrap()
+    };
+    let [parallel, alternating] =
+        [Sweep::Parallel, Sweep::Alternating].map(|sweep| run(sweep).prediction.bound.unwrap());
+    assert!((alternating - parallel * parallel).abs() < 1e-12);
+    let observed = run(Sweep::Alternating).observed.unwrap();
+    assert!(observed <= alternating && observed > 0.9 * alternating, "{observed} against {alternating}");
+}

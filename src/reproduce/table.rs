@@ -9,6 +9,8 @@ pub struct Table {
     pub columns: Vec<String>,
     /// One string a column.
     pub rows: Vec<Vec<String>>,
+    /// How its verdicts are reached; empty where it has none.
+    pub rule: String,
     /// Said below it.
     pub notes: Vec<String>,
 }
@@ -18,6 +20,12 @@ impl Table {
     pub fn new(title: impl Into<String>, columns: &[&str]) -> Self {
         let columns = columns.iter().map(|c| c.to_string()).collect();
         Self { title: title.into(), columns, ..Self::default() }
+    }
+
+    /// With the rule of its verdicts.
+    pub fn ruled(mut self, rule: impl Into<String>) -> Self {
+        self.rule = rule.into();
+        self
     }
 
     /// Adds a row.
@@ -52,8 +60,11 @@ impl fmt::Display for Table {
             widths.iter().enumerate().map(|(c, &w)| if c == 0 { "-".repeat(w) } else { "-".repeat(w - 1) + ":" });
         line(f, &rules.collect::<Vec<_>>())?;
         self.rows.iter().try_for_each(|row| line(f, row))?;
-        if !self.notes.is_empty() {
+        if !self.rule.is_empty() || !self.notes.is_empty() {
             writeln!(f)?;
+        }
+        if !self.rule.is_empty() {
+            writeln!(f, "- verdict: {}", self.rule)?;
         }
         self.notes.iter().try_for_each(|note| writeln!(f, "- {note}"))
     }

@@ -16,20 +16,26 @@ use serde::{Deserialize, Serialize};
 /// piecewise linear interpolation, so that it follows ρ(x) rather than ρ(ξ). `iterations` = l > 1 is (MP)^l: mesh and
 /// physics are computed l times from the same old state, each time with ρ from the newest solution.
 ///
+/// With a `tolerance` ε > 0 both are the most: sub-steps are doubled, 1, 2, 4 …, until the mesh of twice as many differs by
+/// at most ε (M^vP, sub-steps as many as a step needs), and rounds end when the mesh of the next one does, (MP)^∞, which
+/// solves mesh and physics together. ε is a share of the longest side of the box.
+///
 /// # Source
 /// Section 5 of Bihlo, Haynes and Walsh (2015).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Coupling {
     /// k ≥ 1.
     pub mesh_steps: usize,
     /// l ≥ 1.
     pub iterations: usize,
+    /// ε ≥ 0; 0 for exactly k and l.
+    pub tolerance: f64,
 }
 
 impl Default for Coupling {
     fn default() -> Self {
-        Self { mesh_steps: 1, iterations: 1 }
+        Self { mesh_steps: 1, iterations: 1, tolerance: 0.0 }
     }
 }
 
@@ -37,14 +43,24 @@ impl Coupling {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless both are between 1 and 1000.
+    /// [`Error::Invalid`] unless both counts are between 1 and 1000, and the tolerance between 0 and 1.
     pub fn check(&self) -> Result<()> {
         for (key, value) in [("mesh_steps", self.mesh_steps), ("iterations", self.iterations)] {
             if !(1..=1000).contains(&value) {
                 return Err(Error::invalid(key, value, "must be between 1 and 1000"));
             }
         }
-        Ok(())
+        match self.tolerance {
+            0.0..=1.0 => Ok(()),
+            other => Err(Error::invalid("tolerance", other, "must be between 0, for none, and 1")),
+        }
+    }
+
+    /// Whether two meshes are the same for its tolerance.
+    fn same(&self, a: &Mesh<2>, b: &Mesh<2>) -> bool {
+        let longest = a.extent().into_iter().fold(0.0, f64::max);
+        let off = |(a, b): (&[f64; 2], &[f64; 2])| larger((a[0] - b[0]).abs(), a[1] - b[1]);
+        self.tolerance > 0.0 && a.x().iter().zip(b.x()).map(off).fold(0.0, larger) <= self.tolerance * longest
     }
 }
 
@@ -83,7 +99,8 @@ pub(super) fn attempt(
     let Stretch { t, dt, scale, estimated } = stretch;
     let Simulation { physics, monitor, mover, coupling, safety, schedule } = simulation;
     mover.care = safety.care();
-    let stride = Stride { dt, scale, parts: coupling.mesh_steps, share: 1.0 };
+    let doubled = coupling.tolerance > 0.0 && coupling.mesh_steps > 1;
+    let stride = Stride { dt, scale, parts: if doubled { 1 } else { coupling.mesh_steps }, share: 1.0 };
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
@@ -92,11 +109,24 @@ pub(super) fn attempt(
     let predicted = timed(&mut seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
     // a mesh whose way nobody has set goes no faster than is good for the solution
     let guarded = mover.equation.relaxation == Relaxation::Auto && !physics.is_given();
-    let mut latest = None;
+    type Round = (Mesh<2>, Field, Option<Vec<f64>>, Vec<f64>, f64);
+    let mut latest: Option<Round> = None;
     for _ in 0..coupling.iterations {
         let mut retries = Retries::default();
         let mixed = state.gait.mixed(&rho, mover.equation.relaxation);
-        let moved = timed(&mut seconds.mesh, || mover.relax(&predicted, &mixed, stride, &mut retries));
+        let mut moved = timed(&mut seconds.mesh, || mover.relax(&predicted, &mixed, stride, &mut retries));
+        let mut parts = stride.parts;
+        while let (true, Ok(coarse)) = (doubled && 2 * parts <= coupling.mesh_steps, &moved) {
+            parts *= 2;
+            let finer = Stride { parts, ..stride };
+            let again = timed(&mut seconds.mesh, || mover.relax(&predicted, &mixed, finer, &mut retries));
+            let done = again.as_ref().is_ok_and(|again| coupling.same(&again.mesh, &coarse.mesh));
+            work += coarse.work;
+            moved = again;
+            if done {
+                break;
+            }
+        }
         record.safety.substeps += retries.substeps;
         record.safety.smoothed += retries.smoothed;
         record.work.rejected_steps += retries.substeps + retries.smoothed;
@@ -114,7 +144,11 @@ pub(super) fn attempt(
         let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))?;
         work += cost;
         rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
+        let settled = latest.as_ref().is_some_and(|(last, ..)| coupling.same(last, &mesh));
         latest = Some((mesh, u, errors, mixed, share));
+        if settled {
+            break;
+        }
     }
     let (mesh, u, errors, mixed, share) = latest.expect("a coupling has at least one iteration");
     let gait = mover.learn(&state.gait, &predicted, &mesh, [mixed, followed], Stride { share, ..stride });

@@ -483,14 +483,15 @@ impl SchwarzTable {
             Classical => {
                 let sweep = *self.sweep.get_or_insert_default();
                 self.linearized.get_or_insert(false);
-                if *self.coarse.get_or_insert_default() == Coarse::Galerkin && sweep == Sweep::Alternating {
+                let coarse = *self.coarse.get_or_insert_default();
+                if coarse != Coarse::None && sweep == Sweep::Alternating {
                     let rule = "corrects all subdomains at once; set schwarz.sweep to \"parallel\"";
-                    return Err(Error::invalid("coarse", "\"galerkin\"", rule));
+                    return Err(Error::invalid("coarse", format!("\"{coarse:?}\"").to_lowercase(), rule));
                 }
             }
-            _ if in_time => {
-                let rule = "knows no time; leave [time] out, or set it to \"classical\"";
-                return Err(Error::invalid("method", format!("\"{:?}\"", self.method).to_lowercase(), rule));
+            Optimal if in_time && matches!(self.integral, Some(Integral::Trapezoid(_))) => {
+                let rule = "in time there is no integral, the rest of the line is solved; leave it out, or set it to \"exact\"";
+                return Err(Error::invalid("integral", "given", rule));
             }
             Optimal => {
                 let integral = *self.integral.get_or_insert_default();

@@ -1,7 +1,7 @@
 //! Moving fronts: the slides' problem, and exact solutions.
 
-use super::{Options, Rerun, Table};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::reproduce::{Options, Rerun, Table};
 use crate::simulation::{Curve, Figure};
 use crate::study::{FrontFinished, Source, StefanStudy};
 
@@ -12,10 +12,28 @@ fn compute(rest: &str) -> Result<FrontFinished> {
     StefanStudy::from_source(&Source::new("reproduced", text))?.compute()
 }
 
+/// The slides' problem up to a time, with settings of its front and its Laplacian.
+fn problem(across: usize, rows: usize, front: &str, end: f64) -> Result<FrontFinished> {
+    let report = if end > 0.17 { "0.07, 0.17, 0.85" } else { "" };
+    let report = if report.is_empty() { format!("{end:?}") } else { report.into() };
+    compute(&format!(
+        "front = \"1 + cos(x)/4\"\n[grid]\ncells = [{across}, {rows}, {rows}]\n\
+         [phase.lower]\ninitial = \"1 + cos(x)/4 - y\"\nboundary = \"1 + (t+1)*cos(x)/4\"\n\
+         [phase.upper]\ninitial = \"1 + cos(x)/4 - y\"\nboundary = \"-1 + (t/4-1)*cos(x)/4\"\n\
+         [front]\nmobility = 1.0\n{front}[time]\nend = {end:?}\nstep = 0.01\nreport = [{report}]\n"
+    ))
+}
+
+/// What the slides have: segments that shift along their normals, temperatures interpolated, their weights, no filter.
+const LITERAL: &str =
+    "method = \"segments\"\ntransfer = \"interpolate\"\nfilter = \"none\"\n[laplacian]\nkind = \"published\"\n";
+const SOUND: &str = "the slides print pictures of this problem and no number. “sound” where the front is symmetric to 1e-9, its fourth difference \
+     at the walls below 1e-4, and the gap of the energy balance 1 % or less at every time; else what is not";
+
 pub fn slides(options: Options) -> Result<Rerun> {
     let mut pictures = Vec::new();
     let mut table = Table::new(
-        "The slides' front at t = .85",
+        "The slides' front between ice and water, to t = .85",
         &[
             "columns × rows",
             "settings",
@@ -23,12 +41,16 @@ pub fn slides(options: Options) -> Result<Rerun> {
             "h(±1)",
             "asymmetry",
             "4th difference at the walls",
-            "energy",
-            "3-point",
+            "energy at .07",
+            ".17",
+            ".85",
+            "3-point at .85",
             "verdict",
         ],
-    );
+    )
+    .ruled(SOUND);
     let settings = [
+        ("segments, interpolate, no filter, published weights (literal)", LITERAL),
         ("(1,6,1)/8, as recommended", ""),
         ("(1,2,1)/4", "filter = [1, 2, 1]\n"),
         ("segments", "method = \"segments\"\n"),
@@ -39,72 +61,78 @@ pub fn slides(options: Options) -> Result<Rerun> {
     let grids: &[[usize; 2]] = if options.quick { &[[40, 20]] } else { &[[20, 10], [40, 20]] };
     for &[across, rows] in grids {
         for (name, front) in settings {
-            let finished = compute(&format!(
-                "front = \"1 + cos(x)/4\"\n[grid]\ncells = [{across}, {rows}, {rows}]\n\
-                 [phase.lower]\ninitial = \"1 + cos(x)/4 - y\"\nboundary = \"1 + (t+1)*cos(x)/4\"\n\
-                 [phase.upper]\ninitial = \"1 + cos(x)/4 - y\"\nboundary = \"-1 + (t/4-1)*cos(x)/4\"\n\
-                 [front]\nmobility = 1.0\n{front}[time]\nend = 0.85\nstep = 0.01\n"
-            ))?;
-            let size = format!("{} × {}", across + 1, rows + 1);
-            let (h, n) = (&finished.state.front, across);
-            let Some(report) = finished.summary.reports.last() else {
-                let why = finished.failure.map_or_else(String::new, |error| error.to_string());
-                table.row([size, name.into(), why]);
-                continue;
-            };
-            let asymmetry = (0..=n).map(|i| (h[i] - h[n - i]).abs()).fold(0.0, f64::max);
-            let fourth = (h[0] - 4.0 * h[1] + 6.0 * h[2] - 4.0 * h[3] + h[4]).abs();
-            let percent = |value: Option<f64>| value.map_or("–".into(), |value| format!("{:.2} %", 100.0 * value));
-            let asked = front.is_empty() && across == 40;
-            if asked {
+            let finished = problem(across, rows, front, 0.85)?;
+            table.row(front_row(format!("{} × {}", across + 1, rows + 1), name, &finished));
+            if front.is_empty() && across == 40 {
                 let named = ["stefan-slides", "stefan-slides-front"].map(String::from);
                 pictures.extend(named.into_iter().zip(finished.pictures("The slides' front")));
             }
-            let meets = (h[n / 2] - 1.2328).abs() <= 5e-4
-                && (h[0] - 1.2251).abs() <= 5e-4
-                && asymmetry <= 1e-12
-                && fourth < 1e-4
-                && report.energy_imbalance.is_some_and(|miss| miss <= 0.01);
-            let verdict = if !asked {
-                ""
-            } else if meets {
-                "meets 1.2328, 1.2251 ± 5e-4, 1 %"
-            } else {
-                "misses"
-            };
-            table.row([
-                size,
-                name.into(),
-                format!("{:.5}", h[n / 2]),
-                format!("{:.5}", h[0]),
-                format!("{asymmetry:.0e}"),
-                format!("{fourth:.1e}"),
-                percent(report.energy_imbalance),
-                percent(report.energy_imbalance_by_differences),
-                verdict.into(),
-            ]);
+        }
+    }
+    // the states that the slides show: after 7 and 17 steps
+    for (steps, end) in [(7, 0.07), (17, 0.17)] {
+        for (name, title, front) in [("literal", "literal", LITERAL), ("ours", "(1,6,1)/8", "")] {
+            let [state, _] = problem(40, 20, front, end)?.pictures(&format!("{title}, after {steps} steps"));
+            pictures.push((format!("stefan-slides-{steps}-steps-{name}"), state));
         }
     }
     table.note("energy: |ΔE − ∫F dt| / |ΔE| with fluxes through the walls by weighted residual, then by three rows");
-    table.note("the published initial temperature contradicts the no-flux sides: the front bends up there at first");
+    table.note(
+        "the published initial temperature contradicts the no-flux sides: the front bends up there at first, and the balance is off \
+         most while little heat has moved",
+    );
     Ok(Rerun { tables: vec![table], pictures })
+}
+
+fn front_row(size: String, name: &str, finished: &FrontFinished) -> Vec<String> {
+    let (h, n) = (&finished.state.front, finished.state.front.len() - 1);
+    let reports = &finished.summary.reports;
+    if let Some(failure) = &finished.failure {
+        let why = match failure {
+            Error::Failed { failure, moment } => {
+                format!("{}{}", failure.name(), moment.map_or(String::new(), |m| format!(" in step {}", m.step)))
+            }
+            other => other.to_string(),
+        };
+        let dash = std::iter::repeat_n("–".to_string(), 8);
+        return [size, name.into()].into_iter().chain(dash).chain([why]).collect();
+    }
+    let asymmetry = (0..=n).map(|i| (h[i] - h[n - i]).abs()).fold(0.0, f64::max);
+    let fourth = (h[0] - 4.0 * h[1] + 6.0 * h[2] - 4.0 * h[3] + h[4]).abs();
+    let percent = |value: Option<f64>| value.map_or("–".into(), |value| format!("{:.2} %", 100.0 * value));
+    let gaps: Vec<Option<f64>> = reports.iter().map(|report| report.energy_imbalance).collect();
+    let uneven = gaps.iter().flatten().any(|gap| *gap > 0.01);
+    let faults = [(asymmetry > 1e-9, "not symmetric"), (fourth >= 1e-4, "zig-zag at the walls"), (uneven, "energy")];
+    let faults: Vec<&str> = faults.into_iter().filter(|(is, _)| *is).map(|(_, what)| what).collect();
+    let gap = |k: usize| percent(gaps.get(k).copied().flatten());
+    vec![
+        size,
+        name.into(),
+        format!("{:.5}", h[n / 2]),
+        format!("{:.5}", h[0]),
+        format!("{asymmetry:.0e}"),
+        format!("{fourth:.1e}"),
+        gap(0),
+        gap(1),
+        gap(2),
+        percent(reports.last().and_then(|report| report.energy_imbalance_by_differences)),
+        if faults.is_empty() { "sound".into() } else { faults.join(", ") },
+    ]
 }
 
 pub fn exact(options: Options) -> Result<Rerun> {
     let (mut pictures, mut curves) = (Vec::new(), Vec::new());
     let cases = [
-        ("planar", "kind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\n", "", [1.5e-4, 3e-5]),
+        ("planar", "kind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\n", ""),
         (
             "tilted by 20°",
             "kind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\ntilt = 20.0\n",
             "[walls]\nsides = \"exact\"\n",
-            [2e-4, 5e-5],
         ),
         (
             "line source",
             "kind = \"line-source\"\nstrength = 8.0\nfar = -0.3\nstart_radius = 1.5\ncentre = [0.0, -0.5]\n",
             "[walls]\nsides = \"exact\"\n",
-            [3e-4, 7e-5],
         ),
     ];
     let variants = [
@@ -120,8 +148,9 @@ pub fn exact(options: Options) -> Result<Rerun> {
     let mut table = Table::new(
         "Largest error of the front against exact solutions, t₀ to t₀ + .1",
         &["case", "settings", "11 × 9", "21 × 17", "order", "41 × 33", "order", "temperature, last", "verdict"],
-    );
-    for (case, exact, walls, most) in cases {
+    )
+    .ruled("“second order” where every halving of the cells lowers the error of the front by order 1.7 or more; the slides have no exact solution");
+    for (case, exact, walls) in cases {
         for (name, more) in variants {
             // 41 columns take seconds: in the quick form only where they decide
             let decides = case == "line source" && (more.is_empty() || more.contains("laplacian"));
@@ -159,14 +188,11 @@ pub fn exact(options: Options) -> Result<Rerun> {
                 (_, Some(error)) => format!("{error:.2e}"),
             };
             let order = |k: usize| at(k).zip(at(k + 1)).map_or("".into(), |(a, b)| format!("{:.2}", (a / b).log2()));
-            let met = at(0).is_some_and(|e| e <= most[0])
-                && at(1).is_some_and(|e| e <= most[1])
-                && (found.len() < 3 || case != "line source" || at(2).is_some_and(|e| e <= 1.8e-5));
-            let verdict = match (&failure, more.is_empty()) {
-                (Some(crate::Error::Failed { failure, .. }), _) => failure.name(),
-                (_, false) => "",
-                (_, true) if met => "within the bounds",
-                _ => "misses",
+            let second = (0..found.len() - 1).all(|k| at(k).zip(at(k + 1)).is_some_and(|(a, b)| (a / b).log2() >= 1.7));
+            let verdict = match &failure {
+                Some(Error::Failed { failure, .. }) => failure.name(),
+                _ if second => "second order",
+                _ => "not second order",
             };
             table.row([
                 case.to_string(),
@@ -181,7 +207,7 @@ pub fn exact(options: Options) -> Result<Rerun> {
             ]);
         }
     }
-    table.note("steps of .01, .0025 and .000625; bounds: 1.5e-4 → 3e-5, 2e-4 → 5e-5, 3e-4 → 7e-5 → 1.8e-5");
+    table.note("steps of .01, .0025 and .000625: a quarter where the cells are halved");
     table.note("41 columns decide for the line source: stencils that are not exact for quadratics pass at 21 and are lost there, or have a temperature far off");
     let figure = Figure {
         title: "Largest error of the front after .1".into(),

@@ -1,0 +1,45 @@
+use super::chain::{Chain, End, Step, thomas};
+use crate::error::Failure;
+
+/// What lies beyond a cut, over a step in time: the optimal condition there
+///
+/// ```text
+/// φ(x) = M y_ξ at the cut,   (τ/Δt)(y − y_old) = (M y_ξ)_ξ beyond it,   y = x at the cut, y given at the other end
+/// ```
+///
+/// Without time φ is ∫M over the rest by its length, (4.3) of the source. With time no integral is left: φ costs a solve of the
+/// rest, and its derivative a linear one more.
+///
+/// # Source
+/// M. J. Gander and R. D. Haynes (2012), who leave the extension of section 4 to section 7 to the future.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Beyond<'a> {
+    /// Its nodes before the step.
+    pub old: &'a [f64],
+    /// τ/Δt.
+    pub ratio: f64,
+    /// Whether the cut is its left end.
+    pub cut_at_left: bool,
+}
+
+impl Beyond<'_> {
+    /// φ and φ′.
+    pub fn flux(self, chain: &Chain<'_>, x: f64) -> Result<[f64; 2], Failure> {
+        let Self { old, ratio, cut_at_left } = self;
+        let n = old.len() - 1;
+        let step = Step { old, ratio };
+        let ends = if cut_at_left { [x, old[n]] } else { [old[0], x] }.map(End::Value);
+        let (y, _) = chain.newton(old, ends, Some(step))?;
+        // how its nodes follow the one at the cut
+        let (_, rows) = chain.linearised(&y, ends, Some(step))?;
+        let mut right = vec![0.0; n + 1];
+        right[if cut_at_left { 0 } else { n }] = 1.0;
+        let follows = thomas(&rows, &right);
+        // the cell beside the cut, and the half cell up to it
+        let (first, cut, sign) = if cut_at_left { (0, 0, -1.0) } else { (n - 1, n, 1.0) };
+        let [flux, by_left, by_right] = chain.flux_of_cell(y[first], y[first + 1])?;
+        let [more, by_node] = step.half(chain.h, cut, x);
+        let slope = by_left * follows[first] + by_right * follows[first + 1];
+        Ok([flux + sign * more, slope + sign * by_node])
+    }
+}
