@@ -41,7 +41,7 @@ impl Reproduce {
                 Ok(_) => {}
                 // one item that ends takes no other with it where there is a page to say so
                 Err(error) if self.all && !matches!(error, Error::Unwritable { .. }) => {
-                    say(&format!("{}: {error}", item.name));
+                    say(format!("{}: {error}", item.name));
                     done.push(Done { item, outcome: Err(error.to_string()), seconds });
                 }
                 Err(error) => return Err(error),
@@ -51,7 +51,7 @@ impl Reproduce {
             return Ok(ExitCode::SUCCESS);
         }
         self.write("index.html", page(&done, self.quick).as_bytes())?;
-        say(&format!("{}", self.out.join("index.html").display()));
+        say(self.out.join("index.html").display());
         let failed = done.iter().any(|done| done.outcome.is_err());
         Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
     }

@@ -55,10 +55,10 @@ pub fn coupled() -> Result<Rerun> {
         for (count, ranges) in [(2, pair.as_slice()), (4, four.as_slice())] {
             for (kind, method) in [("nonlinear", NONLINEAR), ("linearised", LINEARISED)] {
                 for iterations in [Some(1), Some(2), Some(4), Some(8), None] {
-                    // iterations that fold or hardly converge take minutes, and say no more than the nonlinear ones
-                    if iterations.is_none() && (method == LINEARISED || together && count > 2)
-                        || together && iterations > Some(2)
-                    {
+                    // linearised iterations to the end, and rounds of many, take minutes
+                    let few = !together
+                        || method == NONLINEAR && (iterations == Some(2) || iterations.is_none() && count == 2);
+                    if !few || iterations.is_none() && method == LINEARISED {
                         continue;
                     }
                     let how = match iterations {

@@ -3,7 +3,7 @@
 use super::table_2::state_of;
 use super::{BURGERS, PERIODIC, RESIDUAL, WHOLE, ended, settings, stochastic, study};
 use crate::error::Result;
-use crate::meshing::{EstimatorKind, MonteCarlo};
+use crate::meshing::{EstimatorKind, Mmpde, MonteCarlo};
 use crate::reproduce::{InterfaceStep, Options, Rerun, Table};
 use crate::study::compute;
 
@@ -105,7 +105,7 @@ fn paths() -> Result<Table> {
     )
     .ruled(
         "paths for an error of 5 % of the shortest edge, by N^(−1/2). “holds” where the periodic mesh needs fewer than the bounded one \
-         with the same step; both boxes have the same number of cells and the equation the same ξ in [0, 1]²",
+         of its row or of the row above; both boxes have the same number of cells and the equation the same ξ in [0, 1]²",
     );
     let bounded = settings(&[
         "monitor.strength={relative=10.0}",
@@ -117,36 +117,42 @@ fn paths() -> Result<Table> {
     let periodic = settings(&["time.end=0.85", "time.report=[0.85]", WHOLE]);
     let [front, wave] = [state_of(&study(BURGERS, &bounded)?)?, state_of(&study(PERIODIC, &periodic)?)?];
     let kind = EstimatorKind::MonteCarlo(MonteCarlo::new(1000, 10));
-    for dt in [1e-3, 5e-3] {
-        let mut of_bounded = f64::NAN;
-        for (name, state) in [("Burgers, bounded, t = .75", &front), ("Burgers, periodic, t = .85", &wave)] {
-            let equation = crate::meshing::Mmpde::default();
-            let step = InterfaceStep::new(state.mesh.clone(), state.rho.clone(), equation, dt, [4, 4])?;
+    let mut needed = [[f64::NAN; 2]; 2];
+    for (at, dt) in [1e-3, 5e-3].into_iter().enumerate() {
+        for (which, (name, state)) in
+            [("Burgers, bounded, t = .75", &front), ("Burgers, periodic, t = .85", &wave)].into_iter().enumerate()
+        {
+            let step = InterfaceStep::new(state.mesh.clone(), state.rho.clone(), Mmpde::default(), dt, [4, 4])?;
             let found = step.measure(kind.estimator(), 2)?;
             let share = found.error / step.shortest_edge();
-            let needed = 1000.0 * (share / 0.05).powi(2);
-            let is_bounded = of_bounded.is_nan();
-            if is_bounded {
-                of_bounded = needed;
-            }
-            let verdict = match is_bounded {
-                true => "",
-                false if needed < of_bounded => "holds",
-                false => "does not hold",
-            };
+            needed[at][which] = 1000.0 * (share / 0.05).powi(2);
             table.row([
                 name.to_string(),
                 format!("{dt}"),
                 format!("{:.1e}", found.error),
                 format!("{:.0} %", 100.0 * share),
-                format!("{needed:.0}"),
-                verdict.into(),
+                format!("{:.0}", needed[at][which]),
+                if which == 1 { fewer(needed[at][1], needed[at][0]) } else { String::new() },
             ]);
         }
     }
+    // the paper's steps: 1e-3 on the bounded domain, 5e-3 on the periodic one
+    let [own, bounded] = [needed[1][1], needed[0][0]];
+    let dash = || "–".to_string();
+    table.row([
+        "periodic at 5e-3 beside bounded at 1e-3, the paper's own steps".to_string(),
+        dash(),
+        dash(),
+        dash(),
+        format!("{own:.0} beside {bounded:.0}"),
+        fewer(own, bounded),
+    ]);
     table.note(
-        "a path that leaves a bounded domain stops there, and pays a value without noise; none does on a periodic one. The paper's own steps \
-         are 1e-3 on the bounded domain and 5e-3 on the periodic ones",
+        "a path that leaves a bounded domain stops there, and pays a value without noise; none does on a periodic one",
     );
     Ok(table)
+}
+
+fn fewer(periodic: f64, bounded: f64) -> String {
+    if periodic < bounded { "holds" } else { "does not hold" }.into()
 }

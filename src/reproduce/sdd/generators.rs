@@ -37,12 +37,15 @@ fn by_inverse(line: &Line) -> Result<Vec<f64>> {
     Ok((0..=n).map(place).collect())
 }
 
+/// Makes a density.
+type Density = fn() -> Result<LineDensity>;
+
 fn inverse() -> Result<Table> {
     let mut table = Table::new(
         "(2.1) and (2.2): the nonlinear generator of x(ξ), and the linear one of ξ(x) turned round by linear interpolation",
         &["ρ", "cells", "error of x, (2.1)", "order", "error of x, (2.2)", "order", "Newton steps of (2.1)"],
     );
-    let densities: [(&str, fn() -> Result<LineDensity>); 3] = [
+    let densities: [(&str, Density); 3] = [
         ("x² + 1", || LineDensity::formula("x^2 + 1")),
         ("boundary layer", || LineDensity::arclength("(1 - exp(20*x)) / (1 - exp(20))")),
         ("1 + 100 exp(−1000(x − ½)²)", || LineDensity::formula("1 + 100*exp(-1000*(x - 0.5)^2)")),

@@ -85,8 +85,8 @@ pub fn table_2(options: Options) -> Result<Vec<Table>> {
          the developed mesh at t = .3; the fastest of several steps. The row of one domain stands under the residual walk",
     );
     table.note(
-        "the paper does not print N and M for this table: those of table 1 are taken. Its share of points a subdomain falls like its \
-         own times from 2 × 2 to 16 × 16, so that points were most likely shared as here",
+        "the paper does not print N and M for this table: those of table 1 are taken. Its times fall from 2 × 2 to \
+         16 × 16 subdomains to about a fourth, as an even share of the points does: points were probably shared as here",
     );
     if options.quick {
         table.note("quick: 81² only");
