@@ -89,7 +89,7 @@ fn strips_are_the_opponent_to_beat() {
     let walks = measure(&ResidualWalk::default(), 20);
     assert!(walks.error < 3e-7 && walks.exchanges == 1, "{walks:?}");
     assert_near(walks.standard_error, walks.error, 0.25);
-    assert!(walks.evaluations < 75.0 && walks.handed_on < 0.5, "{walks:?}");
+    assert!(walks.evaluations < 75.0 && walks.handed_on < 1.0, "{walks:?}");
 }
 
 /// The default and the strip stay far below the shortest edge for any stiffness from a = .5 to 100.

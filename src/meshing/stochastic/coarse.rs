@@ -4,7 +4,6 @@ use super::super::overlap::share_of_largest;
 use super::Problem;
 use crate::error::Failure;
 use crate::geometry::{Lattice, Patch};
-use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use crate::parallel;
 use crate::work::Work;
@@ -67,21 +66,24 @@ impl Coarse {
         self.far.prepare(problem, &near).map(|_| ())
     }
 
-    /// The correction at all fine nodes for a residual there, zero on bounded sides, and the largest of what the
-    /// extrapolation changed. `size` is the largest coordinate along each axis.
+    /// The correction at all fine nodes for a residual there, zero on bounded sides, and what the extrapolation
+    /// changed as a share of it, root mean squares both. `size` is the largest coordinate along each axis.
     pub fn correction(&mut self, residual: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, f64, Work), Failure> {
         let near = self.near.down.apply(residual);
         let far = self.far.down.apply(&near);
         let (mut c, mut work) = self.near.solve(&near, size)?;
         let (rough, cost) = self.far.solve(&far, size)?;
         work += cost;
-        let mut changed = 0.0;
+        let (mut changed, mut all) = (0.0, 0.0);
         for (c, rough) in c.iter_mut().zip(self.far.up.apply(&rough)) {
-            let change = [0, 1].map(|k| self.gain * (c[k] - rough[k]));
-            changed = change.into_iter().fold(changed, larger);
-            (0..2).for_each(|k| c[k] += change[k]);
+            for k in 0..2 {
+                let change = self.gain * (c[k] - rough[k]);
+                c[k] += change;
+                (changed, all) = (changed + change * change, all + c[k] * c[k]);
+            }
         }
-        Ok((self.near.up.apply(&c), changed, work))
+        let share = if all > 0.0 { (changed / all).sqrt() } else { 0.0 };
+        Ok((self.near.up.apply(&c), share, work))
     }
 }
 
