@@ -216,7 +216,7 @@ fn a_line_tells_of_its_progress() {
 /// What fails in the run of [compare] is not called a failure of the run itself, which is whole.
 #[test]
 fn a_failure_of_the_compared_run_is_told_apart() {
-    let run = Run::failing(&["compare.generator={kind=\"schwarz\",subdomains=[3,3],iterations=1}"]);
+    let run = Run::failing(&["compare.generator={kind=\"schwarz\",subdomains=[3,3],iterations=1,tolerance=1e-12}"]);
     let summary: serde_json::Value = serde_json::from_str(&run.text("summary.json")).unwrap();
     let told = |key: &str| summary["error"][key].as_str().unwrap_or_default().to_string();
     assert!(told("message").contains("the run itself is complete; in the one of [compare]: "), "{summary:#}");

@@ -86,11 +86,14 @@ def test_monitors_by_name_by_array_and_by_function_are_the_same():
     ],
 )
 def test_subdomains_give_the_mesh_of_the_whole_domain(method):
-    """Within six standard errors; paths are continuous in time and have a bias besides."""
+    """Within six standard errors; paths are continuous in time and have a bias, strips leave up to a hundredth of an edge."""
     whole, divided, again = (MeshGenerator(Arclength(), m, 1.0, "gradient") for m in (Whole(), method, method))
     mesh = follow(divided, steps=1, dt=1e-3)
     interface = divided.last["interface"]
-    bias = 1e-3 if isinstance(getattr(method, "estimator", None), MonteCarlo) else 1e-9
+    estimator = getattr(method, "estimator", None)
+    edge = min(np.diff(mesh.x, axis=0).min(), np.diff(mesh.y, axis=1).min())
+    local = isinstance(method, Stochastic) and (estimator is None or isinstance(estimator, (ResidualWalk, Strip)))
+    bias = 1e-3 if isinstance(estimator, MonteCarlo) else 0.01 * edge if local else 1e-9
     assert interface["points"] > 0
     assert np.abs(mesh.x - follow(whole, steps=1, dt=1e-3).x).max() < 6 * (interface["standard_error"] or 0) + bias
     assert mesh == follow(again, steps=1, dt=1e-3)
