@@ -282,10 +282,13 @@ fn around<T>(x: &mut [T], start: usize, n: usize) -> (&[T], &mut [T], &[T]) {
     (before, here, after)
 }
 
+/// A pencil of values, and the edges that lead there.
+type Neighbours<'a, const K: usize> = (&'a [[f64; K]], &'a [f64]);
+
 /// The neighbours of a pencil and the edges that lead there.
 struct Row<'a, const D: usize, const K: usize> {
     /// For each axis but the last: the pencils below and above, and the edges to them.
-    across: [[(&'a [[f64; K]], &'a [f64]); 2]; D],
+    across: [[Neighbours<'a, K>; 2]; D],
     /// Edges between its nodes.
     along: &'a [f64],
 }
