@@ -103,8 +103,9 @@ fn case_b_by_residual_walks() {
     let published = |walks: usize| {
         format!("mesh.generator.estimator={{kind=\"residual-walk\", sweeps=4, smoother=\"jacobi\", walks={walks}}}")
     };
-    // the strips of the default are solved, those of the published one are swept
-    for (settings, rms, solves) in [(vec![], 1e-6, 70_001), (vec![published(10)], 3e-5, 38_001)] {
+    // the strips of the default are solved, two right-hand sides each but where the first step leaves six of them at rest;
+    // those of the published one are swept
+    for (settings, rms, solves) in [(vec![], 1e-6, 69_989), (vec![published(10)], 3e-5, 38_001)] {
         let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
         let summary = rerun_set(name, &settings, &mut Node::default());
         assert_row(name, "l_inf", linf(&summary), [0.01032, 0.01066, 0.01375], [0.005; 3]);

@@ -14,8 +14,9 @@ use crate::work::Work;
 /// M_H c_H = R r on the whole coarse lattice,   c ≈ P (c_H + q (c_H − P c_2H)),   q = (H² − h²) / ((2H)² − H²)
 /// ```
 ///
-/// R weighs fine values by the hat function of a coarse node, P is the cubic through four coarse nodes along each axis.
-/// M_H is the mesh equation itself on the coarse lattice with the mean density. Its error grows like H², and a second
+/// R weighs fine values by ρ and the hat function of a coarse node, P is the cubic through four coarse nodes along each
+/// axis. M_H is the mesh equation itself on the coarse lattice with the mean density. Residuals of the mesh equation add
+/// up to zero when weighted by ρ, or what the sides leave: without the weight a mesh on periodic axes would be shifted. Its error grows like H², and a second
 /// lattice of twice the spacing says how much it is: Richardson's extrapolation to the spacing h of the fine lattice,
 /// for which the right-hand sides need to be gathered only once.
 #[derive(Debug, Clone)]
@@ -34,10 +35,14 @@ struct Level {
     up: Transfer,
     matrix: LatticeMatrix<2, 5>,
     plane: Robust<2>,
+    /// Of the next finer lattice, and here.
+    densities: [Vec<[f64; 1]>; 2],
 }
 
 /// Fewest cells of a coarse axis: the cubic has four nodes.
 pub(super) const FEWEST_CELLS: usize = 4;
+/// Cells of an axis with fewer of which both lattices may miss the same layer, and agree.
+const ENOUGH_CELLS: usize = 16;
 /// Residual at which coarse lattices and strips count as solved, as a share of the largest that they start with. With
 /// much more, what is left of it is round-off blown up: ten times the density would give another mesh.
 pub(super) const SOLVED: f64 = 1e-7;
@@ -54,6 +59,11 @@ impl Coarse {
         Some(Self { near, far, gain })
     }
 
+    /// True where the coarser lattice is fine enough for the difference between both to say something of their errors.
+    pub fn knows_its_error(&self) -> bool {
+        self.far.lattice.cells().iter().all(|&n| n >= ENOUGH_CELLS)
+    }
+
     /// Numbers that are gathered for the coarse right-hand side, one a coarse node for each coordinate.
     pub fn len(&self) -> usize {
         Patch::whole(&self.near.lattice).len()
@@ -61,16 +71,15 @@ impl Coarse {
 
     /// Sets up the equation of a step.
     pub fn prepare(&mut self, problem: &Problem<'_>) -> Result<(), Failure> {
-        let rho: Vec<[f64; 1]> = problem.rho.iter().map(|&rho| [rho]).collect();
-        let near = self.near.prepare(problem, &rho)?;
-        self.far.prepare(problem, &near).map(|_| ())
+        self.near.prepare(problem, problem.rho.as_chunks::<1>().0)?;
+        self.far.prepare(problem, &self.near.densities[1])
     }
 
     /// The correction at all fine nodes for a residual there, zero on bounded sides, and what the extrapolation
     /// changed as a share of it, root mean squares both. `size` is the largest coordinate along each axis.
     pub fn correction(&mut self, residual: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, f64, Work), Failure> {
-        let near = self.near.down.apply(residual);
-        let far = self.far.down.apply(&near);
+        let near = self.near.restrict(residual);
+        let far = self.far.restrict(&near);
         let (mut c, mut work) = self.near.solve(&near, size)?;
         let (rough, cost) = self.far.solve(&far, size)?;
         work += cost;
@@ -97,22 +106,30 @@ impl Level {
         let down = Transfer::new([0, 1].map(|d| hats(fine, &lattice, d)), fine.nodes()[1]);
         let up = Transfer::new([0, 1].map(|d| cubics(fine, &lattice, d)), lattice.nodes()[1]);
         let matrix = LatticeMatrix::zero(Patch::whole(&lattice));
-        Some(Self { lattice, down, up, matrix, plane: Robust::default() })
+        Some(Self { lattice, down, up, matrix, plane: Robust::default(), densities: Default::default() })
     }
 
-    /// Takes the density of the next finer lattice and returns the one here.
-    fn prepare(&mut self, problem: &Problem<'_>, rho: &[[f64; 1]]) -> Result<Vec<[f64; 1]>, Failure> {
-        let rho = self.down.apply(rho);
-        let flat: Vec<f64> = rho.as_flattened().to_vec();
+    /// Sets up the equation with the mean of a density on the next finer lattice.
+    fn prepare(&mut self, problem: &Problem<'_>, fine: &[[f64; 1]]) -> Result<(), Failure> {
+        self.densities = [fine.to_vec(), self.down.apply(fine)];
+        let rho = self.densities[1].as_flattened();
         let mut equation = *problem.equation;
-        let mut operator = equation.operator(&self.lattice, &flat, problem.dt)?;
+        let mut operator = equation.operator(&self.lattice, rho, problem.dt)?;
         if operator.negative_weight().is_some() {
             // too steep for the coarse cells in this form, never in the other one of the same equation
             equation.form = Form::Conservative;
-            operator = equation.operator(&self.lattice, &flat, problem.dt)?;
+            operator = equation.operator(&self.lattice, rho, problem.dt)?;
         }
         self.matrix = operator.matrix(Patch::whole(&self.lattice));
-        Ok(rho)
+        Ok(())
+    }
+
+    /// Means of values on the next finer lattice, weighted by the density.
+    fn restrict(&self, values: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let [fine, here] = &self.densities;
+        let weighted: Vec<[f64; 2]> = values.iter().zip(fine).map(|(v, [rho])| v.map(|v| rho * v)).collect();
+        let sums = self.down.apply(&weighted);
+        sums.into_iter().zip(here).map(|(sum, [rho])| sum.map(|sum| sum / rho)).collect()
     }
 
     fn solve(&mut self, right: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, Work), Failure> {
@@ -230,9 +247,9 @@ mod tests {
         };
         let up = Transfer::new([0, 1].map(|d| cubics(&fine, &coarse, d)), coarse.nodes()[1]);
         let (plain, shifted) = (up.apply(&wave(&coarse, 0)), up.apply(&wave(&coarse, 1)));
-        for k in 0..fine.len() {
+        for (k, [shifted]) in shifted.iter().enumerate() {
             let [i, j] = fine.node(k);
-            assert!((plain[fine.index([(i + 2) % 24, j])][0] - shifted[k][0]).abs() < 1e-14);
+            assert!((plain[fine.index([(i + 2) % 24, j])][0] - shifted).abs() < 1e-14);
         }
     }
 }

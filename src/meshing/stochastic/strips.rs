@@ -58,8 +58,9 @@ pub(super) const BEYOND: f64 = 1e-3;
 const WIDE: usize = 10;
 /// Width of a strip and ratio of the coarse lattice where ℓ asks for more.
 const FEW: Reach = Reach { width: 8, coarse: 2 };
-/// What narrow strips leave of a correction, about: less than two coarse cells, between which the guess is rough.
-const LEFT_BY_NARROW_STRIPS: f64 = 0.1;
+/// What a coarse lattice leaves of a correction where it cannot tell, and what is left by strips narrower than two coarse
+/// cells, between which the guess is rough.
+const LEFT_IN_DOUBT: f64 = 0.1;
 /// Error that exchanges leave, as a share of the shortest edge of the mesh.
 const LEFT: f64 = 1e-2;
 /// Exchanges in a step: more gain nothing where these have not.
@@ -163,8 +164,11 @@ impl Strips {
             }
             let done = match exchanges {
                 Some(n) => found.exchanges >= n,
-                // not `>=`: what is not finite has not shrunk either
-                None => found.left <= limit || !(change < before) || found.exchanges == MOST_EXCHANGES,
+                None => {
+                    // what is not finite has not shrunk either
+                    let shrinks = change < before;
+                    found.left <= limit || !shrinks || found.exchanges == MOST_EXCHANGES
+                }
             };
             if done {
                 return Ok(found);
@@ -181,12 +185,11 @@ impl Strips {
     }
 
     /// What the coarse lattice is off by, as a share of the largest correction, about: the extrapolation changed the share
-    /// s, the term in H², and the next one goes with its square: ten times that was seen on case B from 81² to 321² nodes,
-    /// twenty and more where twenty cells hold a bump.
+    /// s, the term in H², and the next one goes with its square: ten times that was seen on case B from 81² to 321² nodes.
     fn left_by_coarse(&self, s: f64) -> f64 {
         let narrow = self.reach.width < 2 * self.reach.coarse;
-        let least = if narrow { LEFT_BY_NARROW_STRIPS } else { 0.0 };
-        (30.0 * s * s).clamp(least, 1.0)
+        let doubtful = narrow || !self.coarse.as_ref().is_some_and(Coarse::knows_its_error);
+        (30.0 * s * s).clamp(if doubtful { LEFT_IN_DOUBT } else { 0.0 }, 1.0)
     }
 
     fn exchange(&mut self, problem: &Problem<'_>, local: Local, found: &mut Corrected) -> Result<(), Failure> {
