@@ -152,7 +152,7 @@ fn strips_read_what_they_count() {
     assert_eq!(strips.gathered(), 19 * 19);
 }
 
-/// A fiftieth of doing nothing after one exchange, whatever the form, the sides, the size, the division and the stiffness,
+/// A thirtieth of doing nothing after one exchange, whatever the form, the sides, the size, the division and the stiffness,
 /// and a hundredth of the shortest edge by as many as it takes; the same bits from strips that are used again.
 #[test]
 fn strips_are_good_at_any_stiffness() {
@@ -163,7 +163,7 @@ fn strips_are_good_at_any_stiffness() {
                 let strip = Strip { exchanges: Auto::Value(1), ..Strip::default() };
                 let (found, mut strips) = step.estimate(&strip);
                 let (error, still) = (step.error(|p| found.points[p].x), step.do_nothing());
-                assert!(error < still / 50.0, "{periodic:?}, {cells:?}, Δt = {dt}: {error:e} of {still:e}");
+                assert!(error < still / 30.0, "{periodic:?}, {cells:?}, Δt = {dt}: {error:e} of {still:e}");
                 let (enough, _) = step.estimate(&Strip::default());
                 let (error, edge) = (step.error(|p| enough.points[p].x), step.mesh.shortest_edge());
                 assert!(enough.exchanges == 1 || dt > 1e-4, "{} exchanges", enough.exchanges);
