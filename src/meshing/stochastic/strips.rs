@@ -12,7 +12,8 @@ use crate::work::Work;
 /// Subdomains that see a strip of their neighbours, with the memory of their solvers
 ///
 /// In one exchange every subdomain reads mesh and density in a strip of `width` nodes around it, corrects the mesh on
-/// itself and the strip, each by itself, and keeps what it answers for. The influence of a node at distance d falls like
+/// itself and the strip, each by itself, and keeps what it answers for. The influence of a node at distance d falls
+/// like
 ///
 /// ```text
 /// e^(−θ d/h),   cosh θ = 1 + h²/(2 ℓ²),   ℓ = √(Δt/τ)
@@ -61,8 +62,8 @@ pub(super) const BEYOND: f64 = 1e-3;
 const WIDE: usize = 10;
 /// Width of a strip and ratio of the coarse lattice where ℓ asks for more.
 const FEW: Reach = Reach { width: 8, coarse: 2 };
-/// What a coarse lattice leaves of a correction where it cannot tell, and what is left by strips narrower than two coarse
-/// cells, between which the guess is rough.
+/// What a coarse lattice leaves of a correction where it cannot tell, and what is left by strips narrower than two
+/// coarse cells, between which the guess is rough.
 const LEFT_IN_DOUBT: f64 = 0.1;
 /// Error that exchanges leave, as a share of the shortest edge of the mesh.
 const LEFT: f64 = 1e-2;
@@ -116,8 +117,8 @@ impl Strips {
         self.parts.iter().map(|part| part.read(lattice)).max().unwrap_or(0)
     }
 
-    /// Unknowns of the lattice that is solved whole, whose right-hand sides are gathered in an exchange; 0 where there is
-    /// none.
+    /// Unknowns of the lattice that is solved whole, whose right-hand sides are gathered in an exchange; 0 where there
+    /// is none.
     pub fn gathered(&self) -> usize {
         let whole = self.whole.as_ref().map_or(0, |whole| whole.patch.len());
         self.coarse.as_ref().map_or(whole, Coarse::len)
@@ -198,8 +199,9 @@ impl Strips {
         divided.map(|d| (-decay[d] * self.reach.width as f64).exp()).fold(0.0, f64::max)
     }
 
-    /// What the coarse lattice is off by, as a share of the largest correction, about: the extrapolation changed the share
-    /// s, the term in H², and the next one goes with its square: ten times that was seen on case B from 81² to 321² nodes.
+    /// What the coarse lattice is off by, as a share of the largest correction, about: the extrapolation changed the
+    /// share s, the term in H², and the next one goes with its square: ten times that was seen on case B from 81² to
+    /// 321² nodes.
     fn left_by_coarse(&self, s: f64) -> f64 {
         let narrow = self.reach.width < 2 * self.reach.coarse;
         let doubtful = narrow || !self.coarse.as_ref().is_some_and(Coarse::knows_its_error);

@@ -115,8 +115,8 @@ fn what_lies_beyond_a_strip_does_not_matter() {
     }
 }
 
-/// A subdomain reads its strip and the ring around it, and nothing further away: what is read is counted by the formula,
-/// and a mesh that is changed anywhere else gives the same bits.
+/// A subdomain reads its strip and the ring around it, and nothing further away: what is read is counted by the
+/// formula, and a mesh that is changed anywhere else gives the same bits.
 #[test]
 fn strips_read_what_they_count() {
     for (cells, subdomains, width) in [(40, 4, 4), (40, 4, 8), (60, 3, 5), (64, 8, 2)] {
@@ -152,8 +152,9 @@ fn strips_read_what_they_count() {
     assert_eq!(strips.gathered(), 19 * 19);
 }
 
-/// A thirtieth of doing nothing after one exchange, whatever the form, the sides, the size, the division and the stiffness,
-/// and a hundredth of the shortest edge by as many as it takes; the same bits from strips that are used again.
+/// A thirtieth of doing nothing after one exchange, whatever the form, the sides, the size, the division and the
+/// stiffness, and a hundredth of the shortest edge by as many as it takes; the same bits from strips that are used
+/// again.
 #[test]
 fn strips_are_good_at_any_stiffness() {
     for (equation, periodic) in forms().into_iter().flat_map(|form| SIDES.map(|periodic| (form, periodic))) {
