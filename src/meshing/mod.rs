@@ -5,6 +5,7 @@ mod fixed;
 mod mmpde;
 mod overlap;
 mod relaxation;
+mod ring;
 mod schwarz;
 mod sides;
 mod stochastic;
@@ -103,7 +104,8 @@ pub struct Interface {
 pub struct Contraction {
     /// Iterations done.
     pub iterations: usize,
-    /// Bound on the factor by which an iteration shrinks the error, from the operator itself; none of optimised conditions.
+    /// Bound on the factor by which an iteration shrinks the error, from the operator itself; none of optimised
+    /// conditions.
     pub predicted: Option<f64>,
     /// Geometric mean of the factors seen between the first and the last change.
     pub observed: f64,

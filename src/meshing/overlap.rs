@@ -11,8 +11,8 @@ use crate::work::Work;
 
 /// A subdomain with a part of its neighbours
 ///
-/// It solves M c = r for a correction c of the mesh, given on the ring around it. Corrections are the same on both sides
-/// of the seam of a periodic axis, and zero on the sides of the domain.
+/// It solves M c = r for a correction c of the mesh, given on the ring around it. Corrections are the same on both
+/// sides of the seam of a periodic axis, and zero on the sides of the domain.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     pub patch: Patch<2>,

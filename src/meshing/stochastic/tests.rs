@@ -115,8 +115,8 @@ fn what_lies_beyond_a_strip_does_not_matter() {
     }
 }
 
-/// A subdomain reads its strip and the ring around it, and nothing further away: what is read is counted by the formula,
-/// and a mesh that is changed anywhere else gives the same bits.
+/// A subdomain reads its strip and the ring around it, and nothing further away: what is read is counted by the
+/// formula, and a mesh that is changed anywhere else gives the same bits.
 #[test]
 fn strips_read_what_they_count() {
     for (cells, subdomains, width) in [(40, 4, 4), (40, 4, 8), (60, 3, 5), (64, 8, 2)] {
@@ -152,8 +152,9 @@ fn strips_read_what_they_count() {
     assert_eq!(strips.gathered(), 19 * 19);
 }
 
-/// A fortieth of doing nothing after one exchange, whatever the form, the sides, the size, the division and the stiffness,
-/// and about a hundredth of the shortest edge by as many as it takes; the same bits from strips that are used again.
+/// A thirtieth of doing nothing after one exchange, whatever the form, the sides, the size, the division and the
+/// stiffness, and a hundredth of the shortest edge by as many as it takes; the same bits from strips that are used
+/// again.
 #[test]
 fn strips_are_good_at_any_stiffness() {
     for (equation, periodic) in forms().into_iter().flat_map(|form| SIDES.map(|periodic| (form, periodic))) {
@@ -163,11 +164,11 @@ fn strips_are_good_at_any_stiffness() {
                 let strip = Strip { exchanges: Auto::Value(1), ..Strip::default() };
                 let (found, mut strips) = step.estimate(&strip);
                 let (error, still) = (step.error(|p| found.points[p].x), step.do_nothing());
-                assert!(error < still / 40.0, "{periodic:?}, {cells:?}, Δt = {dt}: {error:e} of {still:e}");
+                assert!(error < still / 30.0, "{periodic:?}, {cells:?}, Δt = {dt}: {error:e} of {still:e}");
                 let (enough, _) = step.estimate(&Strip::default());
                 let (error, edge) = (step.error(|p| enough.points[p].x), step.mesh.shortest_edge());
                 assert!(enough.exchanges == 1 || dt > 1e-4, "{} exchanges", enough.exchanges);
-                assert!(error < 0.02 * edge, "{periodic:?}, {cells:?}, Δt = {dt}: {error:e} of {edge:e}");
+                assert!(error < 0.01 * edge, "{periodic:?}, {cells:?}, Δt = {dt}: {error:e} of {edge:e}");
                 let points = step.decomposition.points();
                 let again = strip.estimate(&step.problem(1), &points, &mut strips).unwrap();
                 let x = |found: &Estimates| found.points.iter().map(|estimate| estimate.x).collect::<Vec<_>>();
