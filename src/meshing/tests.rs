@@ -382,13 +382,13 @@ fn strips_meet_any_stiffness() {
     for periodic in [[false, false], [true, true]] {
         let start = mesh([20, 24], periodic);
         let rho = bump(&start, 20.0, 0.3);
-        for &relaxation in if periodic[0] { &[1.0, 1e-2][..] } else { &[1.0, 1e-2, 1e-4, 1e-6][..] } {
+        for relaxation in [1.0, 1e-2, 1e-4, 1e-6] {
             let equation = Mmpde { relaxation: Relaxation::Time(relaxation), form: Form::Gradient(Gradient::Safe) };
             let exact = Whole::default().step(&equation, &start, &rho, DT).unwrap().mesh;
             let mut walks = Stochastic::new([3, 3], 1, EstimatorKind::default());
             let found = walks.step(&equation, &start, &rho, DT).unwrap();
             let (error, edge) = (largest_difference(&found.mesh, &exact), start.shortest_edge());
-            assert!(error < 0.02 * edge, "{periodic:?}, τ = {relaxation}: {error:e} of {edge:e}");
+            assert!(error < 0.01 * edge, "{periodic:?}, τ = {relaxation}: {error:e} of {edge:e}");
             let interface = found.interface.unwrap();
             assert_eq!(interface.walks == 0, found.work.path_steps == 0, "{interface:?}");
             assert!(relaxation < 1.0 || interface.exchanges == 1, "{interface:?}");
