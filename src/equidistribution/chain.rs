@@ -419,10 +419,10 @@ fn falling_root(first: f64, size: f64, f: impl Fn(f64) -> Option<[f64; 2]>) -> O
         if value == 0.0 {
             return Some(at);
         }
-        *(if value > 0.0 { &mut low } else { &mut high }) = at;
         if value.is_nan() {
             return None;
         }
+        *(if value > 0.0 { &mut low } else { &mut high }) = at;
         let bounded = low.is_finite() && high.is_finite();
         let newton = at - value / slope;
         if (newton - at).abs() <= f64::EPSILON * at.abs()

@@ -186,7 +186,7 @@ impl History {
             _ if still => {
                 "; it stands still: with these conditions subdomains learn next to nothing of each other".into()
             }
-            (Some(rate), Some(more)) if more <= MOST_ITERATIONS => {
+            (Some(rate), Some(more)) if more <= MOST_ITERATIONS as f64 => {
                 format!("; it contracts by {rate:.4} in two iterations: about {more:.0} more would do")
             }
             (Some(rate), _) => format!("; it contracts by {rate:.6} in two iterations, which is too slow to wait for"),
@@ -196,7 +196,7 @@ impl History {
             _ if count < FEW => "; so few do not tell whether it contracts".into(),
             _ => "; it does not contract".into(),
         };
-        let converges = !still && (more.is_some_and(|more| more <= MOST_ITERATIONS) || count < FEW);
+        let converges = !still && (more.is_some_and(|more| more <= MOST_ITERATIONS as f64) || count < FEW);
         let remedy = match method {
             _ if last <= rounding => "raise stop.tolerance",
             Method::Optimized { robin: Robin::Value(_) } if converges => {
@@ -233,8 +233,8 @@ fn contraction(measured: &[f64]) -> Option<f64> {
 const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// An iteration that stands still nearer than this share of the line has converged, as far as rounding lets it.
 const NEAR: f64 = 1e-6;
-/// Iterations that a study may ask for.
-const MOST_ITERATIONS: f64 = 1e6;
+/// Iterations that may be asked for.
+pub(crate) const MOST_ITERATIONS: usize = 1_000_000;
 /// What to ask for of what stands still, over what it came to.
 const STILL: f64 = 1.5;
 /// Iterations that tell nothing of an iteration that has not fallen in them.

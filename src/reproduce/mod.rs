@@ -1,5 +1,6 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
+mod errata;
 mod interface_study;
 mod page;
 mod payoff;

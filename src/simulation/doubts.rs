@@ -43,7 +43,7 @@ fn missed(simulation: &Simulation, state: &State) -> Vec<String> {
     let names = simulation.physics.unknowns();
     let lost = References::new(simulation, state, finer);
     let lost = names.iter().enumerate().map(|(c, name)| lost.as_ref()?.lost(state, c, name));
-    let hidden = hidden(simulation, state, finer).unwrap_or_default();
+    let hidden = hidden(simulation, state, finer).into_iter().chain(std::iter::repeat(None));
     lost.zip(hidden).filter_map(|(lost, hidden)| lost.or(hidden)).collect()
 }
 
@@ -83,10 +83,10 @@ impl References {
 }
 
 /// What is small and lies between the nodes: a value within a cell that is far outside of those at its corners.
-fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Option<Vec<Option<String>>> {
+fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<String>> {
     let mesh = &state.mesh;
     let cells = mesh.lattice().cells();
-    let within = mesh.resampled(cells.map(|n| finer * n)).ok()?;
+    let Ok(within) = mesh.resampled(cells.map(|n| finer * n)) else { return Vec::new() };
     let data = simulation.physics.initial(state.t, &within);
     let names = simulation.physics.unknowns();
     let told = names.iter().enumerate().map(|(c, name)| {
@@ -115,7 +115,7 @@ fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Option<Vec<Op
             )
         })
     });
-    Some(told.collect())
+    told.collect()
 }
 
 /// The least and the largest.

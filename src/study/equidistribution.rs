@@ -3,7 +3,7 @@
 use super::mapped::parse;
 use super::{Header, Output, Source};
 use crate::equidistribution::{
-    Coarse, FaceDensity, Line, LineDensity, Measure, Method, Robin, Stop, Sweep, check_ends, pieces,
+    Coarse, FaceDensity, Line, LineDensity, MOST_ITERATIONS, Measure, Method, Robin, Stop, Sweep, check_ends, pieces,
 };
 use crate::error::{Error, Failure, Result, line_rule};
 use crate::formula::Formula;
@@ -270,7 +270,6 @@ pub struct LineTime {
 
 const ITERATIONS: usize = 500;
 const TOLERANCE: f64 = 1e-10;
-const MAX_ITERATIONS: usize = 1_000_000;
 /// Memory for each cell, measured at a million of them, and a reserve.
 const BYTES_PER_CELL: u128 = 1000;
 /// Meshes kept of a run in time where nothing is said.
@@ -431,8 +430,8 @@ impl StopTable {
     pub fn resolve(&mut self) -> Result<()> {
         match (self.iterations, self.tolerance) {
             (Some(0), _) => return Err(Error::invalid("iterations", 0, "must be 1 or more")),
-            (Some(n), _) if n > MAX_ITERATIONS => {
-                return Err(Error::invalid("iterations", n, format!("must be at most {MAX_ITERATIONS}")));
+            (Some(n), _) if n > MOST_ITERATIONS => {
+                return Err(Error::invalid("iterations", n, format!("must be at most {MOST_ITERATIONS}")));
             }
             (_, Some(tolerance)) if !(tolerance.is_finite() && tolerance > 0.0) => {
                 return Err(Error::invalid("tolerance", tolerance, "must be above 0"));

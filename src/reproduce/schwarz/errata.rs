@@ -3,17 +3,14 @@
 use super::{LINEARISED, VARIANTS, exactly, from_uniform, layer, square, two, until, valley};
 use crate::equidistribution::{FaceDensity, Line, LineDensity, Stop};
 use crate::error::Result;
-use crate::reproduce::{Rerun, Table};
+use crate::reproduce::Rerun;
+use crate::reproduce::errata::{self, row};
 
 const ALPHA: usize = 45;
 const BETA: usize = 55;
 
 pub fn errata() -> Result<Rerun> {
-    let mut table = Table::new(
-        "Gander and Haynes (2012): what is wrong, and the check that shows it",
-        &["where", "printed", "should be", "check", "as printed", "as it should be", "verdict"],
-    )
-    .ruled("“erratum” where the check fails as printed and passes as it should be");
+    let mut table = errata::table("Gander and Haynes (2012)");
     let rows = [
         second_estimate()?,
         always_converges()?,
@@ -30,16 +27,6 @@ pub fn errata() -> Result<Rerun> {
     }
     table.note("misprints without a number to check: the proof of theorem 4.1 integrates from x₁ⁿ(α), not from x₁ⁿ⁻¹(α), in its two displays");
     Ok(vec![table].into())
-}
-
-/// A row; the check fails as printed and passes as it should be.
-fn row(texts: [&str; 4], values: [String; 2], passes: [bool; 2]) -> Vec<String> {
-    let said = match passes {
-        [false, true] => "erratum",
-        [true, _] => "as printed it holds",
-        _ => "neither holds",
-    };
-    texts.into_iter().map(String::from).chain(values).chain([said.to_string()]).collect()
 }
 
 fn exact() -> Result<Line> {

@@ -1,17 +1,14 @@
 //! What is wrong in the paper, each with a check.
 
 use crate::error::Result;
-use crate::reproduce::{Rerun, Table};
+use crate::reproduce::Rerun;
+use crate::reproduce::errata::{self, row};
 use std::f64::consts::PI;
 
 const NU: f64 = 0.005;
 
 pub fn errata() -> Result<Rerun> {
-    let mut table = Table::new(
-        "Bihlo, Haynes and Walsh (2015): what is wrong, and the check that shows it",
-        &["where", "printed", "should be", "check", "as printed", "as it should be", "verdict"],
-    )
-    .ruled("“erratum” where the check fails as printed and passes as it should be");
+    let mut table = errata::table("Bihlo, Haynes and Walsh (2015)");
     for row in [sign(), time(), displacement(), ratios(), decimals()] {
         table.row(row);
     }
@@ -21,15 +18,6 @@ pub fn errata() -> Result<Rerun> {
          shape of the pile in 4.4, N and M of table 2",
     );
     Ok(vec![table].into())
-}
-
-fn row(texts: [&str; 4], values: [String; 2], passes: [bool; 2]) -> Vec<String> {
-    let said = match passes {
-        [false, true] => "erratum",
-        [true, _] => "as printed it holds",
-        _ => "neither holds",
-    };
-    texts.into_iter().map(String::from).chain(values).chain([said.to_string()]).collect()
 }
 
 /// u_t, u_x and u_xx of u = 1/(1 + exp(z)), z = (x + y − t)/(2ν), in closed form.

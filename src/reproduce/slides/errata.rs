@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::reproduce::{Rerun, Table};
+use crate::reproduce::Rerun;
+use crate::reproduce::errata::{self, row};
 use crate::study::{FrontFinished, Source, StefanStudy};
 use std::f64::consts::PI;
 
@@ -10,11 +11,7 @@ use std::f64::consts::PI;
 const PLACE: [f64; 2] = [0.7, 0.4];
 
 pub fn errata() -> Result<Rerun> {
-    let mut table = Table::new(
-        "Castillo and Izsák (2024): what is wrong, and the check that shows it",
-        &["where", "printed", "should be", "check", "as printed", "as it should be", "verdict"],
-    )
-    .ruled("“erratum” where the check fails as printed and passes as it should be");
+    let mut table = errata::table("Castillo and Izsák (2024)");
     for (name, printed, right) in [
         ("p₆", "x^3 - 3*x^2*y", "x^3 - 3*x*y^2"),
         ("p₇", "y^3 - 3*x*y^2", "y^3 - 3*x^2*y"),
@@ -36,15 +33,6 @@ pub fn errata() -> Result<Rerun> {
     table
         .note("L_H is called the latent heat, and the front moves in proportion to it: it acts as the inverse of that");
     Ok(vec![table].into())
-}
-
-fn row(texts: [&str; 4], values: [String; 2], passes: [bool; 2]) -> Vec<String> {
-    let said = match passes {
-        [false, true] => "erratum",
-        [true, _] => "as printed it holds",
-        _ => "neither holds",
-    };
-    texts.into_iter().map(String::from).chain(values).chain([said.to_string()]).collect()
 }
 
 fn laplacian(text: &str) -> Result<f64> {
