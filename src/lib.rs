@@ -71,8 +71,6 @@ pub mod report;
 
 pub mod study;
 
-pub mod reproduce;
-
 pub use error::{Error, Failure, Result};
 pub use setting::Auto;
 pub use work::Work;

@@ -1,7 +1,7 @@
 use crate::terminal::{say, use_threads};
 use clap::Args;
 use driftmesh::Error;
-use driftmesh::reproduce::{Done, ITEMS, Item, Options, Rerun, page};
+use driftmesh_reproduce::{Done, ITEMS, Item, Options, Rerun, page};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;

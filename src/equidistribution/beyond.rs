@@ -1,5 +1,6 @@
-use super::chain::{Chain, End, Step, thomas};
+use super::chain::{Chain, End, Step};
 use crate::error::Failure;
+use crate::numerics::linear::tridiagonal;
 
 /// What lies beyond a cut, over a step in time: the optimal condition there
 ///
@@ -34,7 +35,7 @@ impl Beyond<'_> {
         let (_, rows) = chain.linearised(&y, ends, Some(step))?;
         let mut right = vec![0.0; n + 1];
         right[if cut_at_left { 0 } else { n }] = 1.0;
-        let follows = thomas(&rows, &right);
+        let follows = tridiagonal(&rows, &right);
         // the cell beside the cut, and the half cell up to it
         let (first, cut, sign) = if cut_at_left { (0, 0, -1.0) } else { (n - 1, n, 1.0) };
         let [flux, by_left, by_right] = chain.flux_of_cell(y[first], y[first + 1])?;

@@ -3,6 +3,7 @@ use super::beyond::Beyond;
 use super::cumulative::Cumulative;
 use super::path::Path;
 use crate::error::Failure;
+use crate::numerics::linear::tridiagonal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -336,7 +337,7 @@ impl Chain<'_> {
         };
         let most = if free { MAX_NEWTON / 2 } else { MAX_NEWTON };
         for solves in 1..=most {
-            let change = thomas(&rows, &residual);
+            let change = tridiagonal(&rows, &residual);
             let largest = change.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
             let before = norm(&residual);
             // residuals of nodes that are right to the last bit
@@ -404,7 +405,7 @@ impl Chain<'_> {
                 right[i] = ratio * self.h * old[i];
             }
         }
-        Ok(thomas(&rows, &right))
+        Ok(tridiagonal(&rows, &right))
     }
 }
 
@@ -457,22 +458,4 @@ fn stretched(guess: &[f64], ends: [End<'_>; 2]) -> Vec<f64> {
 
 fn norm(residual: &[f64]) -> f64 {
     residual.iter().fold(0.0, |m, r| if r.is_nan() { f64::INFINITY } else { m.max(r.abs()) })
-}
-
-/// Tridiagonal elimination.
-pub(crate) fn thomas(rows: &[[f64; 3]], right: &[f64]) -> Vec<f64> {
-    let n = rows.len();
-    let mut above = vec![0.0; n];
-    let mut x = vec![0.0; n];
-    let (mut c, mut d) = (0.0, 0.0);
-    for i in 0..n {
-        let [lower, own, upper] = rows[i];
-        let pivot = 1.0 / (own - lower * c);
-        (c, d) = (upper * pivot, (right[i] - lower * d) * pivot);
-        (above[i], x[i]) = (c, d);
-    }
-    for i in (0..n - 1).rev() {
-        x[i] -= above[i] * x[i + 1];
-    }
-    x
 }

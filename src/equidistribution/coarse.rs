@@ -1,9 +1,10 @@
 //! A correction between sweeps that reaches all pieces at once: their number no longer matters.
 
-use super::chain::{End, Step, thomas};
+use super::chain::{End, Step};
 use super::cumulative::Cumulative;
 use super::schwarz::{Coarse, Iteration, owner};
 use crate::error::Failure;
+use crate::numerics::linear::tridiagonal;
 
 /// A correction shorter than this share of the whole one is left out.
 const SHORTEST: f64 = 1e-3;
@@ -62,7 +63,7 @@ pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coars
             }
         }
     }
-    let c = thomas(&system, &right);
+    let c = tridiagonal(&system, &right);
     // of ∫M up to each node
     let change: Vec<f64> = (0..=n).map(|i| hats(i).map(|(j, hat)| hat * c[j - 1]).sum()).collect();
     let integral = chain.cumulative.filter(|_| coarse == Coarse::Integral);

@@ -1,9 +1,10 @@
 //! What Newton's method takes on the first of several pieces, as table 8.1 of Gander and Haynes (2012) counts it.
 
-use super::chain::{Chain, End, thomas};
+use super::chain::{Chain, End};
 use super::schwarz::Iteration;
 use super::{Line, Method, pieces};
 use crate::error::{Failure, Result};
+use crate::numerics::linear::tridiagonal;
 
 /// A step that is at most this ends Newton's method.
 const STEP: f64 = 1e-12;
@@ -52,7 +53,7 @@ fn whole_steps(chain: &Chain<'_>, x: &mut [f64], ends: [End; 2]) -> Result<usize
     let mut largest = f64::INFINITY;
     for solves in 1..=MOST {
         let (residual, rows) = chain.linearised(x, ends, None)?;
-        let change = thomas(&rows, &residual);
+        let change = tridiagonal(&rows, &residual);
         x.iter_mut().zip(&change).for_each(|(x, change)| *x -= change);
         largest = change.iter().fold(0.0, |m: f64, c| if c.is_nan() { f64::INFINITY } else { m.max(c.abs()) });
         if largest <= STEP {

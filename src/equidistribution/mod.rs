@@ -23,7 +23,6 @@ mod schwarz;
 mod tests;
 
 pub use chain::FaceDensity;
-pub(crate) use chain::thomas;
 pub use density::{LineDensity, check_ends};
 pub use predict::Prediction;
 pub use schwarz::{Coarse, Method, Robin, Sweep};

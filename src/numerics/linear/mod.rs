@@ -14,6 +14,7 @@ mod multigrid;
 mod pcg;
 mod relaxation;
 mod sparse;
+mod tridiagonal;
 
 pub use bicgstab::Bicgstab;
 pub use block::BlockBicgstab;
@@ -22,6 +23,7 @@ pub use lu::SparseLu;
 pub use pcg::Pcg;
 pub use relaxation::{Smoother, relax};
 pub use sparse::SparseSystem;
+pub use tridiagonal::tridiagonal;
 
 use super::larger;
 use crate::error::Failure;
