@@ -67,6 +67,8 @@ pub mod stefan;
 
 pub mod simulation;
 
+pub mod output;
+
 pub mod report;
 
 pub mod study;

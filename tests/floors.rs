@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Lowest floor first; modules on one floor are siblings that do not know each other.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     &["elementary", "error"],
     &["formula", "kept", "kind", "parallel", "random", "setting", "stopwatch", "work"],
     &["geometry"],
@@ -11,6 +11,7 @@ const FLOORS: [&[&str]; 9] = [
     &["density", "equidistribution", "laplacian", "meshing", "physics"],
     &["mover", "stefan"],
     &["simulation"],
+    &["output"],
     &["report"],
     &["study"],
 ];

@@ -1,7 +1,8 @@
 //! A run that ends early and goes on has the bits of one that nothing disturbed, for every kind that steps.
 
 use driftmesh::error::Unfit;
-use driftmesh::simulation::{Event, Observer, RunDirectory, Snapshot, Standing};
+use driftmesh::output::{RunDirectory, Standing};
+use driftmesh::simulation::{Event, Observer, Snapshot};
 use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
 use std::collections::BTreeMap;

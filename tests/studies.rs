@@ -3,7 +3,8 @@
 //! The norms are those on which two other implementations agree, each with the tolerance that comes with it; the counters are this implementation's own and hold exactly.
 
 use driftmesh::geometry::DualCells;
-use driftmesh::simulation::{Event, Observer, Snapshot, Summary};
+use driftmesh::output::Summary;
+use driftmesh::simulation::{Event, Observer, Snapshot};
 use driftmesh::study::{MovingMesh, Source, compute, run};
 use std::path::Path;
 

@@ -3,7 +3,8 @@ use crate::{StudyArgs, equidistribution, poisson, progress::Progress, stefan, te
 use clap::Args;
 use driftmesh::Error;
 use driftmesh::meshing::Interface;
-use driftmesh::simulation::{Observer, Retries, RunDirectory, Standing, Summary};
+use driftmesh::output::{RunDirectory, Standing, Summary};
+use driftmesh::simulation::{Observer, Retries};
 use driftmesh::study::{self, Begin, MovingMesh, Study, UniformEquivalent};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -1,6 +1,7 @@
 use crate::errors::raised;
 use crate::threads::{BRIEFLY, Ended, PATIENCE, calls, interruptible};
-use driftmesh::simulation::{Advance, Event, Observer, RunDirectory, Snapshot, Standing, State};
+use driftmesh::output::{RunDirectory, Standing};
+use driftmesh::simulation::{Advance, Event, Observer, Snapshot, State};
 use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
 use pyo3::prelude::*;

@@ -16,7 +16,7 @@ pub use table::Table;
 
 use Document::{Laplacian, Own, Schwarz, Stochastic};
 use driftmesh::error::Result;
-use driftmesh::simulation::Picture;
+use driftmesh::output::Picture;
 
 /// A document that is rerun.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

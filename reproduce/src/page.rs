@@ -158,7 +158,7 @@ fn shown(table: &super::Table) -> Shown {
 }
 
 /// The smaller of drawing and image.
-fn picture((name, picture): &(String, driftmesh::simulation::Picture)) -> Picture {
+fn picture((name, picture): &(String, driftmesh::output::Picture)) -> Picture {
     let (mime, bytes) = match picture.svg.len() < picture.png.len() {
         true => ("image/svg+xml", picture.svg.as_bytes()),
         false => ("image/png", picture.png.as_slice()),

@@ -1,6 +1,6 @@
 use super::{Options, Rerun, Table};
 use driftmesh::error::Result;
-use driftmesh::simulation::{Curve, Figure};
+use driftmesh::output::{Curve, Figure};
 use driftmesh::study::{MovingMesh, Source, compute};
 
 /// How a run came out.

@@ -2,7 +2,7 @@ use super::files::RunFiles;
 use super::frame::Frame;
 use super::viewer::clock;
 use crate::error::{Error, Result};
-use crate::simulation::{COLOURS, Canvas, Curve, Figure, Picture, Scale, Sheet, write_file};
+use crate::output::{COLOURS, Canvas, Curve, Figure, Picture, Scale, Sheet, write_file};
 use gif::{Encoder, Repeat};
 use plotters::style::RGBColor;
 use std::collections::HashMap;

@@ -1,7 +1,7 @@
 use super::frame::{Frame, attribute};
 use crate::error::{Error, Result};
+use crate::output::{Checkpoints, RunDirectory};
 use crate::parallel::map;
-use crate::simulation::{Checkpoints, RunDirectory};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 

@@ -9,8 +9,8 @@ mod tables;
 mod viewer;
 
 use crate::error::Result;
+use crate::output::{Canvas, Picture, write_file};
 use crate::parallel::join;
-use crate::simulation::{Canvas, Picture, write_file};
 use files::RunFiles;
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,5 @@
 use super::files::{Column, RunFiles};
-use crate::simulation::{Curve, Figure, Scale};
+use crate::output::{Curve, Figure, Scale};
 
 /// Curves of `history.csv` that belong into one plot.
 struct Group {

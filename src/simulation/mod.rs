@@ -8,21 +8,15 @@ mod doubts;
 mod journey;
 mod observer;
 mod pace;
-mod report;
+mod record;
 mod safety;
 mod schedule;
 
 pub use benefit::Benefit;
-pub use checkpoint::CheckpointsAt;
-pub(crate) use checkpoint::{Checkpoint, Checkpoints, Course};
+pub(crate) use checkpoint::{Checkpoint, Course, Keeper};
 pub use coupling::Coupling;
-pub use observer::{Advance, Event, Frames, FramesAt, History, Observer, Snapshot};
-pub(crate) use observer::{Rows, frame_name, vtu};
-pub(crate) use report::{COLOURS, Canvas, Sheet, moment, status, write_file};
-pub use report::{
-    Conserved, ErrorNorms, Failed, Parallel, Report, RunDirectory, Seconds, Standing, Summary, WorkTotal,
-};
-pub use report::{Curve, Figure, Picture, Scale, draw, draw_curves, final_arrays};
+pub use observer::{Advance, Event, Observer, Snapshot};
+pub use record::{Conserved, ErrorNorms, Record, Report, Seconds, WorkTotal};
 pub use safety::{Retries, Safety};
 pub use schedule::Schedule;
 
@@ -34,9 +28,7 @@ use crate::meshing::{Interface, Relaxation};
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use crate::stopwatch::Stopwatch;
-use crate::work::Work;
 use pace::Pace;
-use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Everything that changes from step to step.
@@ -57,25 +49,6 @@ pub struct State {
     /// How fast the solution changes by itself: the largest change at a fixed place in the last step, as a share of its
     /// range, over the time that it took; 0 before the first step.
     pub own_change: f64,
-}
-
-/// What a run did so far.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Record {
-    /// Steps and their cost.
-    pub work: WorkTotal,
-    /// Steps that were tried again.
-    pub safety: Retries,
-    /// How far nodes went: the sum over all steps of the longest way of a node.
-    pub travelled: f64,
-    /// Where the time went.
-    pub seconds: Seconds,
-    /// One report for each time asked for.
-    pub reports: Vec<Report>,
-    /// What the last step knows about the interfaces between subdomains.
-    pub interface: Option<Interface>,
-    /// What the user should know although nothing failed.
-    pub warnings: Vec<String>,
 }
 
 /// A moving mesh, the physics on it, and how they are advanced together.
@@ -210,10 +183,10 @@ impl Simulation {
         state: &mut State,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        checkpoints: Option<&mut Checkpoints>,
+        keeper: Option<&mut dyn Keeper>,
         course: Option<Course>,
     ) -> Result<()> {
-        record.timed(|record| self.run_steps(state, record, observers, checkpoints, course))
+        record.timed(|record| self.run_steps(state, record, observers, keeper, course))
     }
 
     fn run_steps(
@@ -221,7 +194,7 @@ impl Simulation {
         state: &mut State,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        mut checkpoints: Option<&mut Checkpoints>,
+        mut keeper: Option<&mut dyn Keeper>,
         course: Option<Course>,
     ) -> Result<()> {
         let clock = Clock::start(course.as_ref(), record);
@@ -239,14 +212,14 @@ impl Simulation {
             None => timed(&mut record.seconds.pde, || Pace::new(self, state))?,
         };
         let course = |pace: &Pace| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
-        self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
+        self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
         while let Some((t, dt)) = pace.next(&self.schedule, state) {
             let step = state.step + 1;
             let next = match pace.step(self, state, (t, dt), record) {
                 Ok(Some(next)) => next,
                 Ok(None) => {
                     if observers.iter().any(|observer| observer.interrupts()) {
-                        self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
+                        self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
                     }
                     continue;
                 }
@@ -263,10 +236,10 @@ impl Simulation {
                 record.reports.push(report);
             }
             self.show(Event::Stepped, state, record, observers, dt, &clock)?;
-            self.pause(state, record, observers, &mut checkpoints, &clock, || course(&pace))?;
+            self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
         }
-        if let Some(checkpoints) = checkpoints.filter(|checkpoints| checkpoints.at_the_end) {
-            self.checkpoint(state, record, observers, checkpoints, &clock, course(&pace))?;
+        if let Some(keeper) = keeper.filter(|keeper| keeper.due(state.step, true)) {
+            self.checkpoint(state, record, observers, keeper, &clock, course(&pace))?;
         }
         self.show(Event::Finished, state, record, observers, 0.0, &clock)
     }
@@ -277,15 +250,15 @@ impl Simulation {
         state: &State,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        checkpoints: &mut Option<&mut Checkpoints>,
+        keeper: &mut Option<&mut dyn Keeper>,
         clock: &Clock,
         course: impl FnOnce() -> Course,
     ) -> Result<()> {
         let asked = end_where_asked(observers, state);
-        if let Some(checkpoints) = checkpoints
-            && (asked.is_err() || checkpoints.due(state.step))
+        if let Some(keeper) = keeper
+            && (asked.is_err() || keeper.due(state.step, false))
         {
-            self.checkpoint(state, record, observers, checkpoints, clock, course())?;
+            self.checkpoint(state, record, observers, *keeper, clock, course())?;
         }
         asked
     }
@@ -295,7 +268,7 @@ impl Simulation {
         state: &State,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        checkpoints: &mut Checkpoints,
+        keeper: &mut dyn Keeper,
         clock: &Clock,
         course: Course,
     ) -> Result<()> {
@@ -303,7 +276,7 @@ impl Simulation {
         let mut kept = Kept::default();
         self.mover.generator.keep(&mut kept);
         observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
-        checkpoints.write(state.step, &Checkpoint::of(state, clock.counted(record), course, kept))?;
+        keeper.keep(&Checkpoint::of(state, clock.counted(record), course, kept))?;
         record.seconds.output += began.elapsed().as_secs_f64();
         Ok(())
     }
@@ -467,27 +440,10 @@ impl Clock {
     }
 }
 
-impl Record {
-    /// Adds the time that a computation takes.
-    pub(crate) fn timed<T>(&mut self, compute: impl FnOnce(&mut Self) -> T) -> T {
-        let clock = Stopwatch::start().after([self.seconds.wall, self.seconds.cpu]);
-        let result = compute(self);
-        [self.seconds.wall, self.seconds.cpu] = clock.elapsed();
-        result
-    }
-}
-
 /// Time and result of a computation.
 pub(crate) fn timed<T>(seconds: &mut f64, compute: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let result = compute();
     *seconds += start.elapsed().as_secs_f64();
     result
-}
-
-impl WorkTotal {
-    fn add(&mut self, work: Work) {
-        self.steps += 1;
-        self.work += work;
-    }
 }

@@ -1,7 +1,8 @@
 use super::moving_mesh::Header;
 use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
 use crate::error::{Error, Result, Unfit};
-use crate::simulation::{Checkpoints, CheckpointsAt, Observer, RunDirectory, Standing};
+use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing};
+use crate::simulation::Observer;
 use schemars::generate::SchemaSettings;
 use serde::Deserialize;
 use serde_json::json;

@@ -1,5 +1,5 @@
 use crate::error::{Error, Result};
-use crate::simulation::RunDirectory;
+use crate::output::RunDirectory;
 use serde::Serialize;
 use std::time::Instant;
 

@@ -8,8 +8,9 @@ use crate::equidistribution::{
 use crate::error::{Error, Failure, Result, line_rule};
 use crate::formula::Formula;
 use crate::kind::kinds;
+use crate::output::FramesAt;
 use crate::setting::{fixed, pair};
-use crate::simulation::{FramesAt, Schedule};
+use crate::simulation::Schedule;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -8,11 +8,11 @@ use crate::error::{Error, Moment, Result, Unfit};
 use crate::geometry::{Field, quality};
 use crate::kept::{Kept, check_nodal};
 use crate::mover::Gait;
-use crate::report;
-use crate::simulation::{
-    Checkpoints, Event, Failed, Frames, Observer, Parallel, Picture, Rows, RunDirectory, Schedule, Snapshot, State,
-    WorkTotal, draw, draw_curves, final_arrays, moment, status,
+use crate::output::{
+    Checkpoints, Failed, Frames, Parallel, Picture, Rows, RunDirectory, draw, draw_curves, final_arrays, moment, status,
 };
+use crate::report;
+use crate::simulation::{Event, Observer, Schedule, Snapshot, State, WorkTotal};
 use crate::stefan::{Energy, Front, FrontState, LOWER, Problem, Stepping, UPPER};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
@@ -284,7 +284,7 @@ impl StefanStudy {
                     frames.observe(event, snapshot)?;
                     watchers.iter_mut().try_for_each(|watcher| watcher.observe(event, snapshot))?;
                     let ends = event != Event::Finished && watchers.iter().any(|watcher| watcher.interrupts());
-                    if ends || event != Event::Finished && checkpoints.due(state.step) {
+                    if ends || event != Event::Finished && checkpoints.is_due(state.step) {
                         let mut kept = Kept::default();
                         tables.keep(&mut kept)?;
                         frames.keep(&mut kept)?;

@@ -7,8 +7,9 @@ use super::line_files::{keep, thinned, write_series};
 use crate::equidistribution::{FaceDensity, History, Iterate, Line, Settled};
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::check_nodal;
+use crate::output::{Checkpoints, Failed, Parallel, RunDirectory, status};
 use crate::report;
-use crate::simulation::{Advance, Checkpoints, Failed, Observer, Parallel, RunDirectory, status};
+use crate::simulation::{Advance, Observer};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
@@ -354,7 +355,7 @@ impl EquidistributionStudy {
                 watchers.iter_mut().for_each(|watcher| watcher.advanced(&advance));
             }
             let ends = study.time.is_some() && watchers.iter().any(|watcher| watcher.interrupts());
-            if ends || study.time.is_some() && checkpoints.due(step) {
+            if ends || study.time.is_some() && checkpoints.is_due(step) {
                 checkpoints.write(step, &LineCheckpoint { evolution: evolution.clone(), seconds: spent() })?;
             }
             // what a report of a run that goes on or is killed can show

@@ -4,11 +4,10 @@ use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
 use crate::mover::{Ending, Mover};
+use crate::output::{CheckpointsAt, FramesAt};
 use crate::physics::{PdeKind, Physics, UniformBurgers, formula};
 use crate::setting::{Auto, pair};
-use crate::simulation::{
-    CheckpointsAt, Coupling, FramesAt, Observer, Record, Safety, Schedule, Simulation, State, timed,
-};
+use crate::simulation::{Coupling, Observer, Record, Safety, Schedule, Simulation, State, timed};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

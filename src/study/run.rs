@@ -5,12 +5,12 @@ use super::rest::at_rest;
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
 use crate::kept::{Kept, check_nodal};
+use crate::output::{
+    Checkpoints, Failed, Frames, History, Parallel, RunDirectory, Summary, draw, final_arrays, moment, status,
+};
 use crate::parallel::join;
 use crate::report;
-use crate::simulation::{
-    Checkpoint, Checkpoints, Course, Event, Failed, Frames, History, Observer, Parallel, Record, RunDirectory,
-    Simulation, Snapshot, State, Summary, draw, final_arrays, moment, status,
-};
+use crate::simulation::{Checkpoint, Course, Event, Observer, Record, Simulation, Snapshot, State};
 use std::path::Path;
 use std::time::Instant;
 

@@ -5,8 +5,9 @@ use super::{Header, LaplacianTable, Output, Source};
 use crate::error::{Error, Failure, Result};
 use crate::formula::Formula;
 use crate::laplacian::Laplacian;
+use crate::output::FramesAt;
 use crate::setting::{Auto, fixed, pair};
-use crate::simulation::{FramesAt, Schedule};
+use crate::simulation::Schedule;
 use crate::stefan::{
     Columns, Filter, Front, FrontState, INITIAL, LOWER, Method, Problem, Sides, Similarity, Stepping, Transfer, UPPER,
 };

@@ -4,7 +4,7 @@ use super::{NONLINEAR, from_uniform, layer, square, until, valley};
 use crate::{Options, Rerun, Table};
 use driftmesh::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Method, Sweep};
 use driftmesh::error::{Error, Failure, Result};
-use driftmesh::simulation::{Curve, Figure};
+use driftmesh::output::{Curve, Figure};
 
 const SPIKE: &str = "1 + 100*exp(-1000*(x - 0.5)^2)";
 /// A density by its number of cells.

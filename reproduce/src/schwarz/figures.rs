@@ -6,7 +6,7 @@ use super::{
 use crate::{Rerun, Table};
 use driftmesh::equidistribution::{FaceDensity, Line, Method, Robin};
 use driftmesh::error::Result;
-use driftmesh::simulation::{Curve, Figure, Scale};
+use driftmesh::output::{Curve, Figure, Scale};
 
 /// Where a figure needs room for its legend beside the curves.
 const LEGEND: f64 = 22.0;

@@ -25,7 +25,7 @@ pub use variants::{figure_8_4, figure_8_5};
 
 use driftmesh::equidistribution::{Coarse, History, Line, LineDensity, Measure, Method, Stop, Sweep};
 use driftmesh::error::Result;
-use driftmesh::simulation::{Curve, Figure, Scale};
+use driftmesh::output::{Curve, Figure, Scale};
 
 const LAYER: &str = "(1 - exp(20*x)) / (1 - exp(20))";
 const NONLINEAR: Method = Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse: Coarse::None };

@@ -2,7 +2,7 @@
 
 use crate::{Rerun, Table};
 use driftmesh::error::Result;
-use driftmesh::simulation::{Curve, Figure, Scale};
+use driftmesh::output::{Curve, Figure, Scale};
 use driftmesh::study::{EquidistributionStudy, Evolution, Source};
 
 const FRONT: &str = "(1 - tanh((1 + 249.5*(1 + tanh(10*(t - 0.2))))*(x - t - 0.4)))/2";

@@ -4,7 +4,7 @@ use super::{LINEARISED, NONLINEAR, exactly, from_uniform, layer, two};
 use crate::{Rerun, Table};
 use driftmesh::equidistribution::{History, Line, Method, Robin};
 use driftmesh::error::Result;
-use driftmesh::simulation::{Curve, Figure, Scale};
+use driftmesh::output::{Curve, Figure, Scale};
 
 const AT: [usize; 6] = [0, 2, 4, 6, 8, 10];
 /// Half of the paper's last digit.

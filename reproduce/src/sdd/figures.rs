@@ -5,7 +5,8 @@ use super::{BURGERS, DAM_BREAK, NO_SAFETY, RESIDUAL, RINGS, WHOLE, settings, sto
 use crate::{Options, Rerun, Table};
 use driftmesh::error::Result;
 use driftmesh::geometry::{compare, quality};
-use driftmesh::simulation::{State, draw};
+use driftmesh::output::draw;
+use driftmesh::simulation::State;
 
 /// A figure: its study with settings, the times that it shows, and the numbers of subdomains along an axis; 1 for one domain.
 struct Shown {

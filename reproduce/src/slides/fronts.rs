@@ -2,7 +2,7 @@
 
 use crate::{Options, Rerun, Table};
 use driftmesh::error::{Error, Result};
-use driftmesh::simulation::{Curve, Figure};
+use driftmesh::output::{Curve, Figure};
 use driftmesh::study::{FrontFinished, Source, StefanStudy};
 
 const BOX: &str = "[domain]\nx = [-1.0, 1.0]\nbottom = \"0\"\ntop = \"2 + cos(x)/2\"\n";

@@ -2,7 +2,7 @@
 
 use crate::{Options, Rerun, Table};
 use driftmesh::error::Result;
-use driftmesh::simulation::{Curve, Figure, Picture};
+use driftmesh::output::{Curve, Figure, Picture};
 use driftmesh::study::{PoissonStudy, Solved, Source};
 use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;

@@ -44,7 +44,7 @@ impl Picture {
 }
 
 /// The font of all drawings.
-pub(super) const FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
+pub(super) const FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
 /// Longer edge of the box in the drawing.
 pub(super) const LONGER: f64 = 640.0;
 pub(super) const SHORTER_AT_LEAST: f64 = 160.0;

@@ -1,9 +1,6 @@
 use crate::error::{Error, Failure};
-use crate::geometry::{Comparison, Quality};
-use crate::meshing::Interface;
-use crate::simulation::{Benefit, Retries};
-use crate::work::Work;
-use serde::{Deserialize, Serialize};
+use crate::simulation::{Report, Retries, Seconds, WorkTotal};
+use serde::Serialize;
 
 /// `summary.json`.
 #[derive(Debug, Clone, Serialize)]
@@ -83,25 +80,6 @@ pub(crate) fn status(failure: Option<&Error>) -> &'static str {
     }
 }
 
-/// Seconds by part.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub struct Seconds {
-    /// By the clock.
-    pub wall: f64,
-    /// Of all threads.
-    pub cpu: f64,
-    /// Computing the density.
-    pub monitor: f64,
-    /// Estimating interface values.
-    pub interface: f64,
-    /// Solving the mesh equation, `interface` not included.
-    pub mesh: f64,
-    /// Solving the physics.
-    pub pde: f64,
-    /// Observers: history, frames, progress.
-    pub output: f64,
-}
-
 /// What a run had at its disposal.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Parallel {
@@ -109,57 +87,4 @@ pub struct Parallel {
     pub ranks: usize,
     /// Threads of each.
     pub threads: usize,
-}
-
-/// Steps and their cost.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct WorkTotal {
-    /// Time steps accepted.
-    pub steps: usize,
-    /// Time steps tried in vain.
-    pub rejected_steps: usize,
-    /// What all of them cost.
-    #[serde(flatten)]
-    pub work: Work,
-}
-
-/// The state of a run at one of the times asked for.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub struct Report {
-    /// Time.
-    pub t: f64,
-    /// Where an exact solution is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub error: Option<ErrorNorms>,
-    /// Of the mesh.
-    pub quality: Quality,
-    /// Integrals of the solution.
-    pub conserved: Conserved,
-    /// Where there are subdomains.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub interface: Option<Interface>,
-    /// Where the study compares with another generator.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub comparison: Option<Comparison>,
-    /// What adaptation brought.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub benefit: Option<Benefit>,
-}
-
-/// Error against the exact solution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ErrorNorms {
-    /// Largest over the nodes.
-    pub linf: f64,
-    /// √(Σ e²·area / Σ area), a node's area being a quarter of its cells'.
-    pub l2: f64,
-}
-
-/// What a conservative scheme keeps, up to what flows through the sides.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub struct Conserved {
-    /// ∫u dA of the first unknown.
-    pub mass: f64,
-    /// Its change since the start over its size there (its change itself where it was 0).
-    pub drift: f64,
 }

@@ -1,15 +1,5 @@
 //! Who watches a run: each observer sees the state after every step.
 
-mod frames;
-mod history;
-mod rows;
-pub(crate) mod vtu;
-
-pub(crate) use frames::frame_name;
-pub use frames::{Frames, FramesAt};
-pub use history::History;
-pub(crate) use rows::Rows;
-
 use super::{ErrorNorms, State, WorkTotal};
 use crate::error::Result;
 use crate::geometry::Quality;

@@ -1,5 +1,5 @@
 use super::rows::Rows;
-use super::{Event, Observer, Snapshot};
+use crate::simulation::{Event, Observer, Snapshot};
 use crate::error::{Result, Unfit};
 use crate::kept::Kept;
 use serde::Serialize;

@@ -1,5 +1,5 @@
 use crate::error::{Error, Result};
-use crate::simulation::Checkpoints;
+use crate::output::Checkpoints;
 use serde::Serialize;
 use std::fs::File;
 use std::io::Write;
