@@ -41,6 +41,9 @@
 //! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`equidistribution`], [`laplacian`], [`meshing`] and
 //! [`physics`], then [`mover`] and [`stefan`], then [`simulation`], then [`report`], then [`study`].
 
+// What only studies and their checkpoints use is dead code in a library without them.
+#![cfg_attr(not(feature = "studies"), allow(dead_code, unused_imports))]
+
 mod elementary;
 pub mod error;
 pub mod formula;
@@ -67,10 +70,13 @@ pub mod stefan;
 
 pub mod simulation;
 
+#[cfg(feature = "studies")]
 pub mod output;
 
+#[cfg(feature = "studies")]
 pub mod report;
 
+#[cfg(feature = "studies")]
 pub mod study;
 
 pub use error::{Error, Failure, Result};
