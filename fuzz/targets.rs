@@ -5,8 +5,11 @@
 //! `tests/corpora.rs` replays the corpora through the same functions.
 #![allow(dead_code)] // each user takes one of them
 
+#[path = "line.rs"]
+mod line;
+
 use driftmesh::formula::{Formula, Program};
-use driftmesh::study::{Source, Study};
+use driftmesh::study::{EquidistributionStudy, Source, Study};
 
 /// A formula, its derivatives, and both ways to evaluate them.
 pub fn formula(data: &[u8]) {
@@ -38,6 +41,21 @@ pub fn study(data: &[u8]) {
     let again = Study::from_source(&Source::new("resolved.toml", resolved.as_str()));
     let again = again.unwrap_or_else(|error| panic!("{error}\nin {resolved}"));
     assert_eq!(again.to_toml(), resolved);
+}
+
+/// A line whose settings follow from the first eight bytes, and whose density or u is the formula of the others: it is
+/// refused, completes with its nodes in order or ends by name.
+pub fn equidistribution(data: &[u8]) {
+    let Some((choices, text)) = data.split_first_chunk() else { return };
+    let Some(text) = std::str::from_utf8(text).ok().filter(|text| Formula::parse(text, &["x"]).is_ok()) else { return };
+    let mut dice = line::dice::Dice(u64::from_le_bytes(*choices));
+    let density = match dice.whole(0, 1) {
+        0 => format!("kind = \"formula\"\nvalue = {text:?}"),
+        _ => format!("kind = \"arclength\"\nof = {text:?}"),
+    };
+    let text = line::text(&mut dice, &density);
+    let Ok(study) = EquidistributionStudy::from_source(&Source::new("line.toml", text.as_str())) else { return };
+    line::ending(&study).unwrap_or_else(|mistake| panic!("{mistake}\n{text}"));
 }
 
 /// A checkpoint behind its checksum: refused, or of a step of the run.

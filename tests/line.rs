@@ -1,8 +1,9 @@
 //! A line never stalls: densities of all kinds are equidistributed, and every Schwarz method converges or says why.
 
-mod dice;
+#[path = "../fuzz/line.rs"]
+mod drawn;
 
-use dice::Dice;
+use drawn::dice::Dice;
 use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
 use driftmesh::study::{EquidistributionStudy, Source};
 use rayon::prelude::*;
@@ -206,40 +207,11 @@ fn impossible_densities_are_named() {
     assert_eq!(failure.name(), "line-unresolved");
 }
 
-/// A random study of the kind: density, averages, method, subdomains, tolerances, first mesh.
+/// A random study of the kind.
 fn study(n: u64) -> Option<(String, EquidistributionStudy)> {
     let mut dice = Dice(n.wrapping_mul(0xD1B5_4A32_D192_ED03));
     let density = density(&mut dice);
-    let faces = dice.of(["exact", "trapezoid", "midpoint"]);
-    let subdomains = dice.whole(1, 16).min(dice.whole(1, 64));
-    let overlap = 2 * dice.whole(1, 3);
-    let width = dice.whole(overlap + 2, overlap + 30);
-    let cells = subdomains * width - (subdomains - 1) * overlap;
-    let cuts: Vec<String> =
-        (1..subdomains).map(|s| format!("{:?}", (s * cells / subdomains) as f64 / cells as f64)).collect();
-    let classical = format!("subdomains = {subdomains}\noverlap_cells = {overlap}\n");
-    let meeting = format!("cuts = [{}]\n", cuts.join(", "));
-    let schwarz = match dice.whole(0, 7) {
-        _ if subdomains == 1 => String::new(),
-        0 => format!("[schwarz]\n{classical}"),
-        1 => format!("[schwarz]\n{classical}linearized = true\n"),
-        2 => format!("[schwarz]\n{classical}sweep = \"alternating\"\n"),
-        3 => format!("[schwarz]\n{classical}coarse = \"galerkin\"\n"),
-        4 => format!("[schwarz]\nmethod = \"optimal\"\n{meeting}"),
-        5 => format!("[schwarz]\nmethod = \"optimized\"\n{meeting}"),
-        6 => format!("[schwarz]\nmethod = \"optimized\"\nrobin = \"lagged\"\n{meeting}"),
-        _ => format!("[schwarz]\nmethod = \"optimized\"\nrobin = {}\n{meeting}", dice.between(0.1, 100.0)),
-    };
-    let stop = match dice.whole(0, 2) {
-        0 => format!("iterations = {}", dice.whole(1, 60)),
-        1 => format!("iterations = 60\ntolerance = {:e}", dice.between(1e-12, 1e-3)),
-        _ => format!("iterations = 60\ntolerance = {:e}\nmeasure = \"increment\"", dice.between(1e-12, 1e-3)),
-    };
-    let start = dice.of(["\"uniform\"", "\"equidistributed\"", "{ formula = \"xi^1.3\" }", "{ formula = \"xi^0.2\" }"]);
-    let text = format!(
-        "[study]\nname = \"line\"\nkind = \"equidistribution\"\n[grid]\ncells = [{cells}]\n[density]\n{density}\n\
-         [equidistribution]\nface_density = \"{faces}\"\n{schwarz}[stop]\n{stop}\n[start]\nmesh = {start}\n"
-    );
+    let text = drawn::text(&mut dice, &density);
     EquidistributionStudy::from_source(&Source::new("line.toml", &text)).ok().map(|study| (text, study))
 }
 
@@ -249,17 +221,14 @@ fn sweep(numbers: std::ops::Range<u64>, most_seconds: f64) {
         .into_par_iter()
         .filter_map(|n| {
             let (text, study) = study(n)?;
-            let (line, begun) = (study.problem().unwrap(), Instant::now());
-            let mut evolution = Default::default();
-            let outcome = catch_unwind(AssertUnwindSafe(|| study.compute(&line, &mut evolution)));
+            let begun = Instant::now();
+            let outcome = catch_unwind(AssertUnwindSafe(|| drawn::ending(&study)));
             let seconds = begun.elapsed().as_secs_f64();
             let mistake = match outcome {
                 Err(_) => Some("panic".into()),
-                Ok(Ok(())) if !evolution.mesh().is_sorted_by(|a, b| a < b) => Some("completed out of order".into()),
                 Ok(_) if seconds > most_seconds => Some(format!("took {seconds:.1} s")),
-                Ok(Err(driftmesh::Error::Failed { failure, .. })) => return Some((failure.name().into(), None)),
-                Ok(Err(other)) => Some(format!("ended without a name: {other}")),
-                Ok(Ok(())) => return Some(("completed".into(), None)),
+                Ok(Err(mistake)) => Some(mistake),
+                Ok(Ok(name)) => return Some((name.into(), None)),
             };
             Some((String::new(), mistake.map(|mistake| format!("study {n}: {mistake}\n{text}"))))
         })

@@ -1,12 +1,12 @@
+use super::directory::is_frame;
 use super::vtu::{self, Values};
-use crate::simulation::{Event, Observer, Snapshot};
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{cell_jacobians, cell_qualities};
 use crate::kept::{Kept, check_nodal};
 use crate::meshing::Decomposition;
 use crate::output::write_file;
 use crate::simulation::State;
-use super::directory::is_frame;
+use crate::simulation::{Event, Observer, Snapshot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 use super::rows::Rows;
-use crate::simulation::{Event, Observer, Snapshot};
 use crate::error::{Result, Unfit};
 use crate::kept::Kept;
+use crate::simulation::{Event, Observer, Snapshot};
 use serde::Serialize;
 use std::path::Path;
 use std::time::{Duration, Instant};
