@@ -151,8 +151,16 @@ fn ended(n: u64) -> (bool, Option<(String, String)>) {
     (record.safety != Retries::default(), failed)
 }
 
-fn sweep(count: u64) {
-    let ended: Vec<_> = (0..count).into_par_iter().map(ended).collect();
+fn sweep(numbers: &[u64]) {
+    let count = numbers.len();
+    let timed = |n| {
+        let begun = std::time::Instant::now();
+        let ended = ended(n);
+        let seconds = begun.elapsed().as_secs_f64();
+        println!("study {n}: {seconds:.1} s");
+        ended
+    };
+    let ended: Vec<_> = numbers.par_iter().copied().map(timed).collect();
     let mut names: BTreeMap<&str, usize> = BTreeMap::new();
     for (name, said) in ended.iter().filter_map(|(_, failed)| failed.as_ref()) {
         *names.entry(name).or_default() += 1;
@@ -167,13 +175,14 @@ fn sweep(count: u64) {
     assert!(completed >= 90.0, "only {completed:.1} % are completed");
 }
 
+/// Ten that take seconds; in 2, 6 and 10 walks are so noisy that a hundred steps are tried again, which takes minutes.
 #[test]
 fn ten_random_studies_end_as_they_should() {
-    sweep(10);
+    sweep(&[0, 1, 3, 4, 5, 7, 8, 9, 11, 13]);
 }
 
 #[test]
 #[ignore = "minutes: make slow"]
 fn five_hundred_random_studies_end_as_they_should() {
-    sweep(500);
+    sweep(&(0..500).collect::<Vec<_>>());
 }
