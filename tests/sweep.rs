@@ -175,10 +175,10 @@ fn sweep(numbers: &[u64]) {
     assert!(completed >= 90.0, "only {completed:.1} % are completed");
 }
 
-/// Ten that take seconds; in 2, 6 and 10 walks are so noisy that a hundred steps are tried again, which takes minutes.
+/// Those of the first seventeen that take seconds; in 2, 6, 10 and 13 walks are so noisy that a hundred steps are tried again, which takes minutes.
 #[test]
-fn ten_random_studies_end_as_they_should() {
-    sweep(&[0, 1, 3, 4, 5, 7, 8, 9, 11, 13]);
+fn random_studies_end_as_they_should() {
+    sweep(&[0, 1, 3, 4, 5, 7, 8, 9, 11, 12, 14, 15, 16]);
 }
 
 #[test]
