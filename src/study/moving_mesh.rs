@@ -27,7 +27,8 @@ pub struct MovingMesh {
     pub time: Time,
     /// `[pde]`.
     pub pde: PdeKind,
-    /// `[monitor]`; where it is left out, arc length, or what is prescribed as the density itself.
+    /// `[monitor]`. Left out, it is `auto`; `given` where `pde.rho` prescribes the density; `arclength` where the mesh does
+    /// not move, since no mesh follows it and it is the cheapest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub monitor: Option<MonitorKind>,
     /// `[mesh]`.
@@ -458,22 +459,8 @@ impl MovingMesh {
 
     fn check_size(&self) -> Result<()> {
         let lattice = Lattice::new(self.grid.cells, self.domain.periodic).map_err(|error| error.within("grid"))?;
-        let there = sysinfo::System::new().map_or(u128::MAX, |mut system| {
-            system.refresh_memory();
-            u128::from(system.total_memory())
-        });
-        let needed = self.memory();
-        if needed > there {
-            let gib = |bytes: u128| (bytes as f64 / (1_u64 << 30) as f64).ceil();
-            let rule = format!(
-                "{:.2e} nodes need about {:.3e} GiB and this machine has {}; lower it",
-                lattice.len() as f64,
-                gib(needed),
-                gib(there)
-            );
-            return Err(Error::invalid("grid.cells", format!("{:?}", self.grid.cells), rule));
-        }
-        Ok(())
+        let nodes = lattice.nodes().into_iter().map(|n| n as u128).product();
+        super::memory::check_memory(nodes, BYTES_PER_NODE, &self.grid.cells)
     }
 
     fn schedule(&self) -> Result<Schedule> {
