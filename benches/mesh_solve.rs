@@ -58,7 +58,7 @@ fn main() {
         let solve = best_ms(50, || {
             x.copy_from_slice(&padded);
             let matrix: LatticeMatrix<2, 5> = operator.matrix(patch);
-            iterations = fast.solve(&matrix, &right, &mut x, TOLERANCE).unwrap();
+            iterations = fast.solve(&matrix, &right, &mut x, TOLERANCE).unwrap().linear_iterations;
         });
         let mut direct = SparseLu::default();
         let mut y = padded.clone();

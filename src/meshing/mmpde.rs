@@ -283,8 +283,8 @@ impl<const D: usize> MeshOperator<D> {
         let right = self.right(patch, old, jump);
         let mut x = patch.gather(&self.lattice, new, jump);
         let matrix = self.matrix(patch);
-        let linear_iterations = solver.solve(&matrix, &right, &mut x, exactness(&matrix, size))?;
-        Ok((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
+        let work = solver.solve(&matrix, &right, &mut x, exactness(&matrix, size))?;
+        Ok((x, work))
     }
 
     /// The right-hand side on one patch: old values, continued across the seam of a periodic axis.
