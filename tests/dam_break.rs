@@ -83,13 +83,15 @@ struct Radial {
 
 /// Where the radial equations end: the water there is still.
 const END: f64 = 3.6;
+/// Radius of the pile: so large that its slope at the centre, where r has a kink, is a fiftieth of a thousandth of its steepest.
+const RADIUS: f64 = 1.5;
 
 impl Radial {
-    /// The pile of the study.
+    /// The pile of the study, of a larger radius.
     fn pile(points: usize) -> Self {
         let spacing = END / points as f64;
         let r = |i: usize| (i as f64 + 0.5) * spacing;
-        let depth = |r: f64| 10.0 + 1.25 * (1.0 - ((r - 1.0) / 0.3).tanh());
+        let depth = |r: f64| 10.0 + 1.25 * (1.0 - ((r - RADIUS) / 0.3).tanh());
         Self { spacing, values: (0..points).map(|i| [depth(r(i)), 0.0]).collect() }
     }
 
@@ -166,7 +168,7 @@ fn errors(radial: &Radial, (mesh, u): (&Mesh<2>, &Field)) -> [f64; 2] {
 }
 
 /// The pile on the moving mesh is the one of the radial equations, to second order in cells and steps together. These are
-/// converged themselves: four times as coarse, they are off by a thousandth of what the study leaves.
+/// converged themselves: four times as coarse, they are off by less than a hundredth of what the study leaves.
 #[test]
 fn the_pile_is_that_of_the_radial_equations() {
     let [radial, coarse] = [1440, 360].map(|points| {
@@ -179,13 +181,13 @@ fn the_pile_is_that_of_the_radial_equations() {
     let [forty, eighty] = [("40", "5e-3"), ("80", "2.5e-3")].map(|(cells, step)| {
         let settings = [format!("grid.cells=[{cells}, {cells}]"), format!("time.step={step}")];
         let whole = "mesh.generator={kind=\"whole\"}";
-        let (_, passed) = rerun(&[&settings[0], &settings[1], whole]);
+        let (_, passed) = rerun(&[&settings[0], &settings[1], whole, &format!("pde.radius={RADIUS}")]);
         let (t, mesh, u) = passed.last.unwrap();
         assert_eq!(t, 0.15);
         errors(&radial, (&mesh, &u))
     });
     println!("the reference {apart:.1e}, depth and velocity {forty:.4?} and {eighty:.4?}");
-    assert!(apart < 1e-3 * forty[0], "the radial equations are not converged: {apart:.1e} beside {:.1e}", forty[0]);
+    assert!(apart < 1e-2 * forty[0], "the radial equations are not converged: {apart:.1e} beside {:.1e}", forty[0]);
     for (what, [coarse, fine]) in ["depth", "velocity"].iter().zip([0, 1].map(|c| [forty[c], eighty[c]])) {
         let order = (coarse / fine).log2();
         assert!((order - 2.0).abs() < 0.3, "{what}: {coarse:.2e} and {fine:.2e}, order {order:.2}");

@@ -69,7 +69,7 @@ impl Poisson<'_> {
         };
         for k in 0..stencils.patch().len() {
             let row = place[stencils.index(k)];
-            for (index, a, source) in stencils.row(k) {
+            for (index, a, source) in stencils.points(k) {
                 couple(row, index, a, &mut b[row]);
                 b[row] += source * self.source[index];
             }

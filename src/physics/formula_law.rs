@@ -230,7 +230,7 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
     fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
         let unknown = |exact| evaluate(exact, t, mesh).into_flattened();
         let known: Vec<Vec<f64>> = self.exact.iter().map(|(_, exact)| unknown(exact)).collect();
-        (!known.is_empty()).then(|| Field::joined(&known))
+        (!known.is_empty()).then(|| Field::joined(&known).expect("each has one value a node"))
     }
 
     fn known(&self) -> Vec<usize> {

@@ -1,5 +1,5 @@
 use super::Source;
-use crate::density::{Arclength, Given, MonitorKind};
+use crate::density::{ArclengthTable, GivenTable, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
@@ -177,7 +177,7 @@ pub struct MeshTable {
 impl Default for MeshTable {
     fn default() -> Self {
         Self {
-            relaxation: Relaxation::Auto,
+            relaxation: Mmpde::default().relaxation,
             form: MeshForm::Conservative,
             start: None,
             generator: GeneratorKind::default(),
@@ -277,15 +277,15 @@ impl MovingMesh {
         let prescribed_density = matches!(&self.pde, PdeKind::Prescribed(p) if p.rho.is_some());
         let stays = matches!(self.mesh.generator, GeneratorKind::Fixed(_));
         let monitor = self.monitor.get_or_insert_with(|| match prescribed_density {
-            true => MonitorKind::Given(Given::default()),
+            true => MonitorKind::GivenTable(GivenTable::default()),
             // no mesh follows it: the cheap one
-            false if stays => MonitorKind::Arclength(Arclength::default()),
+            false if stays => MonitorKind::ArclengthTable(ArclengthTable::default()),
             false => MonitorKind::default(),
         });
         monitor.check().map_err(|error| error.within("monitor"))?;
         let unknowns = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?.unknowns();
         monitor.clone().into_monitor(&unknowns).map_err(|error| error.within("monitor"))?;
-        if prescribed_density && !matches!(monitor, MonitorKind::Given(_)) {
+        if prescribed_density && !matches!(monitor, MonitorKind::GivenTable(_)) {
             let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
             return Err(Error::invalid("monitor.kind", format!("\"{}\"", monitor.name()), rule));
         }

@@ -360,7 +360,7 @@ impl PoissonStudy {
         let problem = Poisson { source: &[], side: &[], neumann: self.neumann() };
         let mut counts = vec![false; lattice.len()];
         for k in 0..stencils.patch().len() {
-            stencils.row(k).into_iter().for_each(|(index, _, source)| counts[index] |= source != 0.0);
+            stencils.row(k).into_iter().flatten().for_each(|(index, _, source)| counts[index] |= source != 0.0);
         }
         let flows: Vec<bool> = (0..lattice.len()).map(|k| problem.neumann_side(lattice, k).is_some()).collect();
         let given: Vec<bool> = (0..lattice.len()).map(|k| lattice.on_side(k) && !flows[k]).collect();
@@ -490,7 +490,15 @@ impl Solved {
         let gait = Gait::at_rest(&self.mesh);
         (
             names,
-            State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, gait, own_change: 0.0 },
+            State {
+                t: 0.0,
+                step: 0,
+                mesh: self.mesh.clone(),
+                u: Field::joined(&fields).expect("u and its error have one value a node each"),
+                rho,
+                gait,
+                own_change: 0.0,
+            },
         )
     }
 

@@ -284,12 +284,13 @@ impl Parts {
 }
 
 impl<E: Estimator> MeshGenerator for Stochastic<E> {
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let parts = match self.parts.take().filter(|parts| parts.lattice == *lattice) {
             Some(parts) => parts,
             None => Parts::new(lattice, self.subdomains)?,
         };
+        self.check(lattice).map_err(Failure::refusing)?;
         let parts = self.parts.insert(parts);
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();

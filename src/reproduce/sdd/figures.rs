@@ -3,7 +3,7 @@
 use super::table_2::state_of;
 use super::{BURGERS, DAM_BREAK, NO_SAFETY, RESIDUAL, RINGS, WHOLE, settings, stochastic, study};
 use crate::error::Result;
-use crate::geometry::{compare, quality};
+use crate::geometry::{compare, quality_and_integral};
 use crate::reproduce::{Options, Rerun, Table};
 use crate::simulation::{State, draw};
 
@@ -87,7 +87,7 @@ impl Shown {
 }
 
 fn row(figure: &Shown, t: f64, s: usize, state: &State, whole: &State) -> Vec<String> {
-    let quality = quality(&state.mesh, &state.rho);
+    let quality = quality_and_integral(&state.mesh, &state.rho, &state.rho).0;
     let rms = compare(&state.mesh, &whole.mesh).mesh_rms;
     let cell = state.mesh.extent()[0] / state.mesh.lattice().cells()[0] as f64;
     let verdict = match s {
