@@ -42,23 +42,24 @@ fn main() {
     for n in [40, 112, 256] {
         let state = developed(n);
         let lattice = *state.mesh.lattice();
-        let operator = Mmpde::default().operator(&lattice, &state.rho, DT).unwrap();
+        let operator = Mmpde::published().operator(&lattice, &state.rho, DT).unwrap();
         let patch = Patch::whole(&lattice);
         // the sides at their new places
-        let Moved { mesh: moved, .. } = Whole::default().step(&Mmpde::default(), &state.mesh, &state.rho, DT).unwrap();
+        let Moved { mesh: moved, .. } =
+            Whole::default().step(&Mmpde::published(), &state.mesh, &state.rho, DT).unwrap();
         let mut guess = state.mesh.x().to_vec();
         lattice.sides().for_each(|k| guess[k] = moved.x()[k]);
         let right: Vec<[f64; 2]> = patch.nodes(&lattice).map(|k| state.mesh.x()[k]).collect();
         let padded = patch.gather(&lattice, &guess, [[0.0; 2]; 2]);
 
         let mut whole = Whole::default();
-        let step = best_ms(50, || drop(whole.step(&Mmpde::default(), &state.mesh, &state.rho, DT).unwrap()));
+        let step = best_ms(50, || drop(whole.step(&Mmpde::published(), &state.mesh, &state.rho, DT).unwrap()));
         let (mut fast, mut iterations) = (Bicgstab::default(), 0);
         let mut x = padded.clone();
         let solve = best_ms(50, || {
             x.copy_from_slice(&padded);
             let matrix: LatticeMatrix<2, 5> = operator.matrix(patch);
-            iterations = fast.solve(&matrix, &right, &mut x, TOLERANCE).unwrap();
+            iterations = fast.solve(&matrix, &right, &mut x, TOLERANCE).unwrap().linear_iterations;
         });
         let mut direct = SparseLu::default();
         let mut y = padded.clone();

@@ -23,7 +23,7 @@ fn developed(n: usize) -> driftmesh::Result<(Mesh<2>, Vec<f64>)> {
     let mut mesh = Mesh::uniform(Lattice::bounded([n, n])?, [0.0; 2], [1.0; 2])?;
     let mut whole = Whole::default();
     for step in 0..STEPS {
-        mesh = whole.step(&Mmpde::default(), &mesh, &density(&mesh, step)?, DT)?.mesh;
+        mesh = whole.step(&Mmpde::published(), &mesh, &density(&mesh, step)?, DT)?.mesh;
     }
     let rho = density(&mesh, STEPS)?;
     Ok((mesh, rho))
@@ -63,7 +63,7 @@ fn rows(n: usize) -> driftmesh::Result<()> {
     for _ in 0..(2000 / n).clamp(3, 20) {
         for ((best, found), (_, generator)) in best.iter_mut().zip(&mut found).zip(&mut generators) {
             let started = Instant::now();
-            let moved = generator.step(&Mmpde::default(), &mesh, &rho, DT)?;
+            let moved = generator.step(&Mmpde::published(), &mesh, &rho, DT)?;
             *best = best.min(started.elapsed().as_secs_f64());
             *found = Some(moved);
         }

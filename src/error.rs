@@ -313,6 +313,30 @@ pub enum Failure {
         /// D₀ ∂u₀/∂y + D₁ ∂u₁/∂y.
         slope: f64,
     },
+    /// A mesh generator met a mesh whose sides are not those of the box around it: it would pull them straight.
+    #[error(
+        "the mesh does not fill its box: node ({}, {}) of a side across axis {axis}, x = {}, y = {}, is off that side of the box by {off:.1e}", node[0], node[1], short(x[0]), short(x[1])
+    )]
+    NotABox {
+        /// Distance from the side of the box.
+        off: f64,
+        /// The axis across the side.
+        axis: usize,
+        /// Indices of the node along ξ and η.
+        node: [usize; 2],
+        /// Where the node is.
+        x: [f64; 2],
+    },
+    /// A setting or an argument of a step is out of range.
+    #[error("{what} is {value}, but {rule}")]
+    OutOfRange {
+        /// The setting, in the reader's words.
+        what: String,
+        /// Its value.
+        value: String,
+        /// What must hold.
+        rule: String,
+    },
     /// An array does not fit the lattice it is given with.
     #[error("{what} has {found} values, but the lattice has {expected} nodes")]
     WrongLength {
@@ -372,8 +396,31 @@ impl Failure {
                 | Self::NotUniform { .. }
                 | Self::ManySubsteps { .. }
                 | Self::Subdomains { .. }
+                | Self::NotABox { .. }
+                | Self::OutOfRange { .. }
                 | Self::WrongLength { .. }
         )
+    }
+
+    /// What refuses a setting, where a step cannot return it as an [`Error`].
+    pub(crate) fn refusing(error: Error) -> Self {
+        match error {
+            Error::Failed { failure, .. } => failure,
+            Error::Invalid { key, value, rule } => Self::OutOfRange { what: format!("`{key}`"), value, rule },
+            other => Self::OutOfRange { what: "a setting".into(), value: "not usable".into(), rule: other.to_string() },
+        }
+    }
+
+    /// Refuses a number that is not finite and above 0.
+    pub(crate) fn unless_positive(what: &str, value: f64) -> Result<(), Self> {
+        match value.is_finite() && value > 0.0 {
+            true => Ok(()),
+            false => Err(Self::OutOfRange {
+                what: what.into(),
+                value: value.to_string(),
+                rule: "must be a finite number above 0".into(),
+            }),
+        }
     }
 
     /// Short name of the variant, for `summary.json`.
@@ -463,6 +510,10 @@ impl Failure {
             }
             Self::FrontUnstable { .. } => "lower time.step, set it to \"auto\", or set front.stepping to \"implicit\"",
             Self::WrongSide { .. } => "let the lower phase be the warm one: mend the initial and boundary formulas",
+            Self::NotABox { .. } => {
+                "move the mesh of the unit square instead, and map it to the domain; or set mesh.generator to { kind = \"fixed\" }"
+            }
+            Self::OutOfRange { .. } => "give a value that does",
             Self::WrongLength { .. } => "give one value a node, in lattice order",
         }
     }

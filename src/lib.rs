@@ -21,14 +21,14 @@
 //! let mut mesh = Mesh::uniform(Lattice::bounded([40, 40])?, [0.0, 0.0], [1.0, 1.0])?;
 //! let front = |[x, y]: [f64; 2]| (40.0 * (x + y - 1.0)).tanh();
 //! let (monitor, mut generator) = (Arclength::default(), Whole::default());
-//! let equation = Mmpde { relaxation: 0.1.into(), ..Mmpde::default() };
-//! for _ in 0..50 {
+//! let equation = Mmpde::default();
+//! for _ in 0..200 {
 //!     let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
 //!     let rho = monitor.density(&mesh, &u, None)?;
 //!     mesh = generator.step(&equation, &mesh, &rho, 1e-3)?.mesh;
 //! }
 //! let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
-//! let q = quality(&mesh, &monitor.density(&mesh, &u, None)?);
+//! let q = quality(&mesh, &monitor.density(&mesh, &u, None)?)?;
 //! assert!(q.min_scaled_jacobian > 0.0 && q.equidistribution < 2.0);
 //! # Ok::<(), driftmesh::Error>(())
 //! ```

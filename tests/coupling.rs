@@ -45,7 +45,7 @@ fn simulate(
     let mut simulation = Simulation {
         physics,
         monitor,
-        mover: Mover::by(Box::new(Whole::default()), Mmpde { relaxation: 0.2.into(), ..Mmpde::default() }),
+        mover: Mover::by(Box::new(Whole::default()), Mmpde { relaxation: 0.2.into(), ..Mmpde::published() }),
         coupling,
         safety: Safety::default(),
         schedule: Schedule::new(start, end, dt, vec![end]).unwrap(),

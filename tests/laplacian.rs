@@ -219,7 +219,7 @@ fn both_solvers_agree() {
     study.solver.kind = driftmesh::study::SolverKind::Krylov;
     let iterated = study.solve().unwrap();
     let apart = direct.u.iter().zip(&iterated.u).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-    assert!(apart < 1e-10 && iterated.iterations > 0, "{apart:e} after {}", iterated.iterations);
+    assert!(apart < 1e-10 && iterated.work.linear_iterations > 0, "{apart:e} after {:?}", iterated.work);
 }
 
 /// Refused at their place in the study, with the cell or the point.

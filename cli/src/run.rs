@@ -162,6 +162,9 @@ fn table(summary: &Summary) -> String {
         "work     {} steps, {} Newton iterations, {} linear solves in {} iterations",
         total.steps, total.work.newton_iterations, total.work.linear_solves, total.work.linear_iterations
     );
+    if total.work.direct_solves() > 0 {
+        text += &format!(", {} of them by elimination", total.work.direct_solves());
+    }
     if total.work.substeps > 0 {
         text += &format!(", {} explicit substeps", total.work.substeps);
     }

@@ -62,6 +62,19 @@ fn entries(directory: &Path) -> Vec<String> {
     names
 }
 
+/// A grid that needs more than `ulimit -v` allows is refused before anything is written, and named as such: 1.3 GiB of 1.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_limit_of_the_shell_is_known() {
+    let sandbox = Sandbox::new();
+    let run = format!(
+        "ulimit -v 1048576; exec {} run study.toml --out out --set 'grid.cells=[700, 700]'",
+        env!("CARGO_BIN_EXE_driftmesh")
+    );
+    let output = Command::new("sh").args(["-c", &run]).current_dir(sandbox.directory.path()).output().unwrap();
+    assert_refused(&sandbox, &output, &["`grid.cells` is [700, 700]", "`ulimit -v` allows 1; lower it"]);
+}
+
 /// A run leaves everything that the contract names, and says where.
 #[test]
 fn a_run_leaves_its_directory() {

@@ -166,5 +166,13 @@ class WrongSide(MeshError):
     """The warm phase lies on the wrong side of the front: the problem is ill-posed."""
 
 
+class NotABox(MeshError, ValueError):
+    """A mesh generator met a mesh whose sides are not those of the box around it: it would pull them straight."""
+
+
+class OutOfRange(MeshError, ValueError):
+    """A setting or an argument of a step is out of range."""
+
+
 class WrongLength(MeshError, ValueError):
     """An array does not fit the lattice it is given with."""

@@ -83,6 +83,7 @@ fn remedy(failure: &Failure) -> Option<&'static str> {
             "raise `iterations`, or give a tolerance in its place, which tells whether the iteration contracts"
         }
         Failure::DegenerateStencil { .. } => "make the cells around it less flat",
+        Failure::NotABox { .. } => "move the mesh of the unit square instead, and map it to the domain",
         Failure::Subdomains { .. } => "give every axis between one subdomain and one a cell",
         _ => return None,
     })

@@ -74,7 +74,7 @@ pub fn uniform<'py>(
 pub fn quality(py: Python<'_>, mesh: Given<'_>, density: PyReadonlyArray2<'_, f64>) -> PyResult<[f64; 4]> {
     let mesh = mesh.mesh(py)?;
     let rho = nodal(&mesh, &density)?;
-    let q = compute(py, move || geometry::quality(&mesh, &rho))?;
+    let q = compute(py, move || geometry::quality(&mesh, &rho))?.map_err(|failure| plain(py, failure))?;
     Ok([q.q_max, q.q_mean, q.min_scaled_jacobian, q.equidistribution])
 }
 

@@ -43,7 +43,7 @@ pub fn stencils<'py>(
         let stencils = laplacian::stencils(&mesh, laplacian)?;
         let (mut rows, mut columns, mut a, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for k in 0..stencils.patch().len() {
-            for (column, on_u, on_source) in stencils.row(k) {
+            for (column, on_u, on_source) in stencils.row(k).into_iter().flatten() {
                 rows.push(stencils.index(k) as i64);
                 columns.push(column as i64);
                 a.push(on_u);

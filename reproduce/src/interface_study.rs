@@ -58,11 +58,11 @@ impl InterfaceStep {
     /// Where the run up to there fails.
     pub fn case_a(cells: usize) -> Result<Self> {
         let dt = 1e-3;
-        let monitor = Arclength { strength: Strength::Relative(10.0), smoothing: 0, ..Arclength::default() };
+        let monitor = Arclength { strength: Strength::Relative(10.0), smoothing: 0 };
         let mut simulation = Simulation {
             physics: Box::new(Burgers::new(0.005, Convection::Advective)?),
             monitor: Box::new(monitor),
-            mover: Mover::by(Box::new(Whole::default()), Mmpde::default()),
+            mover: Mover::by(Box::new(Whole::default()), Mmpde::published()),
             coupling: Coupling::default(),
             safety: Safety::default(),
             schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
@@ -70,7 +70,7 @@ impl InterfaceStep {
         let mesh = Mesh::uniform(Lattice::bounded([cells, cells])?, [0.0; 2], [1.0; 2])?;
         let mut state = simulation.start(mesh)?;
         simulation.run(&mut state, &mut Record::default(), &mut [])?;
-        Ok(Self::new(state.mesh, state.rho, Mmpde::default(), dt, [4, 4])?)
+        Ok(Self::new(state.mesh, state.rho, Mmpde::published(), dt, [4, 4])?)
     }
 
     /// A step of any mesh.
@@ -358,7 +358,7 @@ struct SweepsAlone {
 }
 
 impl MeshGenerator for SweepsAlone {
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();
@@ -387,7 +387,7 @@ fn coupled(options: Options) -> Result<Table> {
         let mut simulation = Simulation {
             physics: Box::new(Burgers::new(0.005, Convection::Conservative)?),
             monitor: Box::new(Arclength::default()),
-            mover: Mover::by(generator, Mmpde::default()),
+            mover: Mover::by(generator, Mmpde::published()),
             coupling: Coupling::default(),
             safety: Safety::default(),
             schedule: Schedule::new(0.25, 0.75, 1e-3, vec![0.75])?,

@@ -1,7 +1,7 @@
 use super::{MAX_SMOOTHING, Monitor, smooth};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::Mesh;
-use crate::numerics::difference::{Gradient, Metrics};
+use crate::geometry::{Mesh, check_length};
+use crate::numerics::difference::Metrics;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,26 +21,19 @@ use serde::{Deserialize, Serialize};
 /// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 1.0])?;
 /// let ramp: Vec<f64> = mesh.x().iter().map(|x| 2.0 * x[0]).collect();
 /// // a ramp of slope 2 with α = 2 has ρ = √(1 + 2·2²) = 3
-/// let rho = Arclength { strength: Strength::Absolute(2.0), ..Arclength::default() }.density(&mesh, &ramp, None)?;
+/// let rho = Arclength { strength: Strength::Absolute(2.0), smoothing: 2 }.density(&mesh, &ramp, None)?;
 /// assert!(rho.iter().all(|r| (r - 3.0).abs() < 1e-14));
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 ///
 /// # Source
 /// Huang and Russell, *Adaptive Moving Mesh Methods*, Springer (2011).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arclength {
-    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
-    /// said.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub of: Option<String>,
     /// How α is chosen.
     pub strength: Strength,
     /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
     pub smoothing: usize,
-    /// How the mesh equation differences ρ.
-    pub gradient: Gradient,
 }
 
 /// How α is chosen.
@@ -55,7 +48,7 @@ pub enum Strength {
 
 impl Default for Arclength {
     fn default() -> Self {
-        Self { of: None, strength: Strength::Relative(30.0), smoothing: 2, gradient: Gradient::Central }
+        Self { strength: Strength::Relative(30.0), smoothing: 2 }
     }
 }
 
@@ -81,9 +74,14 @@ impl Arclength {
 
 impl Monitor for Arclength {
     fn density(&self, mesh: &Mesh<2>, u: &[f64], gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
+        self.check().map_err(Failure::refusing)?;
+        check_length(mesh.lattice(), "what the mesh follows", u.len())?;
         let differenced: Vec<[f64; 2]>;
         let gradient = match gradient {
-            Some(exact) => exact,
+            Some(exact) => {
+                check_length(mesh.lattice(), "the gradient of what the mesh follows", exact.len())?;
+                exact
+            }
             None => {
                 differenced = Metrics::new(mesh).gradient(u);
                 &differenced
@@ -98,7 +96,7 @@ impl Monitor for Arclength {
             }
         };
         let mut rho: Vec<f64> = slope2.into_iter().map(|s| (1.0 + alpha * s).sqrt()).collect();
-        smooth(mesh.lattice(), &mut rho, self.smoothing);
+        smooth(mesh.lattice(), &mut rho, self.smoothing)?;
         match rho.iter().position(|r| !r.is_finite()) {
             None => Ok(rho),
             Some(k) => Err(Failure::NonFinite {

@@ -8,6 +8,7 @@ mod given;
 mod noise;
 mod root_gradient;
 mod smoothing;
+mod tables;
 
 pub use arclength::{Arclength, Strength};
 pub use given::Given;
@@ -15,6 +16,7 @@ pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
 pub(crate) use root_gradient::need;
 pub use smoothing::smooth;
+pub use tables::{ArclengthTable, GivenTable, RootGradientTable};
 
 use crate::error::{Failure, Result};
 use crate::geometry::{Field, Mesh};
@@ -46,15 +48,15 @@ pub trait Monitor: Send {
 kinds! {
     /// `[monitor]` of a study.
     MonitorKind {
-        "auto" = RootGradient: "rho = 1 + 4 sqrt(|grad u|) over its mean, smoothed; nothing to set",
-        "arclength" = Arclength: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
-        "given" = Given: "rho = the unknown itself, smoothed",
+        "auto" = RootGradientTable: "rho = 1 + 4 sqrt(|grad u|) over its mean, smoothed; nothing to set",
+        "arclength" = ArclengthTable: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
+        "given" = GivenTable: "rho = the unknown itself, smoothed",
     }
 }
 
 impl Default for MonitorKind {
     fn default() -> Self {
-        Self::RootGradient(RootGradient::default())
+        Self::RootGradientTable(RootGradientTable::default())
     }
 }
 
@@ -65,27 +67,27 @@ impl MonitorKind {
     /// [`Error::Invalid`](crate::Error::Invalid).
     pub fn check(&self) -> Result<()> {
         match self {
-            Self::RootGradient(_) => Ok(()),
-            Self::Arclength(arclength) => arclength.check(),
-            Self::Given(given) => given.check(),
+            Self::RootGradientTable(_) => Ok(()),
+            Self::ArclengthTable(arclength) => arclength.density().check(),
+            Self::GivenTable(given) => given.density().check(),
         }
     }
 
     /// How the mesh equation differences this density.
     pub fn gradient(&self) -> Gradient {
         match self {
-            Self::RootGradient(_) => Gradient::Safe,
-            Self::Arclength(arclength) => arclength.gradient,
-            Self::Given(given) => given.gradient,
+            Self::RootGradientTable(_) => Gradient::Safe,
+            Self::ArclengthTable(arclength) => arclength.gradient,
+            Self::GivenTable(given) => given.gradient,
         }
     }
 
     /// The unknown, or the formula of them, that the mesh follows, where it is not the first.
     pub fn of(&self) -> Option<&str> {
         match self {
-            Self::RootGradient(root) => root.of.as_deref(),
-            Self::Arclength(arclength) => arclength.of.as_deref(),
-            Self::Given(given) => given.of.as_deref(),
+            Self::RootGradientTable(root) => root.of.as_deref(),
+            Self::ArclengthTable(arclength) => arclength.of.as_deref(),
+            Self::GivenTable(given) => given.of.as_deref(),
         }
     }
 
@@ -96,9 +98,9 @@ impl MonitorKind {
     pub fn into_monitor(self, unknowns: &[String]) -> Result<Box<dyn Monitor>> {
         let of = self.of().filter(|of| Some(*of) != unknowns.first().map(String::as_str)).map(String::from);
         let monitor: Box<dyn Monitor> = match self {
-            Self::RootGradient(root) => Box::new(root),
-            Self::Arclength(arclength) => Box::new(arclength),
-            Self::Given(given) => Box::new(given),
+            Self::RootGradientTable(_) => Box::new(RootGradient::default()),
+            Self::ArclengthTable(arclength) => Box::new(arclength.density()),
+            Self::GivenTable(given) => Box::new(given.density()),
         };
         Ok(match of {
             Some(of) => Box::new(Following::new(monitor, &of, unknowns)?),

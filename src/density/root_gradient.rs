@@ -1,9 +1,7 @@
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
-use crate::geometry::Mesh;
+use crate::geometry::{Mesh, check_length};
 use crate::numerics::{larger, sum};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// The root of the slope, over its mean: no number to set
 ///
@@ -21,14 +19,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a twentieth of
 /// the domain. Their cost does not depend on their number. Where u is constant, ρ = 1.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RootGradient {
-    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
-    /// said.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub of: Option<String>,
-}
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RootGradient {}
 
 /// Share of the layer in the density.
 const BETA: f64 = 4.0;
@@ -46,6 +38,7 @@ const ROUNDING: f64 = 1e-10;
 impl Monitor for RootGradient {
     fn density(&self, mesh: &Mesh<2>, u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
         let lattice = mesh.lattice();
+        check_length(lattice, "what the mesh follows", u.len())?;
         let ([n, m], periodic) = (lattice.cells(), lattice.periodic());
         let (x, values) = (mesh.closed(), lattice.closed(u));
         let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);

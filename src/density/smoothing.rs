@@ -1,23 +1,29 @@
-use crate::geometry::Lattice;
+use crate::error::Failure;
+use crate::geometry::{Lattice, check_length};
 
 /// Passes of the filter (1 2 1)⊗(1 2 1)/16 over a nodal field
 ///
 /// Sides repeat their own value (not mirrored, which would weigh the interior neighbour twice); periodic axes wrap.
 ///
+/// # Errors
+/// [`Failure::WrongLength`] where there is not one value a node.
+///
 /// # Example
 /// ```
 /// use driftmesh::{density::smooth, geometry::Lattice};
 /// let mut spike = vec![0.0, 0.0, 0.0, 0.0, 16.0, 0.0, 0.0, 0.0, 0.0]; // 3 × 3 nodes
-/// smooth(&Lattice::bounded([2, 2])?, &mut spike, 1);
+/// smooth(&Lattice::bounded([2, 2])?, &mut spike, 1)?;
 /// assert_eq!(spike, [1.0, 2.0, 1.0, 2.0, 4.0, 2.0, 1.0, 2.0, 1.0]);
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
-pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: usize) {
+pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: usize) -> Result<(), Failure> {
+    check_length(lattice, "what is smoothed", values.len())?;
     for axis in 0..D {
         along(lattice.nodes(), axis, values, |lines| {
             (0..passes).for_each(|_| pass(lines, lattice.periodic()[axis], 1.0));
         });
     }
+    Ok(())
 }
 
 /// So many passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does not
@@ -178,7 +184,7 @@ mod tests {
             let mut direct = vec![0.0; n];
             direct[n / 2 - 3] = 1.0;
             let mut wide = direct.clone();
-            smooth(&Lattice::bounded([n - 1]).unwrap(), &mut direct, passes);
+            smooth(&Lattice::bounded([n - 1]).unwrap(), &mut direct, passes).unwrap();
             smooth_widely([n], [false], &mut wide, [passes as f64]);
             let most = direct.iter().copied().fold(0.0, f64::max);
             let off = direct.iter().zip(&wide).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));

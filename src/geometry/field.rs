@@ -1,3 +1,5 @@
+use crate::error::Failure;
+
 /// One or more unknowns at every node of a lattice
 ///
 /// The values of one node stand together: component c of node k is `values[k * components + c]`. A scalar field is
@@ -29,24 +31,43 @@ impl Field {
     ///
     /// # Example
     /// ```
-    /// let field = driftmesh::geometry::Field::of(2, vec![1.0, 2.0, 3.0, 4.0]);
+    /// let field = driftmesh::geometry::Field::of(2, vec![1.0, 2.0, 3.0, 4.0])?;
     /// assert_eq!(field.component(1).collect::<Vec<_>>(), [2.0, 4.0]);
+    /// # Ok::<(), driftmesh::Error>(())
     /// ```
-    pub fn of(components: usize, values: Vec<f64>) -> Self {
-        Self { components: components.max(1), values }
+    ///
+    /// # Errors
+    /// [`Failure::OutOfRange`] where the values are not as many for every node, or there is no unknown.
+    pub fn of(components: usize, values: Vec<f64>) -> Result<Self, Failure> {
+        if components == 0 || !values.len().is_multiple_of(components) {
+            let rule = format!("{} values must be as many for every node", values.len());
+            return Err(Failure::OutOfRange {
+                what: "the number of unknowns".into(),
+                value: components.to_string(),
+                rule,
+            });
+        }
+        Ok(Self { components, values })
     }
 
     /// A field from the values of each unknown at all nodes.
     ///
     /// # Example
     /// ```
-    /// let field = driftmesh::geometry::Field::joined(&[vec![1.0, 3.0], vec![2.0, 4.0]]);
+    /// let field = driftmesh::geometry::Field::joined(&[vec![1.0, 3.0], vec![2.0, 4.0]])?;
     /// assert_eq!(field.values(), [1.0, 2.0, 3.0, 4.0]);
+    /// # Ok::<(), driftmesh::Error>(())
     /// ```
-    pub fn joined(unknowns: &[Vec<f64>]) -> Self {
-        let nodes = unknowns.iter().map(Vec::len).min().unwrap_or(0);
+    ///
+    /// # Errors
+    /// [`Failure::WrongLength`] where an unknown has other nodes than the first.
+    pub fn joined(unknowns: &[Vec<f64>]) -> Result<Self, Failure> {
+        let nodes = unknowns.first().map_or(0, Vec::len);
+        if let Some(other) = unknowns.iter().find(|values| values.len() != nodes) {
+            return Err(Failure::WrongLength { what: "an unknown", found: other.len(), expected: nodes });
+        }
         let values = (0..nodes).flat_map(|k| unknowns.iter().map(move |values| values[k])).collect();
-        Self { components: unknowns.len().max(1), values }
+        Ok(Self { components: unknowns.len().max(1), values })
     }
 
     /// Unknowns a node.

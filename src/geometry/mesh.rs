@@ -1,4 +1,4 @@
-use super::{Lattice, lattice::strides};
+use super::{Lattice, lattice::strides, nodal::check_length};
 use crate::error::{Error, Failure, Result};
 use std::borrow::Cow;
 
@@ -87,12 +87,18 @@ impl<const D: usize> Mesh<D> {
     /// The same lattice and box with other positions, one a node in lattice order.
     ///
     /// # Errors
-    /// [`Failure::WrongLength`] where the number of positions is not the number of nodes.
+    /// [`Failure::WrongLength`] where the number of positions is not the number of nodes; [`Failure::NonFinite`] for the
+    /// first position that is not finite.
     pub fn moved(&self, x: Vec<[f64; D]>) -> Result<Self, Failure> {
-        match x.len() {
-            n if n == self.lattice.len() => Ok(Self { x, ..*self }),
-            found => Err(Failure::WrongLength { what: "the mesh", found, expected: self.lattice.len() }),
+        check_length(&self.lattice, "the mesh", x.len())?;
+        if let Some(k) = x.iter().position(|x| !x.iter().all(|v| v.is_finite())) {
+            let value = x[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
+            // a failure tells two coordinates: those of a line are told with 0 as the second
+            let node = self.lattice.node(k);
+            let (node, x) = (first_two(&node), first_two(&x[k]));
+            return Err(Failure::NonFinite { what: "the mesh", value, node, x });
         }
+        Ok(Self { x, ..*self })
     }
 
     /// The map from the computational domain to the mesh on a lattice of other `cells`, linear between the nodes of this one
@@ -219,4 +225,9 @@ impl<const D: usize> Mesh<D> {
         }
         shortest.sqrt()
     }
+}
+
+/// The first two of some numbers, 0 where there are fewer.
+fn first_two<T: Copy + Default>(values: &[T]) -> [T; 2] {
+    [0, 1].map(|d| values.get(d).copied().unwrap_or_default())
 }

@@ -5,6 +5,7 @@ mod field;
 mod lattice;
 mod locate;
 mod mesh;
+mod nodal;
 mod patch;
 mod quality;
 mod remap;
@@ -17,6 +18,7 @@ pub use lattice::Lattice;
 pub(crate) use lattice::strides;
 pub use locate::interpolate;
 pub use mesh::Mesh;
+pub(crate) use nodal::{check_length, check_positive};
 pub use patch::Patch;
 pub(crate) use quality::quality_and_integral;
 pub use quality::{

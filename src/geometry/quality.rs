@@ -1,5 +1,6 @@
 use super::Mesh;
 use super::field::largest;
+use super::nodal::check_length;
 use crate::error::Failure;
 use std::ops::Range;
 
@@ -169,18 +170,22 @@ pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
 
 /// All quality figures of a mesh under a density `rho`, one value a node.
 ///
+/// # Errors
+/// [`Failure::WrongLength`] where `rho` has not one value a node.
+///
 /// # Example
 /// ```
 /// use driftmesh::geometry::{quality, Lattice, Mesh};
 /// // cells of 1 × 2: Q = ½ (1 + 4) / 2 = 1.25
 /// let mesh = Mesh::uniform(Lattice::bounded([3, 3])?, [0.0, 0.0], [3.0, 6.0])?;
-/// let q = quality(&mesh, &vec![1.0; 16]);
+/// let q = quality(&mesh, &vec![1.0; 16])?;
 /// assert!((q.q_max - 1.25).abs() < 1e-14);
 /// assert!((q.equidistribution - 1.0).abs() < 1e-14);
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
-pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Quality {
-    quality_and_integral(mesh, rho, rho).0
+pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Result<Quality, Failure> {
+    check_length(mesh.lattice(), "the density", rho.len())?;
+    Ok(quality_and_integral(mesh, rho, rho).0)
 }
 
 /// The same, and the integral of nodal values: of each cell, its area times the mean over its corners.
@@ -359,7 +364,7 @@ mod tests {
     fn a_sheared_mesh_has_the_q_of_its_shear() {
         let mesh = square(4);
         let sheared = mesh.moved(mesh.x().iter().map(|&[x, y]| [x + 0.5 * y, y]).collect()).unwrap();
-        let q = quality(&sheared, &[1.0; 25]);
+        let q = quality(&sheared, &[1.0; 25]).unwrap();
         assert!((q.q_max - 1.125).abs() < 1e-14 && (q.q_mean - 1.125).abs() < 1e-14);
         assert!((q.min_scaled_jacobian - 1.0).abs() < 1e-13);
     }
@@ -396,7 +401,7 @@ mod tests {
         let error = check_unfolded(&mesh.moved(x.clone()).unwrap()).unwrap_err();
         assert!(matches!(error, Failure::Folded { cell: [2, 2], jacobian, .. } if jacobian < 0.0), "{error}");
         x[12] = [f64::NAN, 0.5];
-        let error = check_unfolded(&mesh.moved(x).unwrap()).unwrap_err();
+        let error = mesh.moved(x).unwrap_err();
         assert!(matches!(error, Failure::NonFinite { node: [2, 2], .. }), "{error}");
         assert!(check_unfolded(&mesh).is_ok());
     }

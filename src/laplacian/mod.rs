@@ -119,7 +119,7 @@ pub const NEAR_DEGENERATE: f64 = 3e3;
 /// let a = stencils(&mesh, Laplacian::Optimised)?;
 /// let u: Vec<f64> = mesh.x().iter().map(|[x, y]| x * x + 3.0 * x * y + y * y).collect();
 /// // Δu = 4, exactly
-/// assert!(a.apply(&u).iter().all(|v| (v - 4.0).abs() < 1e-10));
+/// assert!(a.apply(&u)?.iter().all(|v| (v - 4.0).abs() < 1e-10));
 /// assert_eq!(a.exact_degree(&mesh), Some(3)); // it is a mesh of equal cells
 /// # Ok::<(), driftmesh::Error>(())
 /// ```

@@ -6,6 +6,7 @@ use crate::geometry::{Lattice, Mesh};
 use crate::numerics::lanes::{Lanes, Qr};
 use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport, SparseSystem};
+use crate::work::Work;
 
 /// Residual of the iteration, rows over their diagonal, as a share of the largest given value.
 const ITERATED: f64 = 1e-13;
@@ -68,7 +69,7 @@ impl Poisson<'_> {
         };
         for k in 0..stencils.patch().len() {
             let row = place[stencils.index(k)];
-            for (index, a, source) in stencils.row(k) {
+            for (index, a, source) in stencils.points(k) {
                 couple(row, index, a, &mut b[row]);
                 b[row] += source * self.source[index];
             }
@@ -89,11 +90,11 @@ impl Poisson<'_> {
     }
 
     /// The solution by an iteration, for nine-point stencils on a mesh with values on all sides: less memory than the direct
-    /// solver, and faster on fine meshes. Also tells the number of iterations, 0 where the direct solver had to step in.
+    /// solver, and faster on fine meshes. The work tells the iterations, and whether the direct solver had to step in.
     ///
     /// # Errors
     /// As [`Poisson::solve`]; [`Failure::WrongLength`] for stencils of 25 points or Neumann sides, which it does not take.
-    pub fn iterate(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<(Vec<f64>, usize), Failure> {
+    pub fn iterate(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<(Vec<f64>, Work), Failure> {
         let lattice = mesh.lattice();
         let expected = lattice.len();
         for (what, values) in [("the source", self.source), ("the side data", self.side)] {
@@ -116,8 +117,8 @@ impl Poisson<'_> {
         let mut x: Vec<[f64; 1]> = self.side.iter().map(|&u| [u]).collect();
         patch.places().for_each(|k| x[k] = [0.0]);
         let size = b.as_flattened().iter().chain(self.side).copied().fold(f64::MIN_POSITIVE, larger);
-        let iterations = RobustTransport::<1>::default().solve(&matrix, &b, &mut x, [ITERATED * size])?;
-        Ok((x.into_flattened(), iterations))
+        let work = RobustTransport::<1>::default().solve(&matrix, &b, &mut x, [ITERATED * size])?;
+        Ok((x.into_flattened(), work))
     }
 
     /// The Neumann side that a node stands on, as (axis, upper), if it stands on no other kind.

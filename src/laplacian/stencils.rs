@@ -1,4 +1,5 @@
 use super::{Laplacian, NEAR_DEGENERATE, node};
+use crate::error::Failure;
 use crate::geometry::{Mesh, Patch};
 use crate::numerics::linear::LatticeMatrix;
 
@@ -97,8 +98,13 @@ impl Stencils {
         i * self.nodes[1] + j
     }
 
-    /// (lattice index, weight on u, weight on Δu) of all points of row k.
-    pub fn row(&self, k: usize) -> Vec<(usize, f64, f64)> {
+    /// (lattice index, weight on u, weight on Δu) of all points of row k; none where there is no such row.
+    pub fn row(&self, k: usize) -> Option<Vec<(usize, f64, f64)>> {
+        (k < self.patch.len()).then(|| self.points(k))
+    }
+
+    /// The points of a row that is there.
+    pub(super) fn points(&self, k: usize) -> Vec<(usize, f64, f64)> {
         let [i, j] = node(&self.patch, k);
         match &self.rows {
             Rows::Nine(rows) => {
@@ -120,14 +126,21 @@ impl Stencils {
     }
 
     /// A u at the nodes of [`patch`](Self::patch), in order, from one value for every node of the lattice.
-    pub fn apply(&self, u: &[f64]) -> Vec<f64> {
-        (0..self.patch.len()).map(|k| self.row(k).iter().map(|&(index, a, _)| a * u[index]).sum()).collect()
+    ///
+    /// # Errors
+    /// [`Failure::WrongLength`] where `u` has not one value a node.
+    pub fn apply(&self, u: &[f64]) -> Result<Vec<f64>, Failure> {
+        let expected = self.nodes[0] * self.nodes[1];
+        if u.len() != expected {
+            return Err(Failure::WrongLength { what: "what the Laplacian is applied to", found: u.len(), expected });
+        }
+        Ok((0..self.patch.len()).map(|k| self.points(k).iter().map(|&(index, a, _)| a * u[index]).sum()).collect())
     }
 
     /// Share of rows in which no neighbour's weight is negative.
     pub fn nonnegative_fraction(&self) -> f64 {
         let kept = |k: &usize| {
-            let (own, row) = (self.index(*k), self.row(*k));
+            let (own, row) = (self.index(*k), self.points(*k));
             let size = row.iter().fold(0.0_f64, |m, &(_, a, _)| m.max(a.abs()));
             row.iter().all(|&(index, a, _)| index == own || a >= -1e-12 * size)
         };
@@ -148,7 +161,7 @@ impl Stencils {
         let (x, extent, wraps) = (mesh.x(), mesh.extent(), mesh.lattice().periodic());
         let mut worst = [0.0_f64; 7];
         for k in 0..self.patch.len() {
-            let (own, row) = (self.index(k), self.row(k));
+            let (own, row) = (self.index(k), self.points(k));
             let distance = |index: usize| -> [f64; 2] {
                 std::array::from_fn(|c| {
                     let d = x[index][c] - x[own][c];

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub struct Fixed {}
 
 impl MeshGenerator for Fixed {
-    fn step(&mut self, _: &Mmpde, mesh: &Mesh<2>, _rho: &[f64], _dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, _: &Mmpde, mesh: &Mesh<2>, _rho: &[f64], _dt: f64) -> Result<Moved, Failure> {
         Ok(Moved { mesh: mesh.clone(), work: Work::default(), interface: None })
     }
 

@@ -17,6 +17,10 @@ use crate::work::Work;
 ///
 /// # Source
 /// (2.4) of Bihlo, Haynes and Walsh (2015), MMPDE5 divided by ρ before it is relaxed.
+///
+/// The default is that of studies and of Python: the conservative form, and a τ that the mesh chooses, which is
+/// [`STEPS_TO_BEGIN_WITH`](super::STEPS_TO_BEGIN_WITH) time steps for a generator by itself. [`Mmpde::published`] is that of
+/// the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mmpde {
     /// τ.
@@ -46,11 +50,16 @@ const EXACTNESS: f64 = 1e-12;
 
 impl Default for Mmpde {
     fn default() -> Self {
-        Self { relaxation: Relaxation::Time(1.0), form: Form::Gradient(Gradient::Central) }
+        Self { relaxation: Relaxation::Auto, form: Form::Conservative }
     }
 }
 
 impl Mmpde {
+    /// As published: the gradient form by central differences, τ = 1.
+    pub fn published() -> Self {
+        Self { relaxation: Relaxation::Time(1.0), form: Form::Gradient(Gradient::Central) }
+    }
+
     /// Refuses settings out of range.
     ///
     /// # Errors
@@ -283,8 +292,8 @@ impl<const D: usize> MeshOperator<D> {
         let right = self.right(patch, old, jump);
         let mut x = patch.gather(&self.lattice, new, jump);
         let matrix = self.matrix(patch);
-        let linear_iterations = solver.solve(&matrix, &right, &mut x, exactness(&matrix, size))?;
-        Ok((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
+        let work = solver.solve(&matrix, &right, &mut x, exactness(&matrix, size))?;
+        Ok((x, work))
     }
 
     /// The right-hand side on one patch: old values, continued across the seam of a periodic axis.

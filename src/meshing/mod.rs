@@ -1,5 +1,6 @@
 //! From a density to a mesh: the mesh equation, and the ways to solve it.
 
+mod checked;
 mod decomposition;
 mod fixed;
 mod mmpde;
@@ -35,11 +36,37 @@ use serde::{Deserialize, Serialize};
 /// Laws, tested for every implementation: the mesh does not change under ρ → cρ; constant ρ leaves a uniform mesh at
 /// rest; side nodes stay exactly on the box.
 pub trait MeshGenerator: Send {
-    /// The mesh at t + `dt` from the mesh at t and the density on it, one value a node.
+    /// The mesh at t + `dt` from the mesh at t and the density on it, one value a node: [`solve`](Self::solve), with checks
+    /// of what it is given and of what it returns.
     ///
     /// # Errors
-    /// A [`Failure`] where a system cannot be solved or the arrays do not fit.
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure>;
+    /// [`Failure::OutOfRange`] for a `dt` or τ that is not finite and positive, and for a prediction, which takes a
+    /// [`Mover`](crate::mover::Mover); [`Failure::WrongLength`], [`Failure::NonFinite`] or [`Failure::NotPositive`] for the
+    /// density; [`Failure::NotABox`] for a mesh whose sides are not those of the box around it;
+    /// [`Failure::Folded`] for a new mesh with a folded cell; or what `solve` fails with.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::geometry::{Lattice, Mesh};
+    /// use driftmesh::{Failure, meshing::{MeshGenerator, Mmpde, Whole}};
+    /// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0; 2], [1.0; 2])?;
+    /// let refused = Whole::default().step(&Mmpde::default(), &mesh, &[0.0; 25], 1e-3);
+    /// assert!(matches!(refused, Err(Failure::NotPositive { node: [0, 0], .. })));
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+        checked::check_given(equation, mesh, rho, dt)?;
+        if self.moves() {
+            checked::check_box(mesh)?;
+        }
+        checked::check_made(self.solve(equation, mesh, rho, dt)?)
+    }
+
+    /// Solves for that mesh: what an implementation writes, and nobody calls but [`step`](Self::step).
+    ///
+    /// # Errors
+    /// A [`Failure`] where a system cannot be solved or the settings do not fit the lattice.
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure>;
 
     /// False for a mesh that stays, which nothing predicts either.
     fn moves(&self) -> bool {

@@ -69,9 +69,7 @@ impl Part {
         match local {
             Local::Solve { share } => {
                 let tolerance = share_of_largest(&self.right, share, exact);
-                let linear_iterations =
-                    self.solver.solve(&self.matrix, &self.right, &mut self.correction, tolerance)?;
-                Ok(Work { linear_solves: 2, linear_iterations, ..Work::default() })
+                self.solver.solve(&self.matrix, &self.right, &mut self.correction, tolerance)
             }
             Local::Sweeps { smoother, sweeps, lowest } => {
                 relax(&self.matrix, &self.right, &mut self.correction, smoother, sweeps, lowest);

@@ -307,9 +307,10 @@ impl Parts {
 }
 
 impl MeshGenerator for Schwarz {
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         self.parts.prepare(lattice, self.subdomains, self.overlap)?;
+        self.check(lattice).map_err(Failure::refusing)?;
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();
         let mut work = move_sides(equation, mesh, rho, dt, &mut x, &mut self.line)?;

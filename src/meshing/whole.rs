@@ -55,7 +55,7 @@ impl Whole {
 }
 
 impl MeshGenerator for Whole {
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();

@@ -9,8 +9,8 @@ pub use retries::{Care, Retries};
 pub use start::{Ending, Start, adapted, steps_to_rest};
 
 use crate::error::{Failure, Result};
-use crate::geometry::{Mesh, check_unfolded};
-use crate::meshing::{Form, Interface, MeshGenerator, Mmpde, Moved, Relaxation};
+use crate::geometry::{Mesh, check_length, check_unfolded};
+use crate::meshing::{Interface, MeshGenerator, Mmpde, Moved, Relaxation};
 use crate::work::Work;
 pub(crate) use gait::Predicted;
 
@@ -72,9 +72,6 @@ pub struct Step {
     pub retries: Retries,
 }
 
-/// Standard error of interface values, as a share of the shortest edge, above which it may have folded a mesh.
-const NOISE_THAT_FOLDS: f64 = 0.05;
-
 /// How a step of the mesh goes: its length, and what τ is measured in.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stride {
@@ -91,7 +88,7 @@ pub(crate) struct Stride {
 impl Mover {
     /// The recipe that needs no number: the conservative form, τ and prediction by the mover itself.
     pub fn new(generator: impl MeshGenerator + 'static) -> Self {
-        Self::by(Box::new(generator), Mmpde { relaxation: Relaxation::Auto, form: Form::Conservative })
+        Self::by(Box::new(generator), Mmpde::default())
     }
 
     /// Moves by this generator and equation.
@@ -105,6 +102,8 @@ impl Mover {
     /// A [`Failure`]: the mesh is folded, or would be whatever is tried, or its equation is not solved.
     pub fn step(&mut self, mesh: &Mesh<2>, gait: &Gait, followed: Followed<'_>, dt: f64) -> Result<Step, Failure> {
         let Followed { u, rho } = followed;
+        check_length(mesh.lattice(), "what the mesh follows", u.len())?;
+        check_length(mesh.lattice(), "the density", rho.len())?;
         check_unfolded(mesh)?;
         let mut retries = Retries::default();
         let stride = Stride { dt, scale: dt, parts: 1, share: 1.0 };
@@ -139,7 +138,7 @@ impl Mover {
                 generator,
                 &equation,
                 &predicted.mesh,
-                &retries::smoother(&predicted.mesh, rho, smoothing),
+                &retries::smoother(&predicted.mesh, rho, smoothing)?,
                 stride.dt,
                 parts,
             )
@@ -177,11 +176,6 @@ fn relaxed(
         let mesh = last.as_ref().map_or(start, |moved| &moved.mesh);
         let carried = if part == 0 { None } else { Some(crate::geometry::interpolate(start, rho, mesh)) };
         let moved = generator.step(equation, mesh, carried.as_deref().unwrap_or(rho), dt / parts as f64)?;
-        let noise = moved.interface.and_then(|i| i.noise).filter(|noise| *noise > NOISE_THAT_FOLDS);
-        check_unfolded(&moved.mesh).map_err(|failure| match failure {
-            Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
-            other => other,
-        })?;
         work += moved.work;
         seconds += moved.interface.map_or(0.0, |i| i.seconds);
         last = Some(moved);

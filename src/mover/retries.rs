@@ -66,13 +66,13 @@ impl Care {
 }
 
 /// A density after further passes of the filter.
-pub(super) fn smoother<'a>(mesh: &Mesh<2>, rho: &'a [f64], passes: usize) -> Cow<'a, [f64]> {
+pub(super) fn smoother<'a>(mesh: &Mesh<2>, rho: &'a [f64], passes: usize) -> Result<Cow<'a, [f64]>, Failure> {
     if passes == 0 {
-        return Cow::Borrowed(rho);
+        return Ok(Cow::Borrowed(rho));
     }
     let mut smoother = rho.to_vec();
-    smooth(mesh.lattice(), &mut smoother, passes);
-    Cow::Owned(smoother)
+    smooth(mesh.lattice(), &mut smoother, passes)?;
+    Ok(Cow::Owned(smoother))
 }
 
 #[cfg(test)]

@@ -370,8 +370,7 @@ impl Physics for Burgers {
             let mut correction = vec![[0.0]; patch.padded_len()];
             // Newton squares the residual: solving for much less than that is wasted
             let tolerance = [(0.01 * largest * (largest / size).min(1.0)).max(0.1 * wanted)];
-            work.linear_iterations += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
-            work.linear_solves += 1;
+            work += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
             work.newton_iterations += 1;
             for (u, c) in u_new.iter_mut().zip(&correction) {
                 u[0] += c[0];

@@ -230,7 +230,7 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
     fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
         let unknown = |exact| evaluate(exact, t, mesh).into_flattened();
         let known: Vec<Vec<f64>> = self.exact.iter().map(|(_, exact)| unknown(exact)).collect();
-        (!known.is_empty()).then(|| Field::joined(&known))
+        (!known.is_empty()).then(|| Field::joined(&known).expect("each has one value a node"))
     }
 
     fn known(&self) -> Vec<usize> {
@@ -256,6 +256,7 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
 
 #[cfg(test)]
 mod tests {
+    use super::super::finite_volumes::tests::order_of_newton;
     use super::*;
     use crate::geometry::Lattice;
     use crate::physics::{Burgers, BurgersFlux, Convection, FormulaPde};
@@ -286,6 +287,34 @@ mod tests {
         fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; 1] {
             self.0.side(t, x)
         }
+    }
+
+    /// The matrix of Newton's method is the derivative of the residual for two unknowns that convect, diffuse and make each
+    /// other: what a step leaves out falls with the square of its length.
+    #[test]
+    fn newton_converges_quadratically() {
+        let pde: FormulaPde = toml::from_str(
+            r#"
+            unknowns = ["u", "v"]
+            flux = { u = ["u^2/2", "u*v"], v = ["u*v", "0.3*v^2"] }
+            diffusivity = { u = "0.05*(1 + u*v)", v = "0.04*(1 + v^2 + 0.2*x)" }
+            source = { u = "u*(1 - v) + sin(x + t)", v = "u*v - v^2" }
+            initial = { u = "1 + 0.3*sin(2*x)*cos(y)", v = "0.5 + 0.2*cos(x - y)" }
+            boundary = { u = "1", v = "no-flux" }
+            "#,
+        )
+        .unwrap();
+        let law: FormulaLaw<2, 4, 24> = FormulaLaw::new(pde.read().unwrap());
+        let square = Mesh::uniform(Lattice::bounded([9, 8]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+        let mesh = |t: f64| {
+            let bent = |x: f64, y: f64| x + 0.07 * (std::f64::consts::TAU * x).sin() * (5.0 * y + 3.0 * t).cos();
+            square.moved(square.x().iter().map(|&[x, y]| [bent(x, y), bent(y, x)]).collect()).unwrap()
+        };
+        let [old, new] = [0.0, 0.1].map(mesh);
+        let u = law.initial(0.0, &old);
+        let motion = Motion { t: 0.0, dt: 0.1, old: &old, new: &new };
+        let order = order_of_newton(&law, motion, u.values().as_chunks::<2>().0);
+        assert!((order - 2.0).abs() < 0.1, "order {order:.3}");
     }
 
     /// Burgers' equation with central fluxes is the same equation as formulas, to round-off over 50 steps of a moving mesh.

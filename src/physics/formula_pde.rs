@@ -161,7 +161,7 @@ impl FormulaPde {
         both.filter(|[_, (_, side)]| *side != NO_FLUX).collect()
     }
 
-    fn read(&self) -> Result<Formulas> {
+    pub(super) fn read(&self) -> Result<Formulas> {
         self.check_names()?;
         let names = &self.unknowns;
         let variables: Vec<&str> =

@@ -28,7 +28,7 @@ const MANY: usize = 8;
 const SHOWN: usize = 250;
 
 /// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
-const NAMES: [(&str, &str, &str); 56] = [
+const NAMES: [(&str, &str, &str); 58] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -94,6 +94,8 @@ const NAMES: [(&str, &str, &str); 56] = [
     ("safety.smoothed", "steps tried again with more smoothing", ""),
     ("safety.shortened", "steps tried again shorter", ""),
     ("linear_iterations", "iterations of linear solvers", ""),
+    ("direct_unstarted", "systems left to sparse elimination", "the iteration could not begin"),
+    ("direct_stalled", "systems left to sparse elimination", "the iteration ended above its tolerance"),
     ("newton_iterations", "iterations of Newton's method", ""),
     ("path_steps", "steps of random paths", ""),
     ("iterations_to_tolerance", "iterations to the tolerance", ""),

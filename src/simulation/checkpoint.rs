@@ -94,7 +94,7 @@ impl Checkpoint {
             return damaged("its time steps are none of the run".into());
         }
         let mesh = mesh.moved(x.clone()).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
-        let u = Field::of(components, u.clone());
+        let u = Field::of(components, u.clone()).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
         let sound = check_unfolded(&mesh).and_then(|()| physics.check(*t, &mesh, &u));
         sound.map_err(|failure| Unfit::Damaged(failure.to_string()))?;
         Ok(State { t: *t, step: *step, mesh, u, rho: rho.clone(), gait: gait.clone(), own_change: *own_change })

@@ -22,7 +22,7 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality, quality_and_integral};
+use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality_and_integral};
 use crate::kept::Kept;
 use crate::meshing::{Interface, Relaxation};
 use crate::mover::{self, Gait, Mover, Start};
@@ -370,7 +370,7 @@ impl Simulation {
     /// Quality of the mesh, and the error where an exact solution is known.
     fn assess(&self, state: &State) -> (Quality, Option<ErrorNorms>) {
         let Some(exact) = self.physics.exact(state.t, &state.mesh) else {
-            return (quality(&state.mesh, &state.rho), None);
+            return (quality_and_integral(&state.mesh, &state.rho, &state.rho).0, None);
         };
         let known = self.physics.known();
         let (mut linf, mut squares) = (0.0_f64, vec![0.0; state.mesh.x().len()]);

@@ -438,7 +438,7 @@ fn go(
     let mut tell = |event, front: &Front, state: &FrontState, dt: f64, summary: &mut StefanSummary| {
         let output = Instant::now();
         let picture = pictured(front, state)?;
-        let quality = quality(&picture.mesh, &picture.rho);
+        let quality = quality(&picture.mesh, &picture.rho)?;
         let report = reported(front, given, state);
         let [seconds, _] = clock.elapsed();
         let new = matches!(event, Event::Started | Event::Stepped);

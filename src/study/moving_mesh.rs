@@ -1,5 +1,5 @@
 use super::Source;
-use crate::density::{Arclength, Given, MonitorKind};
+use crate::density::{ArclengthTable, GivenTable, MonitorKind};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
@@ -26,7 +26,8 @@ pub struct MovingMesh {
     pub time: Time,
     /// `[pde]`.
     pub pde: PdeKind,
-    /// `[monitor]`; where it is left out, arc length, or what is prescribed as the density itself.
+    /// `[monitor]`. Left out, it is `auto`; `given` where `pde.rho` prescribes the density; `arclength` where the mesh does
+    /// not move, since no mesh follows it and it is the cheapest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub monitor: Option<MonitorKind>,
     /// `[mesh]`.
@@ -175,7 +176,7 @@ pub struct MeshTable {
 impl Default for MeshTable {
     fn default() -> Self {
         Self {
-            relaxation: Relaxation::Auto,
+            relaxation: Mmpde::default().relaxation,
             form: MeshForm::Conservative,
             start: None,
             generator: GeneratorKind::default(),
@@ -275,15 +276,15 @@ impl MovingMesh {
         let prescribed_density = matches!(&self.pde, PdeKind::Prescribed(p) if p.rho.is_some());
         let stays = matches!(self.mesh.generator, GeneratorKind::Fixed(_));
         let monitor = self.monitor.get_or_insert_with(|| match prescribed_density {
-            true => MonitorKind::Given(Given::default()),
+            true => MonitorKind::GivenTable(GivenTable::default()),
             // no mesh follows it: the cheap one
-            false if stays => MonitorKind::Arclength(Arclength::default()),
+            false if stays => MonitorKind::ArclengthTable(ArclengthTable::default()),
             false => MonitorKind::default(),
         });
         monitor.check().map_err(|error| error.within("monitor"))?;
         let unknowns = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?.unknowns();
         monitor.clone().into_monitor(&unknowns).map_err(|error| error.within("monitor"))?;
-        if prescribed_density && !matches!(monitor, MonitorKind::Given(_)) {
+        if prescribed_density && !matches!(monitor, MonitorKind::GivenTable(_)) {
             let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
             return Err(Error::invalid("monitor.kind", format!("\"{}\"", monitor.name()), rule));
         }
@@ -457,22 +458,8 @@ impl MovingMesh {
 
     fn check_size(&self) -> Result<()> {
         let lattice = Lattice::new(self.grid.cells, self.domain.periodic).map_err(|error| error.within("grid"))?;
-        let there = sysinfo::System::new().map_or(u128::MAX, |mut system| {
-            system.refresh_memory();
-            u128::from(system.total_memory())
-        });
-        let needed = self.memory();
-        if needed > there {
-            let gib = |bytes: u128| (bytes as f64 / (1_u64 << 30) as f64).ceil();
-            let rule = format!(
-                "{:.2e} nodes need about {:.3e} GiB and this machine has {}; lower it",
-                lattice.len() as f64,
-                gib(needed),
-                gib(there)
-            );
-            return Err(Error::invalid("grid.cells", format!("{:?}", self.grid.cells), rule));
-        }
-        Ok(())
+        let nodes = lattice.nodes().into_iter().map(|n| n as u128).product();
+        super::memory::check_memory(nodes, BYTES_PER_NODE, &self.grid.cells)
     }
 
     fn schedule(&self) -> Result<Schedule> {

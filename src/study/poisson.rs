@@ -224,10 +224,8 @@ pub struct Solved {
     pub stencils: Stencils,
     /// Against the exact solution.
     pub error: Option<PoissonError>,
-    /// Of the solver, 0 where it is direct.
-    pub iterations: usize,
-    /// Whether the iteration was asked for, and the direct solver had to step in.
-    pub replaced: bool,
+    /// Of the solver: without iterations where it is direct.
+    pub work: Work,
     seconds: PoissonSeconds,
 }
 
@@ -363,7 +361,7 @@ impl PoissonStudy {
         let problem = Poisson { source: &[], side: &[], neumann: self.neumann() };
         let mut counts = vec![false; lattice.len()];
         for k in 0..stencils.patch().len() {
-            stencils.row(k).into_iter().for_each(|(index, _, source)| counts[index] |= source != 0.0);
+            stencils.row(k).into_iter().flatten().for_each(|(index, _, source)| counts[index] |= source != 0.0);
         }
         let flows: Vec<bool> = (0..lattice.len()).map(|k| problem.neumann_side(lattice, k).is_some()).collect();
         let given: Vec<bool> = (0..lattice.len()).map(|k| lattice.on_side(k) && !flows[k]).collect();
@@ -399,8 +397,8 @@ impl PoissonStudy {
         }
         let clock = Instant::now();
         let problem = Poisson { source: &source, side: &side, ..problem };
-        let (u, iterations) = match self.solver.kind {
-            SolverKind::Lu => (problem.solve(&mesh, &stencils)?, 0),
+        let (u, work) = match self.solver.kind {
+            SolverKind::Lu => (problem.solve(&mesh, &stencils)?, Work { linear_solves: 1, ..Work::default() }),
             SolverKind::Krylov => problem.iterate(&mesh, &stencils)?,
         };
         seconds.solve = clock.elapsed().as_secs_f64();
@@ -424,9 +422,7 @@ impl PoissonStudy {
             let area = sum(areas.iter().copied());
             PoissonError { linf, l2: unit * (squares / area).sqrt(), l2_integral: unit * squares.sqrt() }
         });
-        let zero = u.iter().all(|u| *u == 0.0);
-        let replaced = self.solver.kind == SolverKind::Krylov && iterations == 0 && !zero;
-        Ok(Solved { mesh, u, exact, stencils, error, iterations, replaced, seconds })
+        Ok(Solved { mesh, u, exact, stencils, error, work, seconds })
     }
 
     /// Runs the study into a directory.
@@ -458,7 +454,7 @@ impl PoissonStudy {
             Ok(solved) => {
                 summary.seconds = solved.seconds;
                 summary.error = solved.error;
-                summary.work.linear_iterations = solved.iterations;
+                summary.work = solved.work;
                 summary.stencil = Some(solved.report());
                 summary.warnings = solved.warnings();
                 let output = Instant::now();
@@ -495,7 +491,15 @@ impl Solved {
         let gait = Gait::at_rest(&self.mesh);
         (
             names,
-            State { t: 0.0, step: 0, mesh: self.mesh.clone(), u: Field::joined(&fields), rho, gait, own_change: 0.0 },
+            State {
+                t: 0.0,
+                step: 0,
+                mesh: self.mesh.clone(),
+                u: Field::joined(&fields).expect("u and its error have one value a node each"),
+                rho,
+                gait,
+                own_change: 0.0,
+            },
         )
     }
 
@@ -516,9 +520,11 @@ impl Solved {
     /// Stencils that come near to none, and kinds that are not exact for quadratics.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if self.replaced {
-            let told = "the iteration of solver.kind = \"krylov\" did not converge, and the direct solver took its place; set it to \"lu\"";
-            warnings.push(told.into());
+        if self.work.direct_solves() > 0 {
+            let why = if self.work.direct_unstarted > 0 { "could not begin" } else { "did not converge" };
+            warnings.push(format!(
+                "the iteration of solver.kind = \"krylov\" {why}, and the direct solver took its place; set it to \"lu\""
+            ));
         }
         let near = self.stencils.near_degenerate();
         if let Some(worst) = near.iter().max_by(|a, b| a.condition.total_cmp(&b.condition)) {

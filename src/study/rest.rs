@@ -39,7 +39,7 @@ pub(super) fn at_rest(
         // equal cells are enough
         spread
             if spread < FLAT
-                && matches!(study.monitor(), MonitorKind::RootGradient(_))
+                && matches!(study.monitor(), MonitorKind::RootGradientTable(_))
                 && varies(simulation, state)? =>
         {
             return Ok(None);
@@ -88,15 +88,15 @@ fn flattened(study: &MovingMesh, simulation: &Simulation, state: &State, spread:
     let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u)?;
     let mut bare = study.monitor();
     let smoothing = match &mut bare {
-        MonitorKind::RootGradient(_) => 0,
-        MonitorKind::Arclength(arclength) => std::mem::take(&mut arclength.smoothing),
-        MonitorKind::Given(given) => std::mem::take(&mut given.smoothing),
+        MonitorKind::RootGradientTable(_) => 0,
+        MonitorKind::ArclengthTable(arclength) => std::mem::take(&mut arclength.smoothing),
+        MonitorKind::GivenTable(given) => std::mem::take(&mut given.smoothing),
     };
     let none = match &bare {
-        MonitorKind::Arclength(arclength) => match arclength.strength {
+        MonitorKind::ArclengthTable(arclength) => match arclength.strength {
             Strength::Relative(strength) | Strength::Absolute(strength) => strength == 0.0,
         },
-        MonitorKind::RootGradient(_) | MonitorKind::Given(_) => false,
+        MonitorKind::RootGradientTable(_) | MonitorKind::GivenTable(_) => false,
     };
     if none {
         return Ok("its density is constant: `monitor.strength` is 0".into());

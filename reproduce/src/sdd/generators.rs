@@ -126,7 +126,7 @@ impl Undivided {
 }
 
 impl MeshGenerator for Undivided {
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let (cells, nodes, strides) = (lattice.cells(), lattice.nodes(), lattice.strides());
         let mut x = mesh.x().to_vec();

@@ -137,10 +137,10 @@ impl Level {
         let right: Vec<[f64; 2]> = patch.nodes(&self.lattice).map(|k| right[k]).collect();
         let mut c = vec![[0.0; 2]; patch.padded_len()];
         let tolerance = share_of_largest(&right, SOLVED, exactness(&self.matrix, size));
-        let linear_iterations = self.plane.solve(&self.matrix, &right, &mut c, tolerance)?;
+        let work = self.plane.solve(&self.matrix, &right, &mut c, tolerance)?;
         let mut all = vec![[0.0; 2]; self.lattice.len()];
         patch.scatter(&self.lattice, &c, &mut all, none);
-        Ok((all, Work { linear_solves: 2, linear_iterations, ..Work::default() }))
+        Ok((all, work))
     }
 }
 

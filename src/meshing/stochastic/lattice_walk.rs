@@ -1,6 +1,7 @@
 use super::super::sides::jump;
 use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
+use crate::meshing::Decomposition;
 use crate::parallel;
 use crate::work::Work;
 use schemars::JsonSchema;
@@ -75,6 +76,10 @@ pub(super) fn mean_jumps(problem: &Problem<'_>) -> f64 {
 }
 
 impl Estimator for GridWalk {
+    fn check(&self, _decomposition: &Decomposition) -> Result<()> {
+        self.check()
+    }
+
     fn estimate(&self, problem: &Problem<'_>, points: &[usize], _strips: &mut Strips) -> Result<Estimates, Failure> {
         let (mesh, jump) = (problem.mesh, jump(problem.mesh));
         let walks = Walks::new(problem, self.walks, points.len())?;

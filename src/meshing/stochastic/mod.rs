@@ -41,11 +41,14 @@ use std::time::Instant;
 /// read them from the neighbours in one exchange a step, more only in steps that are long for the mesh, and gather the
 /// right-hand sides of a coarse lattice where they have one; how much that is, is counted.
 ///
+/// The estimator is one of [`EstimatorKind`], as a study names it, or any [`Estimator`] of one's own.
+///
 /// # Source
 /// Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation* (2015).
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Stochastic {
+#[schemars(rename = "Stochastic", bound = "E: JsonSchema + Default + Serialize")]
+pub struct Stochastic<E = EstimatorKind> {
     /// Along each axis.
     #[serde(deserialize_with = "pair")]
     pub subdomains: [usize; 2],
@@ -54,7 +57,7 @@ pub struct Stochastic {
     pub seed: u64,
     /// How values on the interfaces are estimated.
     #[serde(default)]
-    pub estimator: EstimatorKind,
+    pub estimator: E,
     /// Estimates only a sample of each interface; all of its nodes where this is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interface: Option<Interpolation>,
@@ -92,8 +95,11 @@ pub struct Problem<'a> {
     pub dt: f64,
     /// New positions of the nodes on bounded sides; old ones elsewhere.
     pub new: &'a [[f64; 2]],
+    /// Of all random numbers.
+    pub seed: u64,
+    /// Steps done before: with the seed, the key of the random numbers of this one.
+    pub step: u32,
     random: Philox,
-    step: u32,
 }
 
 impl<'a> Problem<'a> {
@@ -109,7 +115,7 @@ impl<'a> Problem<'a> {
         seed: u64,
         step: u32,
     ) -> Self {
-        Self { equation, operator, mesh, rho, dt, new, random: Philox::new(seed), step }
+        Self { equation, operator, mesh, rho, dt, new, seed, step, random: Philox::new(seed) }
     }
 
     /// Δt/(τh²) along each axis.
@@ -128,7 +134,7 @@ pub struct Estimate {
 }
 
 /// What an estimator found.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Estimates {
     /// One a point asked for.
     pub points: Vec<Estimate>,
@@ -163,7 +169,44 @@ impl Estimates {
 }
 
 /// A way to compute the solution of a mesh step at single nodes.
-pub trait Estimator: Sync {
+///
+/// # Example
+/// An estimator that solves the whole domain and hands out what is asked for: the subdomains of [`Stochastic`] then make the
+/// mesh of [`Whole`](crate::meshing::Whole).
+///
+/// ```
+/// use driftmesh::geometry::{Lattice, Mesh};
+/// use driftmesh::meshing::{Estimate, Estimates, Estimator, MeshGenerator, Mmpde, Problem, Stochastic, Strips, Whole};
+/// use driftmesh::{Failure, Work};
+///
+/// struct Oracle;
+///
+/// impl Estimator for Oracle {
+///     fn estimate(&self, problem: &Problem<'_>, points: &[usize], _: &mut Strips) -> Result<Estimates, Failure> {
+///         let moved = Whole::to(1e-9).step(problem.equation, problem.mesh, problem.rho, problem.dt)?;
+///         let at = |&k: &usize| Estimate { x: moved.mesh.x()[k], standard_error: [f64::NAN; 2] };
+///         let guess = moved.mesh.x().to_vec();
+///         Ok(Estimates { points: points.iter().map(at).collect(), guess, work: moved.work, ..Estimates::default() })
+///     }
+/// }
+///
+/// let mesh = Mesh::uniform(Lattice::bounded([16, 16])?, [0.0; 2], [1.0; 2])?;
+/// let rho: Vec<f64> = mesh.x().iter().map(|[x, y]| 1.0 + (x * y).sin()).collect();
+/// let equation = Mmpde::default();
+/// let ours = Stochastic::new([2, 2], 1, Oracle).step(&equation, &mesh, &rho, 0.1)?.mesh;
+/// let whole = Whole::to(1e-9).step(&equation, &mesh, &rho, 0.1)?.mesh;
+/// assert!(ours.farthest(&whole) < 1e-9);
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+pub trait Estimator: Send + Sync {
+    /// Refuses settings out of range for a decomposition.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    fn check(&self, _decomposition: &Decomposition) -> Result<()> {
+        Ok(())
+    }
+
     /// The new positions of `points`, each by itself. `strips` are those around the cuts on which the points lie, with
     /// what is kept of them from step to step.
     ///
@@ -188,20 +231,17 @@ impl Default for EstimatorKind {
     }
 }
 
-impl EstimatorKind {
-    /// Refuses settings out of range for a decomposition.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`].
-    pub fn check(&self, decomposition: &Decomposition) -> Result<()> {
-        match self {
-            Self::ResidualWalk(walk) => walk.check(),
-            Self::Strip(strip) => strip.check(decomposition),
-            Self::GridWalk(walk) => walk.check(),
-            Self::MonteCarlo(paths) => paths.check(),
-        }
+impl Estimator for EstimatorKind {
+    fn check(&self, decomposition: &Decomposition) -> Result<()> {
+        self.estimator().check(decomposition)
     }
 
+    fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure> {
+        self.estimator().estimate(problem, points, strips)
+    }
+}
+
+impl EstimatorKind {
     /// The estimator itself.
     pub fn estimator(&self) -> &dyn Estimator {
         match self {
@@ -213,9 +253,9 @@ impl EstimatorKind {
     }
 }
 
-impl Stochastic {
+impl<E: Estimator> Stochastic<E> {
     /// Subdomains whose interfaces an estimator provides.
-    pub fn new(subdomains: [usize; 2], seed: u64, estimator: EstimatorKind) -> Self {
+    pub fn new(subdomains: [usize; 2], seed: u64, estimator: E) -> Self {
         Self { subdomains, seed, estimator, interface: None, line: Robust::default(), parts: None, steps: 0 }
     }
 
@@ -243,13 +283,14 @@ impl Parts {
     }
 }
 
-impl MeshGenerator for Stochastic {
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+impl<E: Estimator> MeshGenerator for Stochastic<E> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let parts = match self.parts.take().filter(|parts| parts.lattice == *lattice) {
             Some(parts) => parts,
             None => Parts::new(lattice, self.subdomains)?,
         };
+        self.check(lattice).map_err(Failure::refusing)?;
         let parts = self.parts.insert(parts);
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();
@@ -262,7 +303,7 @@ impl MeshGenerator for Stochastic {
         let points = sample.as_ref().unwrap_or(&parts.points);
         let mut interface = None;
         if !points.is_empty() {
-            let found = self.estimator.estimator().estimate(&problem, points, &mut parts.strips)?;
+            let found = self.estimator.estimate(&problem, points, &mut parts.strips)?;
             work += found.work;
             interface = Some(summary(mesh, parts.points.len(), &found, &parts.strips, problem.stiffness())?);
             x.copy_from_slice(&found.guess);

@@ -2,6 +2,7 @@ use super::lattice_walk::Samples;
 use super::paths::{Domain, LANES, Lanes};
 use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
+use crate::meshing::Decomposition;
 use crate::parallel;
 use crate::random::normals;
 use crate::work::Work;
@@ -91,6 +92,10 @@ impl MonteCarlo {
 }
 
 impl Estimator for MonteCarlo {
+    fn check(&self, _decomposition: &Decomposition) -> Result<()> {
+        self.check()
+    }
+
     fn estimate(&self, problem: &Problem<'_>, points: &[usize], _strips: &mut Strips) -> Result<Estimates, Failure> {
         let domain = Domain::new(problem, self);
         let bridge = Bridge::new(self.substeps);

@@ -3,6 +3,7 @@ use super::lattice_walk::{Stop, Walks, check_walks, for_each_neighbour, forget_c
 use super::strips::{Corrected, Reach, Strips};
 use super::{Estimate, Estimates, Estimator, Problem};
 use crate::error::{Error, Failure, Result};
+use crate::meshing::Decomposition;
 use crate::meshing::overlap::Local;
 use crate::numerics::linear::Smoother;
 use crate::setting::Auto;
@@ -76,6 +77,10 @@ impl ResidualWalk {
 }
 
 impl Estimator for ResidualWalk {
+    fn check(&self, _decomposition: &Decomposition) -> Result<()> {
+        self.check()
+    }
+
     fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure> {
         let alone = self.sweeps == Auto::Auto && mean_jumps(problem) > WORTH_WALKING;
         // walks that nobody waits for are refused before anything is done

@@ -94,6 +94,10 @@ impl Strip {
 }
 
 impl Estimator for Strip {
+    fn check(&self, decomposition: &Decomposition) -> Result<()> {
+        self.check(decomposition)
+    }
+
     fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure> {
         let reach = self.reach(problem, strips.decomposition());
         let exchanges = match self.exchanges {

@@ -121,7 +121,7 @@ fn what_lies_beyond_a_strip_does_not_matter() {
 fn strips_read_what_they_count() {
     for (cells, subdomains, width) in [(40, 4, 4), (40, 4, 8), (60, 3, 5), (64, 8, 2)] {
         let side = cells / subdomains;
-        let step = |start: Mesh<2>| Step::new(Mmpde::default(), start, 5.0, 1e-3, [subdomains; 2]);
+        let step = |start: Mesh<2>| Step::new(Mmpde::published(), start, 5.0, 1e-3, [subdomains; 2]);
         let plain = step(mesh([cells; 2], [true; 2]));
         let (found, strips) = plain.estimate(&Strip::plain(width));
         assert_eq!(strips.read(), (side + 2 * width + 1).pow(2) - side.pow(2));
@@ -136,7 +136,7 @@ fn strips_read_what_they_count() {
             let mut x = plain.mesh.x().to_vec();
             nodes.iter().for_each(|&k| x[k][0] += 1e-3);
             let changed = plain.mesh.moved(x).unwrap();
-            let step = Step::with(Mmpde::default(), changed, plain.rho.clone(), 1e-3, [subdomains; 2]);
+            let step = Step::with(Mmpde::published(), changed, plain.rho.clone(), 1e-3, [subdomains; 2]);
             step.estimate(&Strip::plain(width)).0.points[at].x
         };
         assert!(!far.is_empty() || 2 * width + side + 1 >= cells);
@@ -144,7 +144,7 @@ fn strips_read_what_they_count() {
         assert_ne!(moved(&[lattice.index([2 * side + width, 2 * side])]), found.points[at].x);
     }
     // of 2 × 2 subdomains with sides, the last reads most: it does not answer for the side
-    let step = Step::new(Mmpde::default(), mesh([40; 2], [false; 2]), 5.0, 1e-3, [2; 2]);
+    let step = Step::new(Mmpde::published(), mesh([40; 2], [false; 2]), 5.0, 1e-3, [2; 2]);
     let (_, strips) = step.estimate(&Strip::plain(6));
     assert_eq!(strips.read(), (20 + 6_usize).pow(2) - 19 * 19);
     // the coarse lattice has one unknown for 2 × 2, sides left out
@@ -181,7 +181,7 @@ fn strips_are_good_at_any_stiffness() {
 /// Wider strips are better, e^-θ a node without a coarse lattice; more exchanges too.
 #[test]
 fn wider_strips_and_more_exchanges_are_better() {
-    let step = Step::new(Mmpde::default(), mesh([80, 80], [false, true]), 5.0, 2.5e-4, [4, 4]);
+    let step = Step::new(Mmpde::published(), mesh([80, 80], [false, true]), 5.0, 2.5e-4, [4, 4]);
     let errors = [2, 5, 8, 11, 14].map(|width| step.error_of(&Strip::plain(width)));
     let theta = strips::decay(&step.problem(0))[0];
     for pair in errors.windows(2) {
@@ -198,7 +198,7 @@ fn wider_strips_and_more_exchanges_are_better() {
 #[test]
 fn walks_take_the_bias_of_strips_away() {
     for periodic in [[false, false], [true, true]] {
-        let step = Step::new(Mmpde::default(), mesh([24, 20], periodic), 8.0, 2e-3, [3, 2]);
+        let step = Step::new(Mmpde::published(), mesh([24, 20], periodic), 8.0, 2e-3, [3, 2]);
         let points: Vec<usize> = step.decomposition.points().into_iter().step_by(7).collect();
         let mut strips = Strips::new(&step.decomposition);
         let walk = ResidualWalk::default();
@@ -228,7 +228,7 @@ fn walks_take_the_bias_of_strips_away() {
 #[test]
 fn sweeps_in_strips_are_those_of_the_whole_lattice() {
     use crate::numerics::linear::{LatticeMatrix, Smoother, relax};
-    let step = Step::new(Mmpde::default(), mesh([40, 40], [false, true]), 5.0, 1e-3, [4, 4]);
+    let step = Step::new(Mmpde::published(), mesh([40, 40], [false, true]), 5.0, 1e-3, [4, 4]);
     let (lattice, problem) = (*step.mesh.lattice(), step.problem(1));
     for smoother in [Smoother::Jacobi, Smoother::Chebyshev] {
         let walk = ResidualWalk { sweeps: Auto::Value(4), walks: 1, smoother };

@@ -14,6 +14,8 @@ use crate::parallel;
 /// systems along all lines of the lattice, axis by axis, eliminated once for all cycles and right-hand sides. In one
 /// dimension a single sweep is the inverse itself. Corners and couplings around periodic axes are left to the residual.
 ///
+/// Made for one and two axes: with three, the same product of factors multiplies some modes by 3. More axes do not compile.
+///
 /// # Source
 /// Wachspress, *The ADI Model Problem*, Springer (2013).
 #[derive(Debug, Clone, Default)]
@@ -38,6 +40,7 @@ const MAX_SWEEPS: f64 = 10.0;
 impl Adi {
     /// Eliminates all lines of a matrix, reusing the memory. False where a pivot is not positive.
     pub fn factorise<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> bool {
+        const { assert!(D <= 2, "alternating directions converge for one and two axes only") };
         let strides = a.patch.padded_strides();
         // what a row sums to, about 1, is shared between the axes: the lower end of the spectrum of X and Y
         let parts = |row: &[f64; S]| {

@@ -1,12 +1,29 @@
 use super::krylov::{Krylov, add};
-use super::{LatticeMatrix, LinearSolver, adi::Adi, solved, stalled};
+use super::{LatticeMatrix, LinearSolver, adi::Adi, solved, solved_in, stalled};
 use crate::error::Failure;
+use crate::work::Work;
 
 /// Alternating-direction cycles, and BiCGSTAB preconditioned by them where they are slow, for all right-hand sides at
 /// once
 ///
 /// A mesh equation takes a few cycles, whose sweeps grow with the logarithm of Δt/h² (`make bench` counts them). Corners,
 /// strong convection and periodic axes call for the Krylov method. An iteration is a sweep.
+///
+/// For lattices of one and two axes; alternating directions of three diverge, and do not compile:
+///
+/// ```compile_fail
+/// use driftmesh::{geometry::Patch, numerics::linear::{Bicgstab, LatticeMatrix, LinearSolver}};
+/// let matrix = LatticeMatrix::<3, 7>::zero(Patch { origin: [1; 3], size: [2; 3], wraps: [false; 3] });
+/// let _ = Bicgstab::<1>::default().solve(&matrix, &[[1.0]; 8], &mut [[0.0]; 64], [1e-9]);
+/// ```
+///
+/// The same lines for two axes do:
+///
+/// ```
+/// use driftmesh::{geometry::Patch, numerics::linear::{Bicgstab, LatticeMatrix, LinearSolver}};
+/// let matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1; 2], size: [2; 2], wraps: [false; 2] });
+/// let _ = Bicgstab::<1>::default().solve(&matrix, &[[1.0]; 4], &mut [[0.0]; 16], [1e-9]);
+/// ```
 ///
 /// # Source
 /// Peaceman and Rachford (1955); van der Vorst, *Bi-CGSTAB: a fast and smoothly converging variant of Bi-CG* (1992).
@@ -27,14 +44,14 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],
-    ) -> Result<usize, Failure> {
+    ) -> Result<Work, Failure> {
         let Self { adi, krylov, scratch } = self;
         scratch.clear();
         scratch.resize(a.patch.padded_len(), [0.0; K]);
         let (r, hat) = krylov.prepare(a.patch.padded_len());
         let mut sizes = a.residual(b, x, r);
         if solved(sizes, tolerance) {
-            return Ok(0);
+            return Ok(solved_in::<K, f64>(0));
         }
         if !sizes.iter().all(|s| s.is_finite()) || !adi.factorise(a) {
             return Err(stalled(a.rows.len(), sizes, tolerance, 0));
@@ -47,13 +64,13 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
             add(x, [1.0; K], hat);
             let before = std::mem::replace(&mut sizes, a.residual(b, x, r));
             if solved(sizes, tolerance) {
-                return Ok(products);
+                return Ok(solved_in::<K, f64>(products));
             }
             if !(0..K).all(|c| sizes[c] <= tolerance[c] || sizes[c] < SLOW * before[c]) {
                 break;
             }
         }
         let iterations = krylov.solve(a, b, x, tolerance, adi.sweeps(), |v, x| adi.cycle(a, v, x, scratch))?;
-        Ok(products + iterations)
+        Ok(solved_in::<K, f64>(products + iterations))
     }
 }

@@ -1,6 +1,7 @@
-use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, stalled};
+use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::parallel;
+use crate::work::Work;
 
 /// BiCGSTAB preconditioned by the inverted blocks of the diagonal, for B coupled unknowns a node
 ///
@@ -22,12 +23,12 @@ impl<const D: usize, const S: usize, const B: usize> LinearSolver<D, S, B, [[f64
         b: &[[f64; B]],
         x: &mut [[f64; B]],
         tolerance: [f64; B],
-    ) -> Result<usize, Failure> {
+    ) -> Result<Work, Failure> {
         let Self { inverses, krylov } = self;
         let (r, _) = krylov.prepare(a.patch.padded_len());
         let sizes = a.residual(b, x, r);
         if solved(sizes, tolerance) {
-            return Ok(0);
+            return Ok(solved_in::<B, [[f64; B]; B]>(0));
         }
         let n = a.patch.pencil_len();
         inverses.clear();
@@ -40,7 +41,7 @@ impl<const D: usize, const S: usize, const B: usize> LinearSolver<D, S, B, [[f64
         if !sizes.iter().chain(inverses.as_flattened().as_flattened()).all(|v| v.is_finite()) {
             return Err(stalled(a.rows.len() * B, sizes, tolerance, 0));
         }
-        krylov.solve(a, b, x, tolerance, 1, |v, x| {
+        let iterations = krylov.solve(a, b, x, tolerance, 1, |v, x| {
             parallel::for_each_row(x, n + 2, |q, x| {
                 let Some(p) = a.patch.pencil_in_row(q) else { return };
                 let inner = v[q * (n + 2) + 1..].iter().zip(&inverses[p * n..]);
@@ -49,7 +50,8 @@ impl<const D: usize, const S: usize, const B: usize> LinearSolver<D, S, B, [[f64
                 }
             });
             a.patch.wrap(x);
-        })
+        })?;
+        Ok(solved_in::<B, [[f64; B]; B]>(iterations))
     }
 }
 

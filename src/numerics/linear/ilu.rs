@@ -1,6 +1,7 @@
 use super::block::invert;
-use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, stalled};
+use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalled};
 use crate::error::Failure;
+use crate::work::Work;
 
 /// BiCGSTAB preconditioned by incomplete elimination, for B coupled unknowns a node on the nine points of two dimensions
 ///
@@ -53,17 +54,18 @@ impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for IluBicgstab<B> {
         b: &[[f64; B]],
         x: &mut [[f64; B]],
         tolerance: [f64; B],
-    ) -> Result<usize, Failure> {
+    ) -> Result<Work, Failure> {
         let Self { rows, krylov } = self;
         let (r, _) = krylov.prepare(a.patch.padded_len());
         let sizes = a.residual(b, x, r);
         if solved(sizes, tolerance) {
-            return Ok(0);
+            return Ok(solved_in::<B, [[f64; B]; B]>(0));
         }
         if !sizes.iter().all(|size| size.is_finite()) || !eliminate(a, rows) {
             return Err(stalled(a.rows.len() * B, sizes, tolerance, 0));
         }
-        krylov.solve(a, b, x, tolerance, 1, |v, x| precondition(a, rows, v, x))
+        let iterations = krylov.solve(a, b, x, tolerance, 1, |v, x| precondition(a, rows, v, x))?;
+        Ok(solved_in::<B, [[f64; B]; B]>(iterations))
     }
 }
 

@@ -1,6 +1,7 @@
-use super::{Entry, LatticeMatrix, LinearSolver, solved, stalled};
+use super::{Entry, LatticeMatrix, LinearSolver, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::geometry::Patch;
+use crate::work::Work;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMat, Triplet};
@@ -71,12 +72,12 @@ impl<const D: usize, const S: usize, const K: usize, E: Entry<K>> LinearSolver<D
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],
-    ) -> Result<usize, Failure> {
+    ) -> Result<Work, Failure> {
         let n = a.patch.pencil_len();
         let mut r = vec![[0.0; K]; a.patch.padded_len()];
         let mut sizes = a.residual(b, x, &mut r);
         if solved(sizes, tolerance) {
-            return Ok(0);
+            return Ok(solved_in::<K, E>(0));
         }
         if let Some(lu) = self.factorise(a) {
             // one pass solves; more refine what round-off left
@@ -99,7 +100,7 @@ impl<const D: usize, const S: usize, const K: usize, E: Entry<K>> LinearSolver<D
                 }
                 let before = std::mem::replace(&mut sizes, a.residual(b, x, &mut r));
                 if solved(sizes, tolerance) {
-                    return Ok(0);
+                    return Ok(solved_in::<K, E>(0));
                 }
                 if !sizes.iter().all(|size| size.is_finite()) {
                     sizes = before; // the matrix is singular

@@ -29,6 +29,7 @@ use super::larger;
 use crate::error::Failure;
 use crate::geometry::Patch;
 use crate::parallel;
+use crate::work::Work;
 
 /// A matrix whose rows couple a node of a patch to itself and its nearest neighbours
 ///
@@ -207,7 +208,7 @@ fn stalled<const K: usize>(unknowns: usize, sizes: [f64; K], tolerance: [f64; K]
 /// `b` has one value an unknown. `x` is padded: on entry its ring holds the known values and its unknowns the guess; on
 /// success its unknowns hold the solution, and the images of wrapping axes have moved along. The largest residual of
 /// right-hand side or equation c is then at most `tolerance[c]`, in the unit of b, checked on the solution itself.
-/// Returns the number of iterations, 0 for a direct method.
+/// Returns the work: the systems solved and the iterations of all of them together, none of a direct method.
 ///
 /// # Errors
 /// [`Failure::LinearStalled`] with the residual reached; `x` then holds no solution.
@@ -219,10 +220,15 @@ pub trait LinearSolver<const D: usize, const S: usize, const K: usize, E = f64>:
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],
-    ) -> Result<usize, Failure>;
+    ) -> Result<Work, Failure>;
 }
 
-/// One solver, and another for the systems on which the first fails.
+/// The work of a solve for K values a node that took so many iterations.
+fn solved_in<const K: usize, E: Entry<K>>(linear_iterations: usize) -> Work {
+    Work { linear_solves: K / E::COUPLED, linear_iterations, ..Work::default() }
+}
+
+/// One solver, and another for the systems on which the first fails. The work tells how many these were, and why.
 #[derive(Debug, Clone, Default)]
 pub struct Fallback<First, Then>(First, Then);
 
@@ -246,12 +252,24 @@ where
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],
-    ) -> Result<usize, Failure> {
+    ) -> Result<Work, Failure> {
         let guess = x.to_vec();
-        self.0.solve(a, b, x, tolerance).or_else(|_| {
-            x.copy_from_slice(&guess);
-            self.1.solve(a, b, x, tolerance)
-        })
+        let gave_up = match self.0.solve(a, b, x, tolerance) {
+            Ok(work) => return Ok(work),
+            Err(failure) => failure,
+        };
+        x.copy_from_slice(&guess);
+        let mut work = self.1.solve(a, b, x, tolerance)?;
+        match gave_up {
+            // an iteration that begins does at least one
+            Failure::LinearStalled { iterations: 0, .. } => work.direct_unstarted += work.linear_solves,
+            Failure::LinearStalled { iterations, .. } => {
+                work.direct_stalled += work.linear_solves;
+                work.linear_iterations += iterations;
+            }
+            _ => work.direct_stalled += work.linear_solves,
+        }
+        Ok(work)
     }
 }
 

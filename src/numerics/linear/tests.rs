@@ -137,7 +137,8 @@ fn blocks_fall_back_on_the_direct_solver() {
     matrix.rows[3][0] = [[0.0; 3]; 3];
     let mut x = vec![[0.0; 3]; 42];
     assert!(BlockBicgstab::default().solve(&matrix, &[[1.0; 3]; 20], &mut x, [1e-12; 3]).is_err());
-    RobustBlock::default().solve(&matrix, &[[1.0; 3]; 20], &mut x, [1e-11; 3]).unwrap();
+    let work = RobustBlock::default().solve(&matrix, &[[1.0; 3]; 20], &mut x, [1e-11; 3]).unwrap();
+    assert_eq!([work.linear_solves, work.direct_unstarted, work.direct_stalled], [1, 1, 0], "{work:?}");
     matrix.rows[3] = [[[0.0; 3]; 3]; 5];
     let error = RobustBlock::default().solve(&matrix, &[[1.0; 3]; 20], &mut x, [1e-11; 3]).unwrap_err();
     assert!(matches!(error, Failure::LinearStalled { .. }), "{error}");
@@ -151,8 +152,8 @@ fn one_dimension_takes_one_iteration() {
         matrix.rows.fill([1.0 + 2.0 * a, -0.9 * a, -1.1 * a]);
         let mut x = vec![[0.0]; 42];
         x[41] = [1.0];
-        let iterations = Bicgstab::default().solve(&matrix, &[[0.5]; 40], &mut x, [1e-11]).unwrap();
-        assert_eq!(iterations, 1, "a = {a}");
+        let work = Bicgstab::default().solve(&matrix, &[[0.5]; 40], &mut x, [1e-11]).unwrap();
+        assert_eq!(work.linear_iterations, 1, "a = {a}");
     }
 }
 
@@ -165,12 +166,43 @@ fn a_singular_system_is_refused() {
     assert!(matches!(error, Failure::LinearStalled { unknowns: 16, .. }), "{error}");
 }
 
-/// Where the fast solver cannot start (no positive pivots), the direct one steps in.
+/// Where the fast solver cannot start (no positive pivots), the direct one steps in, and the work says so: two right-hand
+/// sides that could not begin.
 #[test]
 fn the_fallback_solves_what_the_iteration_cannot() {
     let mut matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1, 1], size: [5, 4], wraps: [false; 2] });
     matrix.rows.fill([-3.0, 1.0, 0.5, 0.25, 0.125]);
+    let mut x = vec![[0.0; 2]; 42];
+    assert!(Bicgstab::default().solve(&matrix, &[[1.0, 2.0]; 20], &mut x, [1e-12; 2]).is_err());
+    let work = Robust::default().solve(&matrix, &[[1.0, 2.0]; 20], &mut x, [1e-12; 2]).unwrap();
+    let expected = Work { linear_solves: 2, direct_unstarted: 2, ..Work::default() };
+    assert_eq!((work, work.direct_solves()), (expected, 2));
+}
+
+/// A solver that gives up after seven iterations.
+struct GivesUp;
+
+impl LinearSolver<2, 5, 1> for GivesUp {
+    fn solve(
+        &mut self,
+        _: &LatticeMatrix<2, 5>,
+        _: &[[f64; 1]],
+        x: &mut [[f64; 1]],
+        _: [f64; 1],
+    ) -> Result<Work, Failure> {
+        x.fill([f64::NAN]);
+        Err(Failure::LinearStalled { unknowns: 20, residual: 1.0, tolerance: 0.1, iterations: 7 })
+    }
+}
+
+/// An iteration that stalls is told apart from one that cannot begin, its iterations are counted, and what it left of the
+/// guess is forgotten.
+#[test]
+fn a_stalled_iteration_is_counted_with_its_reason() {
+    let matrix = sample::<5>([5, 4], [false; 2], 1.0, 3);
     let mut x = vec![[0.0]; 42];
-    assert!(Bicgstab::default().solve(&matrix, &[[1.0]; 20], &mut x, [1e-12]).is_err());
-    Robust::default().solve(&matrix, &[[1.0]; 20], &mut x, [1e-12]).unwrap();
+    let work = Fallback(GivesUp, SparseLu::default()).solve(&matrix, &[[1.0]; 20], &mut x, [1e-12]).unwrap();
+    let expected = Work { linear_solves: 1, linear_iterations: 7, direct_stalled: 1, ..Work::default() };
+    assert_eq!(work, expected);
+    assert!(x.iter().all(|[x]| x.is_finite()));
 }

@@ -183,8 +183,7 @@ impl ShallowWater {
             // Newton squares the residual: solving for much less than that is wasted
             let share = (0.01 * largest * largest.min(1.0)).max(0.1 * wanted);
             let tolerance = scales.map(|scale| share * scale);
-            work.linear_iterations += solver.solve(&matrix, &residual, &mut correction, tolerance)?;
-            work.linear_solves += 1;
+            work += solver.solve(&matrix, &residual, &mut correction, tolerance)?;
             work.newton_iterations += 1;
             for (w, correction) in w.iter_mut().zip(&correction) {
                 (0..3).for_each(|c| w[c] += correction[c]);

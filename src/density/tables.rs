@@ -1,0 +1,67 @@
+//! `[monitor]` of a study: a density, what the mesh follows, and how the mesh equation differences it.
+
+use super::{Arclength, Given, Strength};
+use crate::numerics::difference::Gradient;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A [`RootGradient`](super::RootGradient) as a study writes it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RootGradientTable {
+    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
+    /// said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+}
+
+/// An [`Arclength`] as a study writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ArclengthTable {
+    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
+    /// said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// How α is chosen.
+    pub strength: Strength,
+    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    pub smoothing: usize,
+    /// How the mesh equation differences ρ.
+    pub gradient: Gradient,
+}
+
+impl Default for ArclengthTable {
+    fn default() -> Self {
+        let Arclength { strength, smoothing } = Arclength::default();
+        Self { of: None, strength, smoothing, gradient: Gradient::Central }
+    }
+}
+
+impl ArclengthTable {
+    /// The density.
+    pub(super) fn density(&self) -> Arclength {
+        Arclength { strength: self.strength, smoothing: self.smoothing }
+    }
+}
+
+/// A [`Given`] as a study writes it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct GivenTable {
+    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; the first unknown where nothing is
+    /// said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    pub smoothing: usize,
+    /// How the mesh equation differences ρ.
+    pub gradient: Gradient,
+}
+
+impl GivenTable {
+    /// The density.
+    pub(super) fn density(&self) -> Given {
+        Given { smoothing: self.smoothing }
+    }
+}

@@ -1,0 +1,26 @@
+//! Checks of one value a node.
+
+use super::{Lattice, Mesh};
+use crate::error::Failure;
+
+/// Refuses an array that has not one value a node.
+pub(crate) fn check_length<const D: usize>(
+    lattice: &Lattice<D>,
+    what: &'static str,
+    found: usize,
+) -> Result<(), Failure> {
+    match found == lattice.len() {
+        true => Ok(()),
+        false => Err(Failure::WrongLength { what, found, expected: lattice.len() }),
+    }
+}
+
+/// Refuses values that are not one a node, not finite, or not above 0.
+pub(crate) fn check_positive(mesh: &Mesh<2>, what: &'static str, values: &[f64]) -> Result<(), Failure> {
+    let Some(k) = values.iter().position(|value| !(value.is_finite() && *value > 0.0)) else { return Ok(()) };
+    let (value, node, x) = (values[k], mesh.lattice().node(k), mesh.x()[k]);
+    Err(match value.is_finite() {
+        true => Failure::NotPositive { what, value, node, x },
+        false => Failure::NonFinite { what, value, node, x },
+    })
+}

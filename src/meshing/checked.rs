@@ -1,0 +1,55 @@
+//! What a step of a mesh generator is given, and what it returns.
+
+use super::{Mmpde, Moved, Relaxation, Steps};
+use crate::error::Failure;
+use crate::geometry::{Mesh, check_length, check_positive, check_unfolded};
+
+/// Standard error of interface values, as a share of the shortest edge, above which it may have folded a mesh.
+const NOISE_THAT_FOLDS: f64 = 0.05;
+/// Distance from the side of a box, as a share of its extent, that is round-off.
+const ROUNDING: f64 = 1e-9;
+
+/// Refuses what no step of a mesh equation can begin with.
+pub(super) fn check_given(equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<(), Failure> {
+    Failure::unless_positive("the time step", dt)?;
+    equation.check().map_err(Failure::refusing)?;
+    if let Relaxation::Steps(Steps { prediction, .. }) = equation.relaxation
+        && prediction != 0.0
+    {
+        let rule = "a generator by itself keeps no velocity of the nodes; set it to 0, or step with a Mover".into();
+        return Err(Failure::OutOfRange {
+            what: "`relaxation.prediction`".into(),
+            value: prediction.to_string(),
+            rule,
+        });
+    }
+    check_length(mesh.lattice(), "the density", rho.len())?;
+    check_positive(mesh, "the mesh density", rho)
+}
+
+/// Refuses a mesh whose bounded sides do not lie on the box around it: on those, nodes move along straight lines.
+pub(super) fn check_box(mesh: &Mesh<2>) -> Result<(), Failure> {
+    let (lattice, ends, extent) = (mesh.lattice(), [mesh.lower(), mesh.upper()], mesh.extent());
+    for k in lattice.sides() {
+        for (axis, beyond) in lattice.beyond(k).into_iter().enumerate() {
+            for end in (0..2).filter(|&end| beyond[end]) {
+                let off = (mesh.x()[k][axis] - ends[end][axis]).abs();
+                // NaN is off, too
+                if !(off <= ROUNDING * extent[axis]) {
+                    return Err(Failure::NotABox { off, axis, node: lattice.node(k), x: mesh.x()[k] });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a folded mesh, and tells the noise that may have folded it.
+pub(super) fn check_made(moved: Moved) -> Result<Moved, Failure> {
+    let noise = moved.interface.and_then(|interface| interface.noise).filter(|noise| *noise > NOISE_THAT_FOLDS);
+    check_unfolded(&moved.mesh).map_err(|failure| match failure {
+        Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },
+        other => other,
+    })?;
+    Ok(moved)
+}
