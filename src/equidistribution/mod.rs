@@ -234,9 +234,9 @@ const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
 const NEAR: f64 = 1e-6;
 /// Iterations that may be asked for.
 pub(crate) const MOST_ITERATIONS: usize = 1_000_000;
-/// What to ask for of what stands still, over what it came to.
+/// The tolerance that a message recommends where an iteration no longer improves, as a multiple of the error that it reached.
 const STILL: f64 = 1.5;
-/// Iterations that tell nothing of an iteration that has not fallen in them.
+/// Iterations before which a message does not call an error that has not fallen yet a stalled iteration.
 const FEW: usize = 4;
 /// Iterates with errors below this share of the line's length are rounding.
 const ROUNDING: f64 = 1e-11;

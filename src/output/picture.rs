@@ -56,7 +56,8 @@ pub(super) const BOTTOM: f64 = 64.0;
 pub(super) const BAR: f64 = 24.0;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
-/// Opacities of mesh lines, and what a cell beside them has of it for each unit that it is wider than one.
+/// Opacities with which mesh lines may be drawn: a line beside wide cells is drawn more strongly than one between narrow cells,
+/// so that crowded lines do not hide the colours.
 const STRENGTHS: [f64; 8] = [0.04, 0.08, 0.13, 0.19, 0.26, 0.35, 0.46, 0.6];
 /// Steps from white to black lines, and the shares of the colour map over which they change.
 const TONES: usize = 5;

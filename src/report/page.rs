@@ -10,6 +10,7 @@ const TEMPLATE: &str = include_str!("../../assets/report/page.html");
 const STYLE: &str = include_str!("../../assets/report/style.css");
 const SCRIPT: &str = concat!(
     include_str!("../../assets/report/parts.js"),
+    include_str!("../../assets/report/paint.js"),
     include_str!("../../assets/report/viewer.js"),
     include_str!("../../assets/report/line.js"),
 );

@@ -121,7 +121,8 @@ const FIRST_AGAIN: f64 = 0.1;
 const GIVEN: f64 = 0.02;
 /// Steps in a run in which nothing changes.
 const FEWEST: f64 = 20.0;
-/// A share of the time in which the mesh follows: what would shorten it by more is asked of a mesh that rests.
+/// The time in which the mesh follows may halve from one step to the next without a doubt; where the solution seems to change
+/// faster, the change is measured again on a mesh that does not move.
 const DOUBTED: f64 = 0.5;
 /// Share of the change in a step above which what widens the range is growth.
 const GROWS: f64 = 0.5;
@@ -247,7 +248,8 @@ impl Free {
         if scale < self.scale {
             let mut in_place = dt * CHANGE / share(change_in_place(before, after, 0), self.ranges[0]);
             if in_place < DOUBTED * self.scale {
-                // that counts what the mesh makes of the values, too, and a τ that is shortened by it sweeps the more
+                // the change at fixed places contains the errors of interpolation that the moving mesh makes; a τ shortened by
+                // these would move the mesh faster and make more of them
                 in_place = in_place.max(self.dt * CHANGE / self.share_at_rest(simulation, after));
             }
             scale = scale.max(in_place.min(self.scale));

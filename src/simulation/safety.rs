@@ -44,11 +44,11 @@ pub struct Retries {
     pub shortened: usize,
 }
 
-/// With more parts a step of the mesh costs more than shorter time steps do.
+/// Largest number of parts of a step of the mesh: with more it costs more than shorter time steps do.
 const MOST_SUBSTEPS: usize = 64;
-/// A density is flat before.
+/// Largest number of further passes of the filter over ρ: a density is constant to the eye after fewer.
 const MOST_SMOOTHING: usize = 1000;
-/// A step of 2⁻³⁰ is none.
+/// Largest number of halvings of a time step: 2⁻³⁰ of it makes no progress.
 const MOST_HALVINGS: usize = 30;
 
 impl Default for Safety {

@@ -75,7 +75,7 @@ pub struct Front {
     pub method: Method,
     /// How temperatures get to the new mesh.
     pub transfer: Transfer,
-    /// Across the columns.
+    /// Smoothing of the front's heights over neighbouring columns of the grid, after every step.
     pub filter: Filter,
     /// From which temperatures the front moves.
     pub stepping: Stepping,

@@ -118,7 +118,7 @@ pub struct FrontTable {
     pub method: Method,
     /// How temperatures get to the new mesh.
     pub transfer: Transfer,
-    /// Across the columns.
+    /// Smoothing of the front's heights over neighbouring columns of the grid after every step: three weights, or "none".
     #[serde(serialize_with = "write_filter", deserialize_with = "read_filter")]
     #[schemars(schema_with = "filter_schema")]
     pub filter: Filter,

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridWalk {
-    /// N, for each point.
+    /// Number N of walks that start at each interface point.
     pub walks: usize,
     /// Walks pay the motion over the step instead of the position: the residual walk without sweeps.
     #[serde(default)]

@@ -28,9 +28,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MonteCarlo {
-    /// N, for each point.
+    /// Number N of paths that start at each interface point.
     pub paths: usize,
-    /// M.
+    /// Number M of Euler–Maruyama steps of a path within a time step.
     pub substeps: usize,
     /// Every second path takes the increments of the one before with opposite sign.
     #[serde(default)]

@@ -31,9 +31,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ResidualWalk {
-    /// k, or "auto".
+    /// Sweeps of relaxation in place of the solves of strips, or "auto" for the solves.
     pub sweeps: Auto<usize>,
-    /// N, for each point.
+    /// Number N of walks that start at each interface point.
     pub walks: usize,
     /// Weights of the sweeps.
     pub smoother: Smoother,
