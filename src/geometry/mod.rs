@@ -2,6 +2,7 @@
 
 mod dual;
 mod field;
+mod folded;
 mod lattice;
 mod locate;
 mod mesh;
@@ -20,9 +21,10 @@ pub use locate::interpolate;
 pub use mesh::Mesh;
 pub(crate) use nodal::{check_length, check_positive};
 pub use patch::Patch;
+pub use folded::check_unfolded;
 pub(crate) use quality::quality_and_integral;
 pub use quality::{
-    Comparison, Quality, cell_areas, cell_jacobians, cell_qualities, check_unfolded, compare, node_areas, quality,
+    Comparison, Quality, cell_areas, cell_jacobians, cell_qualities, compare, node_areas, quality,
 };
 pub use remap::remap;
 pub use simple::check_simple;
