@@ -93,9 +93,7 @@ impl<const D: usize> Mesh<D> {
         check_length(&self.lattice, "the mesh", x.len())?;
         if let Some(k) = x.iter().position(|x| !x.iter().all(|v| v.is_finite())) {
             let value = x[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
-            // a failure tells two coordinates: those of a line are told with 0 as the second
-            let node = self.lattice.node(k);
-            let (node, x) = (first_two(&node), first_two(&x[k]));
+            let (node, x) = (first_two(&self.lattice.node(k)), first_two(&x[k]));
             return Err(Failure::NonFinite { what: "the mesh", value, node, x });
         }
         Ok(Self { x, ..*self })
@@ -201,6 +199,11 @@ impl<const D: usize> Mesh<D> {
         std::array::from_fn(|d| self.upper[d] - self.lower[d])
     }
 
+    /// A node and its place as failures tell them: with two coordinates, 0 as the second on a line.
+    pub(crate) fn told(&self, k: usize) -> ([usize; 2], [f64; 2]) {
+        (first_two(&self.lattice.node(k)), first_two(&self.x[k]))
+    }
+
     /// The longest way of a node from another mesh over the same lattice.
     pub fn farthest(&self, other: &Self) -> f64 {
         let way = |(a, b): (&[f64; D], &[f64; D])| (0..D).map(|d| (a[d] - b[d]) * (a[d] - b[d])).sum::<f64>();
@@ -228,6 +231,6 @@ impl<const D: usize> Mesh<D> {
 }
 
 /// The first two of some numbers, 0 where there are fewer.
-fn first_two<T: Copy + Default>(values: &[T]) -> [T; 2] {
+pub(super) fn first_two<T: Copy + Default>(values: &[T]) -> [T; 2] {
     [0, 1].map(|d| values.get(d).copied().unwrap_or_default())
 }

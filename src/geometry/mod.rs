@@ -2,6 +2,7 @@
 
 mod dual;
 mod field;
+mod folded;
 mod lattice;
 mod locate;
 mod mesh;
@@ -14,6 +15,7 @@ mod simple;
 pub use dual::{DualCells, padded};
 pub use field::Field;
 pub(crate) use field::largest;
+pub use folded::check_unfolded;
 pub use lattice::Lattice;
 pub(crate) use lattice::strides;
 pub use locate::interpolate;
@@ -21,8 +23,6 @@ pub use mesh::Mesh;
 pub(crate) use nodal::{check_length, check_positive};
 pub use patch::Patch;
 pub(crate) use quality::quality_and_integral;
-pub use quality::{
-    Comparison, Quality, cell_areas, cell_jacobians, cell_qualities, check_unfolded, compare, node_areas, quality,
-};
+pub use quality::{Comparison, Quality, cell_areas, cell_jacobians, cell_qualities, compare, node_areas, quality};
 pub use remap::remap;
 pub use simple::check_simple;

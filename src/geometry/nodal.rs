@@ -16,9 +16,13 @@ pub(crate) fn check_length<const D: usize>(
 }
 
 /// Refuses values that are not one a node, not finite, or not above 0.
-pub(crate) fn check_positive(mesh: &Mesh<2>, what: &'static str, values: &[f64]) -> Result<(), Failure> {
+pub(crate) fn check_positive<const D: usize>(
+    mesh: &Mesh<D>,
+    what: &'static str,
+    values: &[f64],
+) -> Result<(), Failure> {
     let Some(k) = values.iter().position(|value| !(value.is_finite() && *value > 0.0)) else { return Ok(()) };
-    let (value, node, x) = (values[k], mesh.lattice().node(k), mesh.x()[k]);
+    let (value, (node, x)) = (values[k], mesh.told(k));
     Err(match value.is_finite() {
         true => Failure::NotPositive { what, value, node, x },
         false => Failure::NonFinite { what, value, node, x },

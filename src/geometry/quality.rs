@@ -323,37 +323,10 @@ pub fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
     all
 }
 
-/// Refuses a mesh with a node that is not finite or a cell that is folded.
-///
-/// # Errors
-/// [`Failure::NonFinite`] for the first such node, else [`Failure::Folded`] for the worst cell.
-pub fn check_unfolded(mesh: &Mesh<2>) -> Result<(), Failure> {
-    if let Some(k) = mesh.x().iter().position(|x| !x.iter().all(|v| v.is_finite())) {
-        let x = mesh.x()[k];
-        let value = if x[0].is_finite() { x[1] } else { x[0] };
-        return Err(Failure::NonFinite { what: "the mesh", value, node: mesh.lattice().node(k), x });
-    }
-    let mut worst: Option<(f64, [usize; 2], [f64; 2])> = None;
-    for_each_cell(mesh, |cell, _, corners| {
-        for (jacobian, x) in Edges::of(corners).corner_jacobians().into_iter().zip(corners) {
-            // not `<=`: a Jacobian that overflowed to NaN is not positive either
-            if jacobian.is_nan() || jacobian <= worst.map_or(0.0, |w| w.0) {
-                worst = Some((jacobian, cell, x));
-            }
-        }
-    });
-    match worst {
-        None => Ok(()),
-        Some((jacobian, cell, x)) => {
-            Err(Failure::Folded { cell, jacobian: jacobian / uniform_jacobian(mesh), x, noise: None })
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Lattice;
+    use crate::geometry::{Lattice, check_unfolded};
 
     fn square(cells: usize) -> Mesh<2> {
         Mesh::uniform(Lattice::bounded([cells, cells]).unwrap(), [0.0, 0.0], [1.0, 1.0]).unwrap()

@@ -10,7 +10,12 @@ const NOISE_THAT_FOLDS: f64 = 0.05;
 const ROUNDING: f64 = 1e-9;
 
 /// Refuses what no step of a mesh equation can begin with.
-pub(super) fn check_given(equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<(), Failure> {
+pub(super) fn check_given<const D: usize>(
+    equation: &Mmpde,
+    mesh: &Mesh<D>,
+    rho: &[f64],
+    dt: f64,
+) -> Result<(), Failure> {
     Failure::unless_positive("the time step", dt)?;
     equation.check().map_err(Failure::refusing)?;
     if let Relaxation::Steps(Steps { prediction, .. }) = equation.relaxation
@@ -28,7 +33,7 @@ pub(super) fn check_given(equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64
 }
 
 /// Refuses a mesh whose bounded sides do not lie on the box around it: on those, nodes move along straight lines.
-pub(super) fn check_box(mesh: &Mesh<2>) -> Result<(), Failure> {
+pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
     let (lattice, ends, extent) = (mesh.lattice(), [mesh.lower(), mesh.upper()], mesh.extent());
     for k in lattice.sides() {
         for (axis, beyond) in lattice.beyond(k).into_iter().enumerate() {
@@ -36,7 +41,8 @@ pub(super) fn check_box(mesh: &Mesh<2>) -> Result<(), Failure> {
                 let off = (mesh.x()[k][axis] - ends[end][axis]).abs();
                 // NaN is off, too
                 if !(off <= ROUNDING * extent[axis]) {
-                    return Err(Failure::NotABox { off, axis, node: lattice.node(k), x: mesh.x()[k] });
+                    let (node, x) = mesh.told(k);
+                    return Err(Failure::NotABox { off, axis, node, x });
                 }
             }
         }
@@ -45,7 +51,7 @@ pub(super) fn check_box(mesh: &Mesh<2>) -> Result<(), Failure> {
 }
 
 /// Refuses a folded mesh, and tells the noise that may have folded it.
-pub(super) fn check_made(moved: Moved) -> Result<Moved, Failure> {
+pub(super) fn check_made<const D: usize>(moved: Moved<D>) -> Result<Moved<D>, Failure> {
     let noise = moved.interface.and_then(|interface| interface.noise).filter(|noise| *noise > NOISE_THAT_FOLDS);
     check_unfolded(&moved.mesh).map_err(|failure| match failure {
         Failure::Folded { cell, jacobian, x, .. } => Failure::Folded { cell, jacobian, x, noise },

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Fixed {}
 
-impl MeshGenerator for Fixed {
-    fn solve(&mut self, _: &Mmpde, mesh: &Mesh<2>, _rho: &[f64], _dt: f64) -> Result<Moved, Failure> {
+impl<const D: usize> MeshGenerator<D> for Fixed {
+    fn solve(&mut self, _: &Mmpde, mesh: &Mesh<D>, _rho: &[f64], _dt: f64) -> Result<Moved<D>, Failure> {
         Ok(Moved { mesh: mesh.clone(), work: Work::default(), interface: None })
     }
 

@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// Laws, tested for every implementation: the mesh does not change under ρ → cρ; constant ρ leaves a uniform mesh at
 /// rest; side nodes stay exactly on the box.
-pub trait MeshGenerator: Send {
+pub trait MeshGenerator<const D: usize = 2>: Send {
     /// The mesh at t + `dt` from the mesh at t and the density on it, one value a node: [`solve`](Self::solve), with checks
     /// of what it is given and of what it returns.
     ///
@@ -54,7 +54,7 @@ pub trait MeshGenerator: Send {
     /// assert!(matches!(refused, Err(Failure::NotPositive { node: [0, 0], .. })));
     /// # Ok::<(), driftmesh::Error>(())
     /// ```
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &[f64], dt: f64) -> Result<Moved<D>, Failure> {
         checked::check_given(equation, mesh, rho, dt)?;
         if self.moves() {
             checked::check_box(mesh)?;
@@ -66,7 +66,7 @@ pub trait MeshGenerator: Send {
     ///
     /// # Errors
     /// A [`Failure`] where a system cannot be solved or the settings do not fit the lattice.
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure>;
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &[f64], dt: f64) -> Result<Moved<D>, Failure>;
 
     /// False for a mesh that stays, which nothing predicts either.
     fn moves(&self) -> bool {
@@ -80,16 +80,16 @@ pub trait MeshGenerator: Send {
     ///
     /// # Errors
     /// [`Unfit`] where that is not there, or cannot be.
-    fn resume(&mut self, _mesh: &Mesh<2>, _kept: &Kept) -> Result<(), Unfit> {
+    fn resume(&mut self, _mesh: &Mesh<D>, _kept: &Kept) -> Result<(), Unfit> {
         Ok(())
     }
 }
 
 /// A mesh that was moved.
 #[derive(Debug, Clone)]
-pub struct Moved {
+pub struct Moved<const D: usize = 2> {
     /// The mesh at the end of the step.
-    pub mesh: Mesh<2>,
+    pub mesh: Mesh<D>,
     /// What it cost.
     pub work: Work,
     /// How well the subdomains fit together, where there are any.

@@ -1,64 +1,155 @@
 use super::mmpde::cell_means;
 use super::{Form, Mmpde};
 use crate::error::{Failure, Result};
-use crate::geometry::{Lattice, Mesh, Patch};
-use crate::numerics::linear::Robust;
+use crate::geometry::{Lattice, Mesh, Patch, strides};
+use crate::numerics::linear::{LinearSolver, Robust};
 use crate::work::Work;
 
-/// Moves the nodes along the bounded sides of the box: the mesh equation in one dimension, on each side by itself
+/// Moves the nodes on the bounded sides of the box: the mesh equation on each side by itself, in as many dimensions as the side has
 ///
-/// On a side the coordinate across it is fixed and the one along it solves the mesh equation with the ρ of the side;
-/// corners stay. `x` holds the old positions of all nodes and receives the new ones on the sides.
-pub fn move_sides(
+/// On a side the coordinates across it are fixed and those along it solve the mesh equation with the ρ of the side, between
+/// the edges around it, which are moved before; corners stay. `x` holds the old positions of all nodes and receives the new
+/// ones on the sides.
+///
+/// # Errors
+/// What the solves fail with.
+pub fn move_sides<const D: usize>(
     equation: &Mmpde,
-    mesh: &Mesh<2>,
+    mesh: &Mesh<D>,
     rho: &[f64],
     dt: f64,
-    x: &mut [[f64; 2]],
+    x: &mut [[f64; D]],
     solver: &mut Robust<1>,
 ) -> Result<Work, Failure> {
-    let lattice = mesh.lattice();
-    let (cells, nodes, strides) = (lattice.cells(), lattice.nodes(), lattice.strides());
+    let sides = Sides::new(equation, mesh, rho, dt);
     let mut work = Work::default();
-    let cell_rho = match equation.form {
-        Form::Gradient(_) => None,
-        Form::Conservative => Some(cell_means(lattice, rho)),
-    };
-    for across in (0..2).filter(|&d| !lattice.periodic()[d]) {
-        let along = 1 - across;
-        let line = Lattice::<1>::new([cells[along]], [lattice.periodic()[along]]).expect("an axis of a lattice is one");
-        let jump = [[mesh.extent()[along]]];
-        for end in [0, cells[across]] {
-            let place = |i: usize| end * strides[across] + i * strides[along];
-            let side_rho: Vec<f64> = (0..nodes[along]).map(|i| rho[place(i)]).collect();
-            let old: Vec<[f64; 1]> = (0..nodes[along]).map(|i| [mesh.x()[place(i)][along]]).collect();
-            let patch = Patch::whole(&line);
-            let operator = match &cell_rho {
-                None => equation.operator(&line, &side_rho, dt)?,
-                Some(rho) => {
-                    // the one row of cells beside the side
-                    let row = if end == 0 { 0 } else { cells[across] - 1 };
-                    let cell = |i: usize| if across == 0 { row * cells[1] + i } else { i * cells[1] + row };
-                    equation.on_cells(&line, &(0..cells[along]).map(|i| rho[cell(i)]).collect::<Vec<_>>(), dt)
-                }
-            };
-            let (new, cost) = operator.solve::<3, 1>(patch, &old, &old, jump, solver, [size(mesh)[along]])?;
-            work += cost;
-            for (i, k) in patch.nodes(&line).zip(patch.places()) {
-                x[place(i)][along] = new[k][0];
-            }
-        }
+    for along in (0..D).rev() {
+        work += sides.solve::<1, 3>([along], x, solver)?;
+    }
+    for across in (0..D).filter(|_| D == 3) {
+        let along = if across == 0 { [1, 2] } else { [0, 3 - across] };
+        work += sides.solve::<2, 5>(along, x, &mut Robust::default())?;
     }
     Ok(work)
 }
 
+/// All sides of a mesh over one step.
+struct Sides<'a, const D: usize> {
+    equation: &'a Mmpde,
+    mesh: &'a Mesh<D>,
+    rho: &'a [f64],
+    /// ρ in the mesh cells, in the conservative form.
+    cells: Option<Vec<f64>>,
+    dt: f64,
+}
+
+impl<'a, const D: usize> Sides<'a, D> {
+    fn new(equation: &'a Mmpde, mesh: &'a Mesh<D>, rho: &'a [f64], dt: f64) -> Self {
+        let cells = match equation.form {
+            Form::Gradient(_) => None,
+            Form::Conservative => Some(cell_means(mesh.lattice(), rho)),
+        };
+        Self { equation, mesh, rho, cells, dt }
+    }
+
+    /// Moves the nodes of all sides that lie along some axes, S = 2E + 1 points of a star; none where an axis across them is
+    /// periodic, or none is.
+    fn solve<const E: usize, const S: usize>(
+        &self,
+        along: [usize; E],
+        x: &mut [[f64; D]],
+        solver: &mut impl LinearSolver<E, S, E>,
+    ) -> Result<Work, Failure> {
+        let across: Vec<usize> = (0..D).filter(|d| !along.contains(d)).collect();
+        let mut work = Work::default();
+        if across.is_empty() || across.iter().any(|&d| self.mesh.lattice().periodic()[d]) {
+            return Ok(work);
+        }
+        for ends in 0..1_usize << across.len() {
+            let upper = |d: usize| across.iter().position(|&a| a == d).is_some_and(|k| ends >> k & 1 == 1);
+            work += self.solve_one(along, upper, x, solver)?;
+        }
+        Ok(work)
+    }
+
+    /// One of them: at the upper or lower end of each axis across it.
+    fn solve_one<const E: usize, const S: usize>(
+        &self,
+        along: [usize; E],
+        upper: impl Fn(usize) -> bool,
+        x: &mut [[f64; D]],
+        solver: &mut impl LinearSolver<E, S, E>,
+    ) -> Result<Work, Failure> {
+        let (lattice, extent, size) = (self.mesh.lattice(), self.mesh.extent(), size(self.mesh));
+        let (cells, periodic) = (lattice.cells(), lattice.periodic());
+        let side = Lattice::<E>::new(along.map(|d| cells[d]), along.map(|d| periodic[d])).expect("axes of a lattice");
+        let place =
+            Places { along, origin: at_ends(lattice.strides(), cells, &along, &upper), strides: lattice.strides() };
+        let operator = match &self.cells {
+            None => {
+                let rho: Vec<f64> = (0..side.len()).map(|k| self.rho[place.of(side.node(k))]).collect();
+                self.equation.operator(&side, &rho, self.dt)?
+            }
+            Some(rho) => {
+                // the one layer of cells beside the side
+                let steps = strides(cells);
+                let beside =
+                    Places { along, origin: at_ends(steps, cells.map(|n| n - 1), &along, &upper), strides: steps };
+                let size = side.cells();
+                let node = |k: usize| std::array::from_fn(|e| k / strides(size)[e] % size[e]);
+                let rho: Vec<f64> = (0..size.iter().product()).map(|k| rho[beside.of(node(k))]).collect();
+                self.equation.on_cells(&side, &rho, self.dt)
+            }
+        };
+        let of = |x: &[f64; D]| along.map(|d| x[d]);
+        let old: Vec<[f64; E]> = (0..side.len()).map(|k| of(&self.mesh.x()[place.of(side.node(k))])).collect();
+        let new: Vec<[f64; E]> = (0..side.len()).map(|k| of(&x[place.of(side.node(k))])).collect();
+        let jump = diagonal(along.map(|d| extent[d]));
+        let patch = Patch::whole(&side);
+        let (found, work) = operator.solve::<S, E>(patch, &old, &new, jump, solver, along.map(|d| size[d]))?;
+        let mut moved = new;
+        patch.scatter(&side, &found, &mut moved, jump);
+        for (k, moved) in moved.iter().enumerate() {
+            let node = place.of(side.node(k));
+            along.iter().zip(moved).for_each(|(&d, value)| x[node][d] = *value);
+        }
+        Ok(work)
+    }
+}
+
+/// Where the nodes, or cells, of a side are in an array over the whole mesh.
+struct Places<const D: usize, const E: usize> {
+    along: [usize; E],
+    origin: usize,
+    strides: [usize; D],
+}
+
+impl<const D: usize, const E: usize> Places<D, E> {
+    fn of(&self, node: [usize; E]) -> usize {
+        self.origin + self.along.iter().zip(node).map(|(&d, i)| i * self.strides[d]).sum::<usize>()
+    }
+}
+
+/// The first entry of a side: at `last` along the axes across it of which it is the upper one.
+fn at_ends<const D: usize>(
+    strides: [usize; D],
+    last: [usize; D],
+    along: &[usize],
+    upper: impl Fn(usize) -> bool,
+) -> usize {
+    (0..D).filter(|&d| !along.contains(&d) && upper(d)).map(|d| last[d] * strides[d]).sum()
+}
+
 /// What is added to positions on wrapping around each axis.
-pub(super) fn jump(mesh: &Mesh<2>) -> [[f64; 2]; 2] {
-    let [width, height] = mesh.extent();
-    [[width, 0.0], [0.0, height]]
+pub(super) fn jump<const D: usize>(mesh: &Mesh<D>) -> [[f64; D]; D] {
+    diagonal(mesh.extent())
+}
+
+fn diagonal<const D: usize>(values: [f64; D]) -> [[f64; D]; D] {
+    std::array::from_fn(|d| std::array::from_fn(|c| if c == d { values[d] } else { 0.0 }))
 }
 
 /// The largest coordinate along each axis.
-pub(super) fn size(mesh: &Mesh<2>) -> [f64; 2] {
+pub(super) fn size<const D: usize>(mesh: &Mesh<D>) -> [f64; D] {
     std::array::from_fn(|d| mesh.lower()[d].abs().max(mesh.upper()[d].abs()))
 }

@@ -3,36 +3,40 @@ use super::{MeshGenerator, Mmpde, Moved, move_sides};
 use crate::error::{Failure, Result, Unfit};
 use crate::geometry::{Mesh, Patch};
 use crate::kept::{Kept, check_nodal};
-use crate::numerics::linear::{Pcg, Robust};
+use crate::numerics::linear::{LinearSolver, Pcg, Robust, SparseLu};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One implicit solve of the mesh equation on the whole domain: the sides first, then all other nodes at once
 ///
-/// The gradient form is solved to round-off. The conservative form is solved by conjugate gradients from the mesh that
-/// the last step would lead to if it went on, to a hundredth of the shortest edge or better.
+/// In one, two or three dimensions. The gradient form is solved to round-off. The conservative form is solved by conjugate
+/// gradients from the mesh that the last step would lead to if it went on, to a hundredth of the shortest edge or better.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Whole {
+#[schemars(rename = "Whole")]
+pub struct Whole<const D: usize = 2> {
     #[serde(skip)]
     line: Robust<1>,
     #[serde(skip)]
-    plane: Robust<2>,
+    inside: Robust<D>,
+    /// In three dimensions, for which alternating directions are not.
     #[serde(skip)]
-    symmetric: Pcg<2, 2>,
+    elimination: SparseLu,
+    #[serde(skip)]
+    symmetric: Pcg<D, D>,
     /// How exactly conjugate gradients solve for positions, as a share of the shortest edge. A residual of the mesh
     /// equation bounds the error it leaves.
     #[serde(skip, default = "closeness")]
     closeness: f64,
     /// The last step: from where to where, and how long it took.
     #[serde(skip)]
-    last: Option<Step>,
+    last: Option<Step<D>>,
 }
 
 #[derive(Debug, Clone)]
-struct Step {
-    from: Mesh<2>,
-    to: Mesh<2>,
+struct Step<const D: usize> {
+    from: Mesh<D>,
+    to: Mesh<D>,
     dt: f64,
 }
 
@@ -42,37 +46,43 @@ fn closeness() -> f64 {
     1e-2
 }
 
-impl Default for Whole {
+impl<const D: usize> Default for Whole<D> {
     fn default() -> Self {
         Self::to(closeness())
     }
 }
 
-impl Whole {
+impl<const D: usize> Whole<D> {
     /// Solves the conservative form to a share of the shortest edge of the mesh.
     pub fn to(closeness: f64) -> Self {
-        Self { line: Robust::default(), plane: Robust::default(), symmetric: Pcg::default(), closeness, last: None }
+        Self {
+            line: Robust::default(),
+            inside: Robust::default(),
+            elimination: SparseLu::default(),
+            symmetric: Pcg::default(),
+            closeness,
+            last: None,
+        }
     }
-}
 
-impl MeshGenerator for Whole {
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    /// One step. S = 2D + 1 is the number of points of the star; `direct` solves what conjugate gradients do not.
+    fn solve_with<const S: usize, Direct: LinearSolver<D, S, D>>(
+        &mut self,
+        equation: &Mmpde,
+        mesh: &Mesh<D>,
+        (rho, dt): (&[f64], f64),
+        direct: impl FnOnce(&mut Self) -> &mut Direct,
+    ) -> Result<Moved<D>, Failure> {
         let lattice = mesh.lattice();
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();
         let mut work = move_sides(equation, mesh, rho, dt, &mut x, &mut self.line)?;
         let patch = Patch::whole(lattice);
         if operator.is_symmetric() {
-            let last = self.last.take().filter(|last| last.to == *mesh);
-            let mut guess = x.clone();
-            if let Some(Step { from, dt: before, .. }) = last {
-                for k in patch.nodes(lattice) {
-                    guess[k] = [0, 1].map(|d| x[k][d] + dt / before * (x[k][d] - from.x()[k][d]));
-                }
-            }
+            let guess = self.guess(mesh, &x, dt);
             let (solver, closeness) = (&mut self.symmetric, self.closeness * mesh.shortest_edge());
             if let Some((new, cost)) =
-                operator.solve_symmetric::<5, 2>(patch, mesh.x(), &guess, jump(mesh), solver, closeness)
+                operator.solve_symmetric::<S, D>(patch, mesh.x(), &guess, jump(mesh), solver, closeness)
             {
                 work += cost;
                 patch.scatter(lattice, &new, &mut x, jump(mesh));
@@ -81,21 +91,34 @@ impl MeshGenerator for Whole {
                 return Ok(Moved { mesh: moved, work, interface: None });
             }
         }
-        let (new, cost) = operator.solve::<5, 2>(patch, mesh.x(), &x, jump(mesh), &mut self.plane, size(mesh))?;
+        let (new, cost) = operator.solve::<S, D>(patch, mesh.x(), &x, jump(mesh), direct(self), size(mesh))?;
         work += cost;
         patch.scatter(lattice, &new, &mut x, jump(mesh));
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: None })
     }
 
-    fn keep(&self, kept: &mut Kept) {
-        kept.put("last mesh step", &self.last.as_ref().map(|last| (last.from.x(), last.to.x(), last.dt)));
+    /// The mesh that the last step leads to if it goes on, where that step led to this mesh; on the sides, `x`.
+    fn guess(&mut self, mesh: &Mesh<D>, x: &[[f64; D]], dt: f64) -> Vec<[f64; D]> {
+        let mut guess = x.to_vec();
+        if let Some(Step { from, dt: before, .. }) = self.last.take().filter(|last| last.to == *mesh) {
+            for k in Patch::whole(mesh.lattice()).nodes(mesh.lattice()) {
+                guess[k] = std::array::from_fn(|d| x[k][d] + dt / before * (x[k][d] - from.x()[k][d]));
+            }
+        }
+        guess
     }
 
-    fn resume(&mut self, mesh: &Mesh<2>, kept: &Kept) -> Result<(), Unfit> {
-        type Last = (Vec<[f64; 2]>, Vec<[f64; 2]>, f64);
-        let moved = |x: Vec<[f64; 2]>| {
-            check_nodal("last mesh step", &x, mesh.lattice().len())?;
-            mesh.moved(x).map_err(|failure| Unfit::Damaged(failure.to_string()))
+    fn put(&self, kept: &mut Kept) {
+        let plain = |mesh: &Mesh<D>| mesh.x().as_flattened().to_vec();
+        kept.put("last mesh step", &self.last.as_ref().map(|last| (plain(&last.from), plain(&last.to), last.dt)));
+    }
+
+    fn take_up(&mut self, mesh: &Mesh<D>, kept: &Kept) -> Result<(), Unfit> {
+        type Last = (Vec<f64>, Vec<f64>, f64);
+        let moved = |x: Vec<f64>| {
+            let (x, rest) = x.as_chunks::<D>();
+            check_nodal("last mesh step", x, mesh.lattice().len() + rest.len())?;
+            mesh.moved(x.to_vec()).map_err(|failure| Unfit::Damaged(failure.to_string()))
         };
         self.last = match kept.get::<Option<Last>>("last mesh step")? {
             Some((.., dt)) if !(dt.is_finite() && dt > 0.0) => {
@@ -107,3 +130,26 @@ impl MeshGenerator for Whole {
         Ok(())
     }
 }
+
+/// The generator in D dimensions, where a star has S = 2D + 1 points: Rust has no arithmetic of const parameters.
+macro_rules! generator {
+    ($D:literal, $S:literal, $direct:ident) => {
+        impl MeshGenerator<$D> for Whole<$D> {
+            fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<$D>, rho: &[f64], dt: f64) -> Result<Moved<$D>, Failure> {
+                self.solve_with::<$S, _>(equation, mesh, (rho, dt), |whole| &mut whole.$direct)
+            }
+
+            fn keep(&self, kept: &mut Kept) {
+                self.put(kept);
+            }
+
+            fn resume(&mut self, mesh: &Mesh<$D>, kept: &Kept) -> Result<(), Unfit> {
+                self.take_up(mesh, kept)
+            }
+        }
+    };
+}
+
+generator!(1, 3, inside);
+generator!(2, 5, inside);
+generator!(3, 7, elimination);

@@ -1,0 +1,87 @@
+//! Folded cells, in any number of dimensions.
+
+use super::Mesh;
+use super::lattice::strides;
+use super::mesh::first_two;
+use crate::error::Failure;
+
+/// Refuses a mesh with a node that is not finite or a cell that is folded
+///
+/// A cell is folded where at one of its 2^D corners the edges that leave it do not span a positive volume,
+///
+/// ```text
+/// det(x_{c+e_1} − x_c, …, x_{c+e_D} − x_c) ≤ 0,
+/// ```
+///
+/// edges that run against their axis taken with the opposite sign.
+///
+/// # Errors
+/// [`Failure::NonFinite`] for the first such node, else [`Failure::Folded`] for the worst cell.
+///
+/// # Example
+/// ```
+/// use driftmesh::geometry::{Lattice, Mesh, check_unfolded};
+/// let line = Mesh::uniform(Lattice::bounded([2])?, [0.0], [1.0])?;
+/// assert!(check_unfolded(&line).is_ok());
+/// assert!(check_unfolded(&line.moved(vec![[0.0], [1.5], [1.0]])?).is_err());
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+pub fn check_unfolded<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
+    if let Some(k) = mesh.x().iter().position(|x| !x.iter().all(|v| v.is_finite())) {
+        let value = mesh.x()[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
+        let (node, x) = mesh.told(k);
+        return Err(Failure::NonFinite { what: "the mesh", value, node, x });
+    }
+    let (cells, x) = (mesh.lattice().cells(), mesh.closed());
+    let steps = strides(cells.map(|n| n + 1));
+    let mut worst: Option<(f64, usize, usize)> = None;
+    for start in pencils(cells, steps) {
+        for cell in start..start + cells[D - 1] {
+            for corner in 0..1 << D {
+                let at = (0..D).filter(|d| corner >> d & 1 == 1).map(|d| steps[d]).sum::<usize>() + cell;
+                let volume = corner_volume(&x, at, corner, steps);
+                // not `<=` alone: a volume that overflowed to NaN is not positive either
+                if volume.is_nan() || volume <= worst.map_or(0.0, |worst| worst.0) {
+                    worst = Some((volume, cell, at));
+                }
+            }
+        }
+    }
+    let Some((volume, cell, at)) = worst else { return Ok(()) };
+    let uniform: f64 = (0..D).map(|d| mesh.extent()[d] / cells[d] as f64).product();
+    let cell: [usize; D] = std::array::from_fn(|d| cell / steps[d] % (cells[d] + 1));
+    Err(Failure::Folded { cell: first_two(&cell), jacobian: volume / uniform, x: first_two(&x[at]), noise: None })
+}
+
+/// The first cells of all rows along the last axis, in an array of nodes with these strides.
+fn pencils<const D: usize>(cells: [usize; D], steps: [usize; D]) -> impl Iterator<Item = usize> {
+    let count: usize = cells[..D - 1].iter().product();
+    (0..count).map(move |p| {
+        let mut rest = p;
+        (0..D - 1).rev().fold(0, |sum, d| {
+            let place = rest % cells[d];
+            rest /= cells[d];
+            sum + place * steps[d]
+        })
+    })
+}
+
+/// What the edges from a corner span.
+fn corner_volume<const D: usize>(x: &[[f64; D]], at: usize, corner: usize, steps: [usize; D]) -> f64 {
+    determinant::<D>(std::array::from_fn(|d| {
+        let upper = corner >> d & 1 == 1;
+        let (a, b) = if upper { (x[at - steps[d]], x[at]) } else { (x[at], x[at + steps[d]]) };
+        std::array::from_fn(|c| b[c] - a[c])
+    }))
+}
+
+/// Of up to three rows.
+fn determinant<const D: usize>(rows: [[f64; D]; D]) -> f64 {
+    let cross = |a: usize, b: usize, c: usize, d: usize| rows[a][c] * rows[b][d] - rows[a][d] * rows[b][c];
+    match D {
+        1 => rows[0][0],
+        2 => cross(0, 1, 0, 1),
+        3 => rows[0][0] * cross(1, 2, 1, 2) - rows[0][1] * cross(1, 2, 0, 2) + rows[0][2] * cross(1, 2, 0, 1),
+        _ => unreachable!("meshes have one to three axes"),
+    }
+}
