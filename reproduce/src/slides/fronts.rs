@@ -73,10 +73,21 @@ pub fn slides(options: Options) -> Result<Rerun> {
     // the states that the slides show: after 7 and 17 steps
     for (steps, end) in [(7, 0.07), (17, 0.17)] {
         for (name, title, front) in [("literal", "literal as far as given", LITERAL), ("ours", "(1,6,1)/8", "")] {
-            let [state, _] = problem(40, 20, front, end)?.pictures(&format!("{title}, after {steps} steps"));
+            let [state, _] = problem(40, 20, front, end)?.pictures(&format!(
+                "The slides' front, {title}, after \
+                 {steps} steps"
+            ));
             pictures.push((format!("stefan-slides-{steps}-steps-{name}"), state));
         }
     }
+    notes(&mut table);
+    if options.quick {
+        table.note("quick: the finer of two grids only");
+    }
+    Ok(Rerun { tables: vec![table], pictures })
+}
+
+fn notes(table: &mut Table) {
     table.note("energy: |ΔE − ∫F dt| / |ΔE| with fluxes through the walls by weighted residual, then by three rows");
     table.note(
         "the published initial temperature contradicts the no-flux sides: the front bends up there at first, and the \
@@ -86,10 +97,6 @@ pub fn slides(options: Options) -> Result<Rerun> {
         "the slides give neither D₀, D₁ and L_H, here 1, nor the step δ, here .01, nor the grid, here so many \
          columns and so many rows in each phase, nor a time but 7 and 17 steps: t = .85 is ours",
     );
-    if options.quick {
-        table.note("quick: the finer of two grids only");
-    }
-    Ok(Rerun { tables: vec![table], pictures })
 }
 
 fn front_row(size: String, name: &str, finished: &FrontFinished) -> Vec<String> {
@@ -238,8 +245,8 @@ fn refined(
             let name = format!("stefan-exact-{}", case.split(' ').next().unwrap_or(case));
             let front: Vec<[f64; 2]> =
                 finished.columns.iter().zip(&finished.state.front).map(|(x, y)| [*x, *y]).collect();
-            let [_, over_time] = finished.pictures(case);
-            let title = format!("{case}, t = {:.3}", finished.state.t);
+            let [_, over_time] = finished.pictures(&format!("Exact solution, {case}"));
+            let title = format!("Exact solution, {case}, t = {:.3}", finished.state.t);
             pictures.push((name.clone(), draw(&title, "u", &finished.whole, &front)));
             pictures.push((format!("{name}-front"), over_time));
         }
