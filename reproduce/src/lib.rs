@@ -1,6 +1,7 @@
 //! The published tables and figures, rerun: ours beside theirs, with a verdict for each row.
 
 mod errata;
+mod interface_step;
 mod interface_study;
 mod page;
 mod payoff;
@@ -9,7 +10,7 @@ mod sdd;
 mod slides;
 mod table;
 
-pub use interface_study::{InterfaceStep, Measured};
+pub use interface_step::{InterfaceStep, Measured};
 pub use page::{Done, page};
 pub use slides::slides_error;
 pub use table::Table;
@@ -39,16 +40,16 @@ impl Document {
     pub fn title(self) -> &'static str {
         match self {
             Self::Stochastic => {
-                "A. Bihlo, R. D. Haynes and E. J. Walsh, Stochastic domain decomposition for time dependent adaptive mesh \
-                 generation (2015)"
+                "A. Bihlo, R. D. Haynes and E. J. Walsh, Stochastic domain decomposition for time dependent adaptive \
+                 mesh generation (2015)"
             }
             Self::Schwarz => {
-                "M. J. Gander and R. D. Haynes, Domain decomposition approaches for mesh generation via the equidistribution \
-                 principle (2012)"
+                "M. J. Gander and R. D. Haynes, Domain decomposition approaches for mesh generation via the \
+                 equidistribution principle (2012)"
             }
             Self::Laplacian => {
-                "S. J. Castillo and F. Izsák, Efficient discretization of the Laplacian: application to moving boundary problems \
-                 (2024)"
+                "S. J. Castillo and F. Izsák, Efficient discretization of the Laplacian: application to moving \
+                 boundary problems (2024)"
             }
             Self::Own => "Measured for this project",
         }
@@ -97,8 +98,8 @@ pub const ITEMS: &[Item] = &[
     item(Stochastic, "table-1", "Burgers' front on 2×2, 3×3 and 4×4 subdomains", |o| {
         sdd::table_1(o).map(Rerun::from)
     }),
-    item(Stochastic, "table-2", "time of a mesh step against the number of subdomains", |o| {
-        sdd::table_2(o).map(Rerun::from)
+    item(Stochastic, "table-2", "time of a mesh step against the number of subdomains", |_| {
+        sdd::table_2().map(Rerun::from)
     }),
     item(Stochastic, "table-3", "Burgers' equation on a periodic domain", |o| sdd::table_3(o).map(Rerun::from)),
     item(Stochastic, "table-4", "shallow water on a periodic domain", |o| sdd::table_4(o).map(Rerun::from)),
@@ -158,7 +159,8 @@ impl Item {
 mod tests {
     use super::*;
 
-    /// Items that take seconds: every row is as long as its head, no cell is NaN, a verdict has its rule and each erratum its
+    /// Items that take seconds: every row is as long as its head, no cell is NaN, a verdict has its rule and each
+    /// erratum its
     /// check.
     #[test]
     fn every_verdict_says_its_rule() {
@@ -199,6 +201,6 @@ mod tests {
             assert_eq!([said(method, "ours"), said(method, "solves, counted so")], ["agrees", "agrees"]);
         }
         assert_eq!(said("optimal", "ours"), "agrees");
-        assert_eq!(said("optimised", "ours"), "n = 4: 0.0366, not 0.0367");
+        assert_eq!(said("optimised", "ours"), "not reproduced with our settings: n = 4: 0.0366, not 0.0367");
     }
 }

@@ -32,7 +32,6 @@ struct Page {
 #[derive(Serialize)]
 struct Chapter {
     title: &'static str,
-    tally: String,
     sections: Vec<Section>,
 }
 
@@ -50,10 +49,17 @@ struct Section {
 #[derive(Serialize)]
 struct Shown {
     title: String,
-    head: Vec<String>,
+    head: Vec<Head>,
     rows: Vec<Vec<Cell>>,
     rule: String,
     notes: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Head {
+    name: String,
+    /// Whether its cells are read as text, all of them alike.
+    is_text: bool,
 }
 
 #[derive(Serialize)]
@@ -65,7 +71,8 @@ struct Cell {
 
 #[derive(Serialize)]
 struct Picture {
-    name: String,
+    /// A sentence in its place.
+    alt: String,
     source: String,
 }
 
@@ -80,7 +87,7 @@ enum Tone {
 
 /// Verdicts by how they begin; all others are against what is published.
 const GOOD: [&str; 9] =
-    ["agrees", "holds", "nearer to 1", "as good", "independent of I", "sound", "second order", "converges", "the same"];
+    ["agrees", "holds", "nearer to 1", "as good", "independent of I", "sound", "second order", "confirmed", "wins"];
 const NEITHER: [&str; 4] = ["no difference", "neither", "erratum", "–"];
 
 impl Tone {
@@ -109,9 +116,7 @@ impl Tone {
 pub fn page(done: &[Done], quick: bool) -> String {
     let chapter = |document: Document| {
         let of: Vec<&Done> = done.iter().filter(|done| done.item.of == document).collect();
-        let sections: Vec<Section> = of.into_iter().map(section).collect();
-        let tally = tally(&sections);
-        Chapter { title: document.title(), tally, sections }
+        Chapter { title: document.title(), sections: of.into_iter().map(section).collect() }
     };
     let page = Page {
         version: env!("CARGO_PKG_VERSION"),
@@ -142,19 +147,31 @@ fn section(done: &Done) -> Section {
     }
 }
 
+/// A cell with more letters than this is text.
+const NUMBER: usize = 24;
+
 fn shown(table: &super::Table) -> Shown {
     let judged: Vec<bool> = table.columns.iter().map(|head| head.starts_with("verdict")).collect();
     let cell = |(c, text): (usize, &String)| {
         let tone = if judged[c] { Tone::of(text).class() } else { "" };
-        Cell { text: text.clone(), tone }
+        Cell { text: unbroken(text), tone }
+    };
+    let head = |(c, name): (usize, &String)| {
+        let is_text = table.rows.iter().any(|row| row[c].chars().count() > NUMBER);
+        Head { name: unbroken(name), is_text }
     };
     Shown {
-        title: table.title.clone(),
-        head: table.columns.clone(),
+        title: unbroken(&table.title),
+        head: table.columns.iter().enumerate().map(head).collect(),
         rows: table.rows.iter().map(|row| row.iter().enumerate().map(cell).collect()).collect(),
-        rule: table.rule.clone(),
-        notes: table.notes.clone(),
+        rule: unbroken(&table.rule),
+        notes: table.notes.iter().map(|note| unbroken(note)).collect(),
     }
+}
+
+/// A number stays on a line with its per cent sign.
+fn unbroken(text: &str) -> String {
+    text.replace(" %", "\u{a0}%")
 }
 
 /// The smaller of drawing and image.
@@ -163,27 +180,24 @@ fn picture((name, picture): &(String, driftmesh::output::Picture)) -> Picture {
         true => ("image/svg+xml", picture.svg.as_bytes()),
         false => ("image/png", picture.png.as_slice()),
     };
-    Picture { name: name.clone(), source: format!("data:{mime};base64,{}", STANDARD.encode(bytes)) }
+    let alt = title(&picture.svg).unwrap_or_else(|| name.clone());
+    Picture { alt: format!("{alt}."), source: format!("data:{mime};base64,{}", STANDARD.encode(bytes)) }
 }
 
-/// Verdicts of a document, and how many of them are favourable.
-fn tally(sections: &[Section]) -> String {
-    let verdicts = sections.iter().flat_map(|section| &section.tables).flat_map(|table| {
-        let judged = |c: &usize| table.head[*c].starts_with("verdict");
-        table.rows.iter().flat_map(move |row| (0..row.len()).filter(judged).map(|c| &row[c]))
-    });
-    let (mut all, mut good) = (0, 0);
-    for verdict in verdicts.filter(|verdict| !verdict.text.is_empty()) {
-        all += 1;
-        good += usize::from(verdict.tone == Tone::Good.class());
-    }
-    if all == 0 { "no verdicts".into() } else { format!("{all} verdicts, {good} of them favourable (green)") }
+/// What a drawing writes first, which is its title.
+fn title(svg: &str) -> Option<String> {
+    let (_, text) = svg.split_once("<text")?.1.split_once('>')?;
+    let (text, _) = text.split_once('<')?;
+    let plain = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&apos;", "'"), ("&#39;", "'"), ("&amp;", "&")];
+    let text = plain.iter().fold(text.trim().to_string(), |text, (from, to)| text.replace(from, to));
+    (!text.is_empty()).then_some(text)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{ITEMS, Table};
+    use driftmesh::output::Figure;
 
     #[test]
     fn verdicts_are_coloured_by_the_worst_part() {
@@ -200,7 +214,9 @@ mod tests {
     fn the_page_stands_alone() {
         let mut table = Table::new("a < b", &["run", "verdict"]).ruled("by eye");
         table.row(["<b>", "agrees"]);
-        let rerun = Rerun { tables: vec![table], pictures: Vec::new() };
+        let figure = Figure { title: "a & b, drawn".into(), ..Figure::default() };
+        let pictures = vec![("a-b".to_string(), figure.draw())];
+        let rerun = Rerun { tables: vec![table], pictures };
         let done = [
             Done { item: &ITEMS[0], outcome: Ok(rerun), seconds: 1.0 },
             Done { item: &ITEMS[1], outcome: Err("it folded".into()), seconds: 2.0 },
@@ -208,6 +224,7 @@ mod tests {
         let html = page(&done, true);
         assert!(html.contains("a &lt; b") && html.contains("&lt;b&gt;") && html.contains("it folded"));
         assert!(html.contains("class=\"good\"") && html.contains("by eye"));
+        assert!(html.contains("alt=\"a &amp; b, drawn.\""));
         for fetches in ["http://", "https://", "<script", "<link rel=\"style", "src=\"/", "@import"] {
             assert!(!html.contains(fetches), "{fetches}");
         }

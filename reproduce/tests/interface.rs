@@ -76,8 +76,8 @@ fn variance_reductions_reduce() {
     assert!(sobol.error < 0.1 * plain.error, "{sobol:?}");
 }
 
-/// The deterministic opponent has 1.4e-7 with 8 nodes to each side; what the program chooses is as good or better, in one
-/// exchange, and so are its walks.
+/// The deterministic opponent has 1.4e-7 with 8 nodes to each side; what the program chooses is as good or better, in
+/// one exchange, and so are its walks.
 #[test]
 fn strips_are_the_opponent_to_beat() {
     let plain = measure(&Strip::plain(8), 1);

@@ -4,7 +4,7 @@ use super::{NONLINEAR, from_uniform, layer, square, until, valley};
 use crate::{Options, Rerun, Table};
 use driftmesh::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Method, Sweep};
 use driftmesh::error::{Error, Failure, Result};
-use driftmesh::output::{Curve, Figure};
+use driftmesh::output::{Curve, Figure, Picture};
 
 const SPIKE: &str = "1 + 100*exp(-1000*(x - 0.5)^2)";
 /// A density by its number of cells.
@@ -19,7 +19,8 @@ fn thin(cells: usize) -> Result<Line> {
     Ok(Line::new(LineDensity::arclength("tanh(1000*(x - 0.37))")?, cells))
 }
 
-/// The same with exact averages: the discrete problem is then the continuous one, and no cell is too wide for its layer.
+/// The same with exact averages: the discrete problem is then the continuous one, and no cell is too wide for its
+/// layer.
 fn thin_exact(cells: usize) -> Result<Line> {
     Ok(Line { face: FaceDensity::Exact, ..thin(cells)? })
 }
@@ -32,7 +33,10 @@ pub fn coarse(options: Options) -> Result<Rerun> {
         columns: heads.chain(counts.iter().map(|n| format!("I = {n}"))).chain(["verdict".into()]).collect(),
         ..Table::default()
     }
-    .ruled("“independent of I” where no count is above 1.5 times that of 2 subdomains; else “grows”, with the largest count");
+    .ruled(
+        "“independent of I” where no count is above 1.5 times that of 2 subdomains; else “grows”, with the \
+         largest count",
+    );
     let correction = |coarse| Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse };
     let (galerkin, integral) = (correction(Coarse::Galerkin), correction(Coarse::Integral));
     let problems: [(&str, Problem); 6] = [
@@ -68,16 +72,24 @@ pub fn coarse(options: Options) -> Result<Rerun> {
         "spike: M = {SPIKE}; thin layer: the arc length of tanh(1000(x − .37)); C = 300: M = 300(x − ½)² + 1"
     ));
     table.note(
-        "both corrections solve the same two coarse unknowns an interface. “galerkin” moves nodes by the change of ∫M over M, which \
-         overshoots where M varies over the way of a node; “integral” moves them to where ∫M has changed by so much",
+        "both corrections solve the same two coarse unknowns an interface. “galerkin” moves nodes by the change of \
+         ∫M over M, which overshoots where M varies over the way of a node; “integral” moves them to where ∫M has \
+         changed by so much",
     );
-    let figure = Figure {
+    if options.quick {
+        table.note("quick: up to 16 subdomains, not 64");
+    }
+    Ok(Rerun { tables: vec![table], pictures: vec![("coarse".into(), drawn(curves))] })
+}
+
+fn drawn(curves: Vec<Curve>) -> Picture {
+    Figure {
         title: "Iterations to 1e-8 against the number of subdomains".into(),
         labels: ["subdomains".into(), "iterations".into()],
         curves,
         ..Figure::default()
-    };
-    Ok(Rerun { tables: vec![table], pictures: vec![("coarse".into(), figure.draw())] })
+    }
+    .draw()
 }
 
 /// Iterations to 1e-8, or the name of what ended them.

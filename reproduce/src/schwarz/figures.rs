@@ -8,8 +8,8 @@ use driftmesh::equidistribution::{FaceDensity, Line, Method, Robin};
 use driftmesh::error::Result;
 use driftmesh::output::{Curve, Figure, Scale};
 
-/// Where a figure needs room for its legend beside the curves.
-const LEGEND: f64 = 22.0;
+/// A curve of figure 8.2 ends with the first error below this.
+const END: f64 = 1e-10;
 
 pub fn figure_8_1() -> Result<Rerun> {
     let mut table = Table::new(
@@ -17,8 +17,8 @@ pub fn figure_8_1() -> Result<Rerun> {
         &["M", "overlap", "predicted", "observed", "iterations to 1e-10", "verdict"],
     )
     .ruled(
-        "“holds” where the observed rate of two iterations is within 1 % of theorem 3.2's (α/β)(1 − β)/(1 − α), whatever M is: the \
-         paper prints curves and no numbers",
+        "“holds” where the observed rate of two iterations is within 1 % of theorem 3.2's (α/β)(1 − β)/(1 − α), \
+         whatever M is: the paper prints curves and no numbers",
     );
     let mut pictures = Vec::new();
     for (side, m, line) in [("left", "x² + 1", square(100)?), ("right", "layer", layer(100)?)] {
@@ -46,15 +46,10 @@ pub fn figure_8_1() -> Result<Rerun> {
 /// Methods with their names.
 type Methods = Vec<(&'static str, Method)>;
 
-pub fn figure_8_2() -> Result<Rerun> {
-    let mut table = Table::new(
-        "Figure 8.2: what the interface knows, 100 cells, cut at ½ (classical: .45/.55)",
-        &["M", "method", "predicted", "observed", "bound", "iterations to 1e-10", "verdict"],
-    )
-    .ruled(
-        "the paper ranks classical, optimised, optimal. “holds” where a method takes fewer iterations than classical Schwarz, the optimal one \
-         no more than any optimised one, and no rate of an optimised one is above (5.7); no numbers are printed",
-    );
+/// A half of figure 8.2: its name, M, the line and its methods.
+type Half = (&'static str, &'static str, Line, Methods);
+
+fn halves() -> Result<[Half; 2]> {
     let robin = |p: f64| Method::Optimized { robin: Robin::Value(p) };
     let lagged = Method::Optimized { robin: Robin::Lagged };
     let exact = |line: Line| Line { face: FaceDensity::Exact, ..line };
@@ -72,10 +67,21 @@ pub fn figure_8_2() -> Result<Rerun> {
         ("optimised, lagged", lagged),
         ("optimal, 20 panels", Method::Optimal { panels: Some(20) }),
     ];
-    let sides: [(&str, &str, Line, Methods); 2] =
-        [("left", "x² + 1", exact(square(100)?), left), ("right", "layer", layer(100)?, right)];
+    Ok([("left", "x² + 1", exact(square(100)?), left), ("right", "layer", layer(100)?, right)])
+}
+
+pub fn figure_8_2() -> Result<Rerun> {
+    let mut table = Table::new(
+        "Figure 8.2: what the interface knows, 100 cells, cut at ½ (classical: .45/.55)",
+        &["M", "method", "predicted", "observed", "bound", "iterations to 1e-10", "verdict"],
+    )
+    .ruled(
+        "the paper ranks classical, optimised, optimal. “holds” where a method takes fewer iterations than classical \
+         Schwarz, the optimal one no more than any optimised one, and no rate of an optimised one is above (5.7); no \
+         numbers are printed",
+    );
     let mut pictures = Vec::new();
-    for (side, m, line, methods) in sides {
+    for (side, m, line, methods) in halves()? {
         let (mut curves, mut classical, mut optimised) = (Vec::new(), 0, usize::MAX);
         for (what, method) in methods {
             let ranges = if method == NONLINEAR { two([45, 55], 100) } else { two([50, 50], 100) };
@@ -103,14 +109,17 @@ pub fn figure_8_2() -> Result<Rerun> {
                 if method == NONLINEAR { String::new() } else { verdict(holds) },
             ]);
             let shown = from_uniform(&line, &ranges, method, exactly(24))?;
-            curves.push(curve(what, &shown, 2));
+            let mut drawn = curve(what, &shown, 2);
+            let below = drawn.points.iter().position(|p| p[1] <= END);
+            drawn.points.truncate(below.map_or(usize::MAX, |last| last + 1));
+            curves.push(drawn);
         }
-        let title = format!("Figure 8.2, {side}: every second iteration, M of {m}");
-        let room = vec![[24.0 + LEGEND, 1e-2]];
-        pictures.push((format!("figure-8-2-{side}"), Figure { room, ..errors(&title, "iterations", curves) }.draw()));
+        let title = format!("Figure 8.2, {side}: every second iteration to {END:e}, M of {m}");
+        pictures.push((format!("figure-8-2-{side}"), errors(&title, "iterations", curves).draw()));
     }
     table.note(
-        "M = x² + 1 with exact faces, the layer with trapezoidal ones. “lagged” is ours: p from the last iterate",
+        "M = x² + 1 with exact faces, the layer with trapezoidal ones. Ours are “lagged”, which is p from the last \
+         iterate, and on the layer p = 3.70 and the 20 panels",
     );
     table.note(
         "the paper's p: 4 from (5.7) with m̂ = 2, and 2.71 from x(½) ≈ .596. Two p make the rate zero, M(x(α))/α and \
@@ -131,6 +140,7 @@ pub fn figure_8_3() -> Result<Rerun> {
         &["iteration", "largest jump", "interpolation error", "over that of the limit", "distance to the limit"],
     );
     let mut meshes = Vec::new();
+    let mut left = f64::NAN;
     for n in 0..=ITERATIONS {
         let history = from_uniform(&line, &overlap, NONLINEAR, exactly(n))?;
         let it = history.iterates[n];
@@ -142,9 +152,15 @@ pub fn figure_8_3() -> Result<Rerun> {
             format!("{:.2}", off / best),
             format!("{:.2e}", it.error),
         ]);
+        left = it.error;
         meshes.push(history.mesh);
     }
     table.note(format!("the limit, the discrete equidistributed mesh, has an interpolation error of {best:.2e}"));
+    table.note(format!(
+        "the text: only a few iterations are required to give a qualitatively correct grid. After {ITERATIONS} of \
+         them a node is still {left:.3} of the line away from where it ends, and the interpolation error goes up and \
+         down on the way; the paper does not say what “qualitatively” asks for, so that there is no verdict"
+    ));
     let u = line.density.followed(0.0, &mesh).unwrap_or_default();
     let left = Figure {
         title: "Figure 8.3, left: u on the equidistributing mesh".into(),

@@ -13,8 +13,8 @@ pub fn in_time() -> Result<Rerun> {
         &["M", "Δt/τ", "subdomains", "method", "iterations", "observed", "linear solves", "verdict"],
     )
     .ruled(
-        "optimal: “holds” where it ends after as many iterations as subdomains; optimised: where it needs fewer iterations than \
-         classical Schwarz with an overlap of ten cells. The paper has no figures for these",
+        "optimal: “holds” where it ends after as many iterations as subdomains; optimised: where it needs fewer \
+         iterations than classical Schwarz with an overlap of ten cells. The paper has no figures for these",
     );
     let lagged = Method::Optimized { robin: Robin::Lagged };
     let optimal = Method::Optimal { panels: None };
@@ -52,9 +52,10 @@ pub fn in_time() -> Result<Rerun> {
         }
     }
     table.note(format!(
-        "peak: M = {FRONT}. Optimised: p = M̃ √θ coth(√θ L), θ = τ/(Δt M̃), L the length of the rest, which is M̃/L without time; no \
-         number is set. Optimal: the flux that the rest of the line answers with, by a solve of it for each try of the node at the \
-         cut, which its linear solves do not count: exact for the discrete problem, and as dear as the whole line"
+        "peak: M = {FRONT}. Optimised: p = M̃ √θ coth(√θ L), θ = τ/(Δt M̃), L the length of the rest, which is M̃/L \
+         without time; no number is set. Optimal: the flux that the rest of the line answers with, by a solve of it \
+         for each try of the node at the cut, which its linear solves do not count: exact for the discrete problem, \
+         and as dear as the whole line"
     ));
     table.note(
         "steps that are short against τ couple neighbours only: then even classical Schwarz takes few iterations",

@@ -1,7 +1,9 @@
-//! M. J. Gander and R. D. Haynes, *Domain decomposition approaches for mesh generation via the equidistribution principle*
+//! M. J. Gander and R. D. Haynes, *Domain decomposition approaches for mesh generation via the equidistribution
+//! principle*
 //! (2012): section 8, the theorems, and what they left open.
 //!
-//! Their table and plots give neither the number of cells nor the norm; 100 cells and trapezoidal averages reproduce table 8.1.
+//! Their table and plots give neither the number of cells nor the norm; 100 cells and trapezoidal averages reproduce
+//! table 8.1.
 
 mod coarse;
 mod coupled;

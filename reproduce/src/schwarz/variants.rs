@@ -48,11 +48,10 @@ pub fn figure_8_4() -> Result<Rerun> {
 
 /// What the paper says of figure 8.4.
 fn claims(counts: &Counts) -> Table {
-    let mut table = Table::new(
-        "What the text says of figure 8.4",
-        &["claim", "M, overlap", "ours", "verdict"],
-    )
-    .ruled("“holds” where the claim is true by more than one iteration, or linear solve, in both sweeps; “no difference” within one");
+    let mut table = Table::new("What the text says of figure 8.4", &["claim", "M, overlap", "ours", "verdict"]).ruled(
+        "“holds” where the claim is true by more than one iteration, or linear solve, in both sweeps; “no \
+         difference” within one",
+    );
     let iterations = |c: &[[usize; 2]; 4]| c.map(|n| n[0]);
     let solves = |c: &[[usize; 2]; 4]| c.map(|n| n[1]);
     let mut row = |claim: &str, case: &str, pairs: [[usize; 2]; 2]| {
@@ -88,7 +87,13 @@ fn claims(counts: &Counts) -> Table {
             [[frozen, parallel], [alternating_frozen, alternating]],
         );
     }
-    table.note("the claims are of the left half, M = x² + 1, and of the right half, the layer; we look at all cases for the first two");
+    table.note(
+        "in the left picture the curves of the linearised variants lie on those of the nonlinear ones and hide them",
+    );
+    table.note(
+        "the claims are of the left half, M = x² + 1, and of the right half, the layer; we look at all cases \
+         for the first two",
+    );
     table
 }
 
@@ -99,8 +104,9 @@ pub fn figure_8_5() -> Result<Rerun> {
         &["from", "method", "C = 1", "10", "50", "100", "300", "verdict"],
     )
     .ruled(
-        "the paper: linearised degrades as C grows, holds where its counts never fall and the last is above the first; nonlinear \
-         is affected less, holds where its counts grow by a smaller factor than the linearised ones from the same start",
+        "the paper: linearised degrades as C grows, holds where its counts never fall and the last is above the \
+         first; nonlinear is affected less, holds where its counts grow by a smaller factor than the linearised ones \
+         from the same start",
     );
     let [mut left, mut right] = [Vec::new(), Vec::new()];
     for power in [1.0, 1.3] {

@@ -1,4 +1,5 @@
-//! A. Bihlo, R. D. Haynes and E. J. Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation*
+//! A. Bihlo, R. D. Haynes and E. J. Walsh, *Stochastic domain decomposition for time dependent adaptive mesh
+//! generation*
 //! (2015): its tables, figures and claims.
 
 mod coupling;
@@ -21,6 +22,7 @@ pub use table_2::table_2;
 
 use super::Table;
 use driftmesh::error::{Error, Result};
+use driftmesh::meshing::{Decomposition, MeshGenerator, Whole};
 use driftmesh::simulation::Record;
 use driftmesh::study::{MovingMesh, Source, compute};
 
@@ -30,6 +32,8 @@ pub(super) const DAM_BREAK: &str = include_str!("../../../studies/dam-break.toml
 pub(super) const RINGS: &str = include_str!("../../../studies/rings.toml");
 /// Nothing is tried again: the first failure of a step is the result.
 pub(super) const NO_SAFETY: [&str; 3] = ["safety.substeps=1", "safety.smoothing=0", "safety.halvings=0"];
+/// Nodes of the periodic meshes, as the paper counts them.
+pub(super) const NODES: &str = "the paper's 41 × 41 nodes with the repeated row and column";
 pub(super) const WHOLE: &str = "mesh.generator={kind=\"whole\"}";
 pub(super) const RESIDUAL: &str = "{kind=\"residual-walk\", walks=10}";
 
@@ -61,6 +65,37 @@ pub(super) fn ended(failure: &Error) -> String {
         }
         other => other.to_string(),
     }
+}
+
+/// What one substep of its Monte Carlo does to the first mesh of a study, and what its paths leave of noise.
+pub(super) fn first_step(base: &str, more: &[String], dt: f64, paths: usize) -> Result<String> {
+    let study = study(base, &[more, &[WHOLE.into()]].concat())?;
+    let simulation = study.simulation()?;
+    let state = study.start(&simulation, &mut Record::default(), &mut [])?;
+    let (mesh, equation) = (&state.mesh, &simulation.mover.equation);
+    let lattice = mesh.lattice();
+    let operator = equation.operator(lattice, &state.rho, dt)?;
+    // the weights of both neighbours differ by bΔt/(τh): the way of a path in cells, which on a uniform mesh is that
+    // of its node
+    let path = |k: usize, d: usize| operator.weights()[k][d][1] - operator.weights()[k][d][0];
+    let moved = Whole::default().step(equation, mesh, &state.rho, dt)?.mesh;
+    let cell = |d: usize| mesh.extent()[d] * lattice.spacing()[d];
+    let node = |k: usize, d: usize| (moved.x()[k][d] - mesh.x()[k][d]) / cell(d);
+    let [mut carried, mut off] = [0.0_f64; 2];
+    for k in Decomposition::new(lattice, [4, 4])?.points() {
+        for d in 0..2 {
+            carried = carried.max(path(k, d).abs());
+            off = off.max((path(k, d) - node(k, d)).abs());
+        }
+    }
+    let noise = (2.0 * dt / paths as f64).sqrt() / lattice.spacing()[0];
+    Ok(format!(
+        "what M = 1 does: on the uniform mesh of the start one Euler–Maruyama step carries the nodes between 4 × 4 \
+         subdomains by bΔt, b = ∇ρ/ρ, up to {carried:.1} cells; that is up to {off:.1} cells from where the step of \
+         one domain has them, and with them the neighbours inside. More paths do not mend that: it is no noise, \
+         which for N = {paths} is √(2Δt/N), {:.0} % of a cell",
+        100.0 * noise
+    ))
 }
 
 /// What the paper gives for R_max and R_mean at one time and number of subdomains.
@@ -115,17 +150,18 @@ const COLUMNS: [&str; 10] = [
     "R_mean, paper",
     "ours",
     "cell_max",
-    "mesh rms",
+    "mesh rms / box",
     "tries rejected",
     "verdict of R_max / R_mean",
 ];
-/// How far two ratios may be apart that count as the same: the paper's own are within this of 1 nearly everywhere; and the
+/// How far two ratios may be apart that count as the same: the paper's own are within this of 1 nearly everywhere; and
+/// the
 /// half digit that they are rounded to.
 const SAME: f64 = 0.01;
 const ROUNDED: f64 = 0.005 + 1e-9;
-const RULE: &str = "“agrees” where |R − R of the paper| ≤ .01, plus the half digit that the paper's is rounded to. Where not, \
-     what counts is the distance to 1, on either side: “nearer to 1” or “farther from 1” than the paper's, and by how much. A run \
-     that ends early has the name of its failure";
+const RULE: &str = "“agrees” where |R − R of the paper| ≤ .01, plus the half digit that the paper's is rounded to. \
+     Where not, what counts is the distance to 1, on either side: “nearer to 1” or “farther from 1” than the \
+     paper's, and by how much. A run that ends early has the name of its failure";
 
 /// A ratio of mesh qualities beside the paper's.
 pub(super) fn verdict(ours: f64, paper: f64) -> String {
@@ -137,13 +173,14 @@ pub(super) fn verdict(ours: f64, paper: f64) -> String {
 }
 
 impl Ratios {
-    pub fn new(title: &str, paper: Vec<Published>) -> Self {
+    pub fn new(title: impl Into<String>, paper: Vec<Published>) -> Self {
         let mut table = Table::new(title, &COLUMNS).ruled(RULE);
         table.note(
-            "R_max and R_mean: the largest and the mean Q of the mesh of one domain over those of the subdomains' mesh. Section 3.7 of \
-             the paper has the largest and the mean of the cellwise ratios R(K) in place of this; but a largest value is never below the \
-             mean, and its R_max often are (errata-sdd counts them). cell_max is the largest R(K); the paper has no such column, so it has no verdict. mesh rms: \
-             distance of the nodes from those of one domain",
+            "R_max and R_mean: the largest and the mean Q of the mesh of one domain over those of the subdomains' \
+             mesh. Section 3.7 of the paper has the largest and the mean of the cellwise ratios R(K) in place of \
+             this; but a largest value is never below the mean, and its R_max often are (errata-sdd counts them). \
+             cell_max is the largest R(K); the paper has no such column, so it has no verdict. mesh rms / box: \
+             distance of the nodes from those of one domain, as a share of the side of the box",
         );
         Self { table, paper }
     }
@@ -153,18 +190,25 @@ impl Ratios {
         let mut sizes: Vec<usize> = self.paper.iter().map(|p| p.subdomains).collect();
         sizes.dedup();
         for s in sizes {
-            let (record, failure) = compute(&way.on(s)?)?;
+            let study = way.on(s)?;
+            let side = study.domain.upper[0] - study.domain.lower[0];
+            let (record, failure) = compute(&study)?;
             for p in self.paper.iter().filter(|p| p.subdomains == s) {
-                self.table.row(cells(&way.label, p, &record, failure.as_ref()));
+                self.table.row(cells(&way.label, p, side, &record, failure.as_ref()));
             }
         }
         Ok(())
     }
 
+    /// A row without `[safety]`.
+    pub fn unaided(&mut self, way: &Way) -> Result<()> {
+        let bare = [way.settings.as_slice(), &settings(&NO_SAFETY)].concat();
+        self.row(&Way { settings: bare, ..way.clone() })
+    }
+
     /// A row as published, without `[safety]`, and one that `[safety]` rescues.
     pub fn literal(&mut self, way: &Way, rescued: bool) -> Result<()> {
-        let bare = [way.settings.as_slice(), &settings(&NO_SAFETY)].concat();
-        self.row(&Way { label: format!("{} (literal)", way.label), settings: bare, ..way.clone() })?;
+        self.unaided(&Way { label: format!("{} (literal)", way.label), ..way.clone() })?;
         if rescued {
             self.row(&Way { label: format!("{}, rescued by [safety]", way.label), ..way.clone() })?;
         }
@@ -172,7 +216,7 @@ impl Ratios {
     }
 }
 
-fn cells(label: &str, p: &Published, record: &Record, failure: Option<&Error>) -> Vec<String> {
+fn cells(label: &str, p: &Published, side: f64, record: &Record, failure: Option<&Error>) -> Vec<String> {
     let found = record.reports.iter().find(|r| (r.t - p.t).abs() < 1e-9).and_then(|r| r.comparison);
     let work = &record.work;
     let tries = format!("{} in {} steps", work.rejected_steps, work.steps);
@@ -182,7 +226,7 @@ fn cells(label: &str, p: &Published, record: &Record, failure: Option<&Error>) -
             format!("{:.3}", c.r_max),
             format!("{:.3}", c.r_mean),
             format!("{:.2}", c.cell_max),
-            format!("{:.1e}", c.mesh_rms),
+            format!("{:.1e}", c.mesh_rms / side),
             format!("{} / {}", verdict(c.r_max, p.r_max), verdict(c.r_mean, p.r_mean)),
         ],
         (None, failure) => {

@@ -6,7 +6,8 @@ use driftmesh::error::{Error, Result};
 use driftmesh::simulation::Record;
 use driftmesh::study::compute;
 
-/// l_inf of the paper for one domain, 2×2, 3×3 and 4×4 at t = .75, 1, 1.25, with .032, .035 and .024 for the printed .320,
+/// l_inf of the paper for one domain, 2×2, 3×3 and 4×4 at t = .75, 1, 1.25, with .032, .035 and .024 for the printed
+/// .320,
 /// .35 and .24.
 const LINF: [(usize, [f64; 3]); 4] =
     [(1, [0.027, 0.031, 0.030]), (2, [0.023, 0.033, 0.031]), (3, [0.031, 0.032, 0.035]), (4, [0.026, 0.034, 0.024])];
@@ -23,9 +24,12 @@ const RATIOS: [(usize, f64, f64, f64); 9] = [
     (4, 1.25, 1.0, 1.0),
 ];
 const COLUMNS: [&str; 5] = ["run", "t = 0.75", "t = 1", "t = 1.25", "verdict"];
-/// How far two errors may be apart that count as the same.
+/// How far two errors may be apart that count as the same, as a share and by the half digit that the paper's are
+/// rounded to.
 const SAME: f64 = 0.1;
-const RULE: &str = "“agrees” where all errors are within 10 % of the paper's; else the least and the largest ratio of ours to the paper's";
+const ROUNDED: f64 = 5e-4 + 1e-9;
+const RULE: &str = "“agrees” where all errors are within 10 % of the paper's, plus the half digit that those are \
+     rounded to; else the least and the largest ratio of ours to the paper's";
 
 /// Densities and forms of the equation.
 struct Variants {
@@ -34,6 +38,8 @@ struct Variants {
     one_pass: Vec<String>,
     two_passes: Vec<String>,
     smooth: Vec<String>,
+    /// The literal one in a box that is higher by 1e-10.
+    nearly: Vec<String>,
 }
 
 impl Variants {
@@ -45,6 +51,7 @@ impl Variants {
             one_pass: settings(&[ten, "monitor.smoothing=1"]),
             two_passes: settings(&[ten, "monitor.smoothing=2"]),
             smooth: settings(&["monitor.strength={relative=30.0}", "monitor.smoothing=2"]),
+            nearly: settings(&[ten, "monitor.smoothing=0", "domain.upper=[1.0, 1.0000000001]"]),
         }
     }
 }
@@ -79,23 +86,21 @@ pub fn table_1(options: Options) -> Result<Vec<Table>> {
         let way = Way::new(&label, BURGERS, &with(settings), &estimator);
         match literal {
             true if options.quick => {
-                let bare = [way.settings.as_slice(), &super::settings(&super::NO_SAFETY)].concat();
-                ratios.row(&Way { label: format!("{label} (literal but for N)"), settings: bare, ..way.clone() })?;
+                ratios.unaided(&Way { label: format!("{label} (literal but for N)"), ..way.clone() })?;
             }
             true => ratios.literal(&way, false)?,
-            false => ratios.row(&way)?,
+            false => ratios.unaided(&way)?,
         }
         for &(s, paper) in LINF[1..].iter().filter(|_| estimator == RESIDUAL && !options.quick) {
             errors.row(linf_row(&format!("{label}, {s}×{s}"), &compute(&way.on(s)?)?, &paper));
         }
     }
     let mut table = ratios.table;
-    table.note(
-        "without smoothing the front sits on the diagonal of the mesh and the run is chaotic from t = 1 on: two runs that differ by \
-         1e-10 have Q and l_inf that differ by percents",
-    );
     if options.quick {
-        table.note(format!("quick: {paths} paths in place of the paper's 10000, to t = .75, 4 × 4 subdomains only"));
+        table.note(format!(
+            "quick: {paths} paths in place of the paper's 10000, to t = .75, 4 × 4 subdomains only, no advective \
+             row, no l_inf on subdomains"
+        ));
         return Ok(vec![one_domain(&v)?, table]);
     }
     errors.note("the paper prints .320, .35 and .24 where .032, .035 and .024 must be meant; the verdict takes these");
@@ -109,6 +114,7 @@ fn one_domain(v: &Variants) -> Result<Table> {
     table.row(["paper".to_string(), "0.027".into(), "0.031".into(), "0.030".into(), String::new()]);
     let variants = [
         ("conservative as (4.1), strength 10, no smoothing (literal)", &v.literal),
+        ("the same, a box higher by 1e-10", &v.nearly),
         ("advective, strength 10, no smoothing", &v.advective),
         ("conservative, strength 10, 1 pass of smoothing", &v.one_pass),
         ("conservative, strength 10, 2 passes", &v.two_passes),
@@ -119,8 +125,13 @@ fn one_domain(v: &Variants) -> Result<Table> {
         table.row(linf_row(label, &compute(&study(BURGERS, &all)?)?, &paper));
     }
     table.note(
-        "the paper names neither a filter of the density nor, beside (4.1), a form of the convection: rows with passes of \
-         (1 2 1) × (1 2 1)/16, the advective row and strength 30 are guesses. No row is helped by [safety]",
+        "the paper names neither a filter of the density nor, beside (4.1), a form of the convection: rows with \
+         passes of (1 2 1) × (1 2 1)/16, the advective row and strength 30 are guesses. No row is helped by \
+         [safety]",
+    );
+    table.note(
+        "without smoothing the front sits on the diagonal of the mesh: how far the literal row is determined at all, \
+         the row below it shows, whose box differs by less than any digit that is printed",
     );
     Ok(table)
 }
@@ -133,7 +144,9 @@ fn linf_row(label: &str, (record, failure): &(Record, Option<Error>), paper: &[f
     let [least, largest] = [ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max)];
     let verdict = match failure {
         Some(failure) => ended(failure),
-        None if least >= 1.0 - SAME && largest <= 1.0 + SAME => "agrees".into(),
+        None if (0..3).all(|k| found(k).is_some_and(|e| (e - paper[k]).abs() <= SAME * paper[k] + ROUNDED)) => {
+            "agrees".into()
+        }
         None => format!("{least:.2} to {largest:.2} times the paper's"),
     };
     [label.to_string()].into_iter().chain(cells).chain([verdict]).collect()

@@ -28,6 +28,10 @@ pub fn errata() -> Result<Rerun> {
     table.row(walls());
     table.row(sign()?);
     table.note(
+        "(3.16) alone has the wrong sign: the shift of a segment below it, d = δ (ν·(∇u₀ − ∇u₁))ν, is right with D₀ \
+         = D₁ = L_H = 1, whichever way ν points",
+    );
+    table.note(
         "(2.4) adds up nine neighbours, j = 0 … 9, where there are eight; “(Δp)_j = p_j(x₀)” must read (Δp_j)(x₀)",
     );
     table
@@ -60,9 +64,9 @@ fn walls() -> Vec<String> {
 
 /// A planar front of water that melts ice moves into the ice.
 fn sign() -> Result<Vec<String>> {
-    let text = "[study]\nname = \"melting\"\nkind = \"stefan\"\n[domain]\nx = [-1.0, 1.0]\nbottom = \"0\"\ntop = \"2\"\n[grid]\n\
-                cells = [8, 8, 8]\n[exact]\nkind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\n[time]\n\
-                duration = 0.01\nstep = 0.001\n";
+    let text = "[study]\nname = \"melting\"\nkind = \"stefan\"\n[domain]\nx = [-1.0, 1.0]\nbottom = \"0\"\ntop = \
+         \"2\"\n[grid]\ncells = [8, 8, 8]\n[exact]\nkind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = \
+         0.7\n[time]\nduration = 0.01\nstep = 0.001\n";
     let FrontFinished { state, .. } = StefanStudy::from_source(&Source::new("melting", text))?.compute()?;
     let moved = state.front[0] - 0.7;
     Ok(row(

@@ -1,4 +1,5 @@
-//! S. J. Castillo and F. Izsák, *Efficient discretization of the Laplacian: application to moving boundary problems* (2024).
+//! S. J. Castillo and F. Izsák, *Efficient discretization of the Laplacian: application to moving boundary problems*
+//! (2024).
 
 mod errata;
 mod fronts;
