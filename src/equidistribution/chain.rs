@@ -1,7 +1,6 @@
 use super::LineDensity;
 use super::beyond::Beyond;
 use super::cumulative::Cumulative;
-use super::path::Path;
 use crate::error::Failure;
 use crate::numerics::linear::tridiagonal;
 use schemars::JsonSchema;
@@ -130,13 +129,13 @@ impl Law<'_> {
 }
 
 impl Chain<'_> {
-    /// The path of a step over all places that it may touch, and M x′ of the step; none where M has no value on the way.
-    fn path(&self, x: &[f64], change: &[f64]) -> Option<(Path, Vec<f64>)> {
-        let ends = x.iter().zip(change).flat_map(|(x, c)| [*x, x - c]);
-        let [a, b] = ends.fold(self.ends, |[a, b], x| [a.min(x), b.max(x)]);
-        let m = self.density.at_each(self.t, x).ok()?;
-        let changes = m.iter().zip(change).map(|([m, _], c)| m * c).collect();
-        Some((Path::new(self.density, self.t, [a, b]).ok()?, changes))
+    /// Where nodes come to that go on until ∫M on their way is that of a share of a change, with M at where they begin.
+    fn along(&self, cumulative: &Cumulative, x: &[f64], change: &[f64], share: f64) -> Vec<f64> {
+        let moved = |(x, change): (&f64, &f64)| {
+            let [g, m] = cumulative.at(*x);
+            cumulative.place(g - share * change * m)
+        };
+        x.iter().zip(change).map(moved).collect()
     }
 
     /// ∫M from a to b.
@@ -342,14 +341,12 @@ impl Chain<'_> {
             let before = norm(&residual);
             // residuals of nodes that are right to the last bit
             let rounding = 4.0 * f64::EPSILON * size * rows.iter().fold(0.0, |m: f64, row| m.max(row[1].abs()));
-            let (mut found, mut path) = (None, None);
+            let mut found = None;
             for (ordered, way, share) in ways(free) {
                 let mut tried: Vec<f64> = match way {
                     Way::Straight => x.iter().zip(&change).map(|(x, c)| x - share * c).collect(),
-                    Way::Curved => match path.get_or_insert_with(|| self.path(&x, &change)) {
-                        Some((path, changes)) => {
-                            x.iter().zip(changes).map(|(x, c)| path.along(*x, -share * *c)).collect()
-                        }
+                    Way::Curved => match self.cumulative {
+                        Some(cumulative) => self.along(cumulative, &x, &change, share),
                         None => continue,
                     },
                 };

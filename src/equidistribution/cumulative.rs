@@ -166,6 +166,19 @@ impl Cumulative {
         self.at(x)[0]
     }
 
+    /// Where G is so large.
+    pub fn place(&self, g: f64) -> f64 {
+        let [a, b] = self.ends();
+        if g < 0.0 {
+            return a + g / self.at(a)[1];
+        }
+        if g > self.whole {
+            return b + (g - self.whole) / self.at(b)[1];
+        }
+        let piece = &self.pieces[self.pieces.partition_point(|piece| piece.below <= g).max(1) - 1];
+        piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + piece.inverted(g, -1.0))
+    }
+
     /// Where G is as large as each of some values that grow.
     pub fn inverted(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut k = 0;

@@ -14,7 +14,6 @@ mod coarse;
 mod counts;
 mod cumulative;
 mod density;
-mod path;
 pub mod pieces;
 mod predict;
 mod schwarz;
