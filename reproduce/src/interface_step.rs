@@ -60,7 +60,7 @@ impl InterfaceStep {
         let mut simulation = Simulation {
             physics: Box::new(Burgers::new(0.005, Convection::Advective)?),
             monitor: Box::new(monitor),
-            mover: Mover::by(Box::new(Whole::default()), Mmpde::default()),
+            mover: Mover::by(Box::new(Whole::default()), Mmpde::published()),
             coupling: Coupling::default(),
             safety: Safety::default(),
             schedule: Schedule::new(0.25, 0.75, dt, vec![0.75])?,
@@ -68,7 +68,7 @@ impl InterfaceStep {
         let mesh = Mesh::uniform(Lattice::bounded([cells, cells])?, [0.0; 2], [1.0; 2])?;
         let mut state = simulation.start(mesh)?;
         simulation.run(&mut state, &mut Record::default(), &mut [])?;
-        Ok(Self::new(state.mesh, state.rho, Mmpde::default(), dt, [4, 4])?)
+        Ok(Self::new(state.mesh, state.rho, Mmpde::published(), dt, [4, 4])?)
     }
 
     /// A step of any mesh.

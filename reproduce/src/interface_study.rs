@@ -190,7 +190,7 @@ struct SweepsAlone {
 }
 
 impl MeshGenerator for SweepsAlone {
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();
@@ -213,7 +213,7 @@ fn case_b(lattice: Lattice<2>, generator: Box<dyn MeshGenerator>) -> Result<Mesh
     let mut simulation = Simulation {
         physics: Box::new(Burgers::new(0.005, Convection::Conservative)?),
         monitor: Box::new(Arclength::default()),
-        mover: Mover::by(generator, Mmpde::default()),
+        mover: Mover::by(generator, Mmpde::published()),
         coupling: Coupling::default(),
         safety: Safety::default(),
         schedule: Schedule::new(0.25, 0.75, 1e-3, vec![0.75])?,

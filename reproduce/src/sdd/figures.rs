@@ -35,7 +35,7 @@ pub fn figures(options: Options) -> Result<Rerun> {
             let whole = figure.state(t, 1)?;
             for &s in &figure.subdomains {
                 let state = if s == 1 { whole.clone() } else { figure.state(t, s)? };
-                table.row(row(&figure, t, s, &state, &whole));
+                table.row(row(&figure, t, s, &state, &whole)?);
                 // one domain is drawn where the paper draws it
                 if s > 1 || figure.name != "figure-1" {
                     let where_ = if s == 1 { "one domain".into() } else { format!("{s} × {s} subdomains") };
@@ -99,8 +99,8 @@ impl Shown {
     }
 }
 
-fn row(figure: &Shown, t: f64, s: usize, state: &State, whole: &State) -> Vec<String> {
-    let quality = quality(&state.mesh, &state.rho);
+fn row(figure: &Shown, t: f64, s: usize, state: &State, whole: &State) -> Result<Vec<String>> {
+    let quality = quality(&state.mesh, &state.rho)?;
     let rms = compare(&state.mesh, &whole.mesh).mesh_rms / state.mesh.extent()[0];
     let cell = 1.0 / state.mesh.lattice().cells()[0] as f64;
     let verdict = match s {
@@ -108,7 +108,7 @@ fn row(figure: &Shown, t: f64, s: usize, state: &State, whole: &State) -> Vec<St
         _ if rms <= 0.1 * cell => "holds",
         _ => "does not hold",
     };
-    vec![
+    Ok(vec![
         format!("{}, {}", figure.name, figure.what),
         t.to_string(),
         if s == 1 { "one domain".into() } else { format!("{s}×{s}") },
@@ -117,5 +117,5 @@ fn row(figure: &Shown, t: f64, s: usize, state: &State, whole: &State) -> Vec<St
         format!("{:.3}", quality.min_scaled_jacobian),
         if s == 1 { String::new() } else { format!("{rms:.1e}") },
         verdict.into(),
-    ]
+    ])
 }

@@ -148,13 +148,13 @@ fn fastest(repeats: usize, mut measure: impl FnMut() -> Result<Slowest>) -> Resu
 
 fn whole(state: &State) -> Result<Slowest> {
     let started = Instant::now();
-    Whole::default().step(&Mmpde::default(), &state.mesh, &state.rho, DT)?;
+    Whole::default().step(&Mmpde::published(), &state.mesh, &state.rho, DT)?;
     Ok(Slowest { seconds: started.elapsed().as_secs_f64(), interface: 0.0 })
 }
 
 /// What the core of the slowest subdomain does: operator and sides, its points, its solve.
 fn slowest(state: &State, decomposition: &Decomposition, strips: &mut Strips, kind: &EstimatorKind) -> Result<Slowest> {
-    let (equation, mesh, rho) = (Mmpde::default(), &state.mesh, &state.rho);
+    let (equation, mesh, rho) = (Mmpde::published(), &state.mesh, &state.rho);
     let lattice = mesh.lattice();
     let points = decomposition.points();
     let share = points.len().div_ceil(decomposition.patches().len());
