@@ -5,6 +5,8 @@ use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 
 const README: &str = include_str!("../README.md");
+const STUDY: &str = include_str!("../docs/study.md");
+const SUBDOMAINS: &str = include_str!("../docs/subdomains.md");
 const LINE: &str = include_str!("../docs/one-dimension.md");
 const FRONTS: &str = include_str!("../docs/poisson-stefan.md");
 const RESUME: &str = include_str!("../docs/resume.md");
@@ -13,7 +15,7 @@ const SAFETY: &str = include_str!("../docs/safety.md");
 #[test]
 fn studies_on_the_pages_are_valid() {
     let mut kinds = BTreeSet::new();
-    for (page, text) in [("README", README), ("one-dimension", LINE), ("poisson-stefan", FRONTS)] {
+    for (page, text) in [("README", README), ("study", STUDY), ("one-dimension", LINE), ("poisson-stefan", FRONTS)] {
         let blocks = text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap_or_default());
         for block in blocks.filter(|block| block.starts_with("[study]")) {
             let study = Study::from_source(&Source::new(page, block)).unwrap_or_else(|error| panic!("{page}: {error}"));
@@ -46,9 +48,9 @@ fn keys(schema: &Value, definitions: &Map<String, Value>, out: &mut BTreeSet<Str
 fn pages_name_every_key() {
     let schema = Study::schema();
     let definitions = schema["$defs"].as_object().unwrap();
-    let of_output = [README, RESUME].concat();
+    let of_output = [STUDY, RESUME].concat();
     for (kind, page) in [
-        ("MovingMesh", [README, SAFETY].concat()),
+        ("MovingMesh", [STUDY, SUBDOMAINS, SAFETY].concat()),
         ("PoissonStudy", FRONTS.to_string()),
         ("StefanStudy", FRONTS.to_string()),
         ("EquidistributionStudy", LINE.to_string()),

@@ -1,4 +1,4 @@
-"""Runs the Python examples of the README, section by section of its own; those that need matplotlib where it is there."""
+"""Runs the Python examples of docs/python.md in one namespace; those that need matplotlib where it is there."""
 
 import os
 import re
@@ -11,11 +11,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def examples() -> list[str]:
-    """The blocks of code in the section "Python"."""
-    text = (ROOT / "README.md").read_text("utf-8")
-    section = re.search(r"^## Python\n(.*?)^## ", text, re.DOTALL | re.MULTILINE)
-    assert section, "the README has no section Python"
-    return re.findall(r"^```python\n(.*?)^```", section.group(1), re.DOTALL | re.MULTILINE)
+    """The blocks of code of the page. That of the README is the first of them."""
+    blocks = [
+        re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.DOTALL | re.MULTILINE)
+        for page in ("README.md", "docs/python.md")
+    ]
+    assert blocks[0] == blocks[1][:1], "the example of the README is not the first of docs/python.md"
+    return blocks[1]
 
 
 def main() -> None:
@@ -28,7 +30,7 @@ def main() -> None:
                 print(f"example {number}: left out, there is no matplotlib")
                 continue
             print(f"example {number}:", flush=True)
-            exec(compile(example, f"README.md, example {number}", "exec"), names)
+            exec(compile(example, f"docs/python.md, example {number}", "exec"), names)
 
 
 if __name__ == "__main__":
