@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release -p driftmesh --example errors > docs/errors.md
 
-use driftmesh::Failure;
+use driftmesh::study::failures;
 
 const HEAD: &str = "\
 # How a run may fail
@@ -15,6 +15,9 @@ What is asked for wrongly, a key, a formula, a directory that is not ours, ends 
 written, and is shown where it stands. A run that was told to end has `\"status\": \"interrupted\"`, one whose disk is full
 names the file that could not be written.
 
+A run says what helps in the keys of its own study: those that it has and takes, with the value that each has now. The last
+column has those of all studies.
+
 | name | what happened | what helps |
 |---|---|---|
 ";
@@ -22,7 +25,8 @@ names the file that could not be written.
 /// The page.
 pub fn page() -> String {
     let cell = |text: &str| text.replace('|', "\\|");
-    let rows = Failure::all().map(|[name, what, help]| format!("| `{name}` | {} | {} |\n", cell(what), cell(help)));
+    let rows = failures().into_iter();
+    let rows = rows.map(|[name, what, help]| format!("| `{name}` | {} | {} |\n", cell(&what), cell(&help)));
     HEAD.to_string() + &rows.collect::<String>()
 }
 

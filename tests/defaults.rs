@@ -1,5 +1,7 @@
 //! What is taken where nothing is said, and that every door says the same.
 
+use driftmesh::meshing::{Mmpde, Whole};
+use driftmesh::mover::Mover;
 use driftmesh::study::{MovingMesh, Source};
 
 /// A study that says as little as it may.
@@ -25,4 +27,13 @@ fn the_schema_names_the_default_monitor() {
         assert!(said.contains(&format!("`{kind}`")), "{kind} is not in {said:?}");
     }
     assert!(said.starts_with("`[monitor]`. Left out, it is `auto`;"), "{said}");
+}
+
+/// A study that says nothing of its mesh equation has the one that the library takes where nothing is said.
+#[test]
+fn one_mesh_equation_is_the_default_of_the_library_and_of_studies() {
+    let study = resolved("[pde]\nkind = \"burgers\"\nviscosity = 0.05\n");
+    assert_eq!(study.simulation().unwrap().mover.equation, Mmpde::default());
+    assert_eq!(Mover::new(Whole::default()).equation, Mmpde::default());
+    assert_ne!(Mmpde::published(), Mmpde::default());
 }

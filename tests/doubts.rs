@@ -99,7 +99,7 @@ fn steps_that_vanish_say_why() {
     let pde = "kind = \"formula\"\nunknowns = [\"u\"]\nsource = { u = \"u^2\" }\ndiffusivity = { u = \"1e-4\" }\n\
                initial = { u = \"1 + exp(-((x-0.5)^2 + (y-0.5)^2)/0.1^2)\" }\nboundary = { u = \"no-flux\" }";
     let failed = |study: &MovingMesh| match compute(study).unwrap().1 {
-        Some(error @ Error::Failed { .. }) => (error.to_string(), error.help().unwrap()),
+        Some(error @ Error::Failed { .. }) => (error.to_string(), study.remedy(&error).unwrap()),
         other => panic!("{other:?}"),
     };
     let (message, help) = failed(&study("start = 0\nend = 1", pde, ""));

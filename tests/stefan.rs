@@ -118,7 +118,7 @@ fn automatic_steps_that_fail_are_halved() {
         compute("stefan-slides", &set)
     };
     let [given, automatic] = ["0.04", "\"auto\""].map(ends);
-    assert!(says(given.failure.as_ref().unwrap(), &["stalled", "time.step"]), "{:?}", given.failure);
+    assert!(says(given.failure.as_ref().unwrap(), &["stalled", "lower the time step"]), "{:?}", given.failure);
     assert!(given.state.t < 1.6 && given.summary.work.rejected_steps == 0);
     assert!(automatic.failure.is_none(), "{:?}", automatic.failure);
     assert!(automatic.state.t == 2.0 && automatic.summary.work.rejected_steps > 0);

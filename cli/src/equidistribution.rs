@@ -27,7 +27,7 @@ pub fn run(study: &EquidistributionStudy, out: &Path, begin: Begin, quiet: bool)
         None => Ok(ExitCode::SUCCESS),
         Some(error) => {
             let note = format!("the last mesh and every iteration up to it are in {}", out.display());
-            Ok(terminal::complain(&error, remedy(&error, out, error.help()), Some(note)))
+            Ok(terminal::complain(&error, remedy(&error, out, study.remedy(&error)), Some(note)))
         }
     }
 }

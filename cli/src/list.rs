@@ -47,7 +47,7 @@ impl List {
         }
         if self.topic.is_none_or(|only| only == Topic::Errors) {
             say("errors (error.kind in summary.json)");
-            Failure::all().for_each(|[name, what, _]| say(format_args!("  {name:<19}{what}")));
+            Failure::all().for_each(|[name, what]| say(format_args!("  {name:<19}{what}")));
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 pub fn run(study: &PoissonStudy, out: &Path, quiet: bool) -> driftmesh::Result<ExitCode> {
     let summary = match study.run(out) {
         Ok(summary) => summary,
-        Err(error) => return Ok(terminal::complain(&error, error.help_without_density(), None)),
+        Err(error) => return Ok(terminal::complain(&error, study.remedy(&error), None)),
     };
     summary.warnings.iter().for_each(|warning| terminal::warn(warning));
     if !quiet {

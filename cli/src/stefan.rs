@@ -32,7 +32,7 @@ pub fn run(study: &StefanStudy, out: &Path, begin: Begin, quiet: bool) -> driftm
         Some(error) => {
             let note =
                 format!("everything up to the last good state (step {}) is in {}", finished.state.step, out.display());
-            Ok(terminal::complain(&error, remedy(&error, out, error.help_without_density()), Some(note)))
+            Ok(terminal::complain(&error, remedy(&error, out, study.remedy(&error)), Some(note)))
         }
     }
 }

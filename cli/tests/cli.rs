@@ -426,6 +426,9 @@ fn a_folded_mesh_is_named_and_the_frames_are_kept() {
     let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(summary["status"], "failed");
     assert_eq!(summary["error"]["kind"], "mesh-folded");
+    // the file and the terminal say the same
+    let help = words.lines().find_map(|line| line.trim().strip_prefix("help: ")).unwrap();
+    assert_eq!(summary["error"]["help"], help);
     let steps = summary["work"]["steps"].as_u64().unwrap() as usize;
     assert!(steps > 0);
     assert_eq!(entries(&sandbox.path("out/frames")).len(), steps + 1);

@@ -1,3 +1,4 @@
+use driftmesh::error::{Act, Door, Setting, sentence};
 use driftmesh::{Error, Failure};
 use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -52,39 +53,71 @@ fn capital(word: &str) -> String {
 pub fn plain(py: Python<'_>, error: impl Into<Error>) -> PyErr {
     let error = error.into();
     let help = match &error {
-        // what a study has in tables are arguments here
-        Error::Failed { failure: failure @ Failure::NotConverged { .. }, .. } => {
-            let tables = ["equidistribution.", "grid.", "schwarz.", "stop."];
-            Some(tables.iter().fold(failure.help().to_string(), |help, table| help.replace(table, "")))
-        }
-        Error::Failed { failure, .. } => remedy(failure).map(String::from),
+        Error::Failed { failure, .. } => remedy(failure),
         _ => error.help(),
     };
     raised(py, &error, help)
 }
 
 /// The remedy where there is no study; nothing where the message says it all.
-fn remedy(failure: &Failure) -> Option<&'static str> {
+fn remedy(failure: &Failure) -> Option<String> {
+    let said_already = matches!(
+        failure,
+        Failure::NonFinite { .. }
+            | Failure::Formula { .. }
+            | Failure::NotPositive { .. }
+            | Failure::OutOfRange { .. }
+            | Failure::WrongLength { .. }
+    );
+    let help = sentence(&failure.remedies(), &Arguments).filter(|_| !said_already)?;
     Some(match failure {
-        Failure::Folded { .. } => {
-            "begin with a mesh without folded cells; where a step folded it, lower `dt` or raise the monitor's `smoothing`"
-        }
-        Failure::LinearStalled { .. } => {
-            "lower `dt`, raise `relaxation`, or set the monitor's `gradient` to \"safe\" where the density is very steep"
-        }
-        Failure::SteepDensity { .. } => "set the monitor's `gradient` to \"safe\", or raise its `smoothing`",
-        Failure::LongWalks { .. } => "raise `relaxation`, lower `dt` or the number of walks, or use Whole()",
-        Failure::NoisyInterface { .. } => "raise the estimator's `walks` or `paths`, or use ResidualWalk()",
-        Failure::SchwarzStalled { .. } => "raise `iterations` or `overlap` of Schwarz(…), or lower `dt`",
-        Failure::LineDensity { .. } => "change the density so",
-        Failure::LineStalled { .. } => "set `face_density` to \"exact\"",
-        Failure::LineUnresolved { .. } => "give fewer cells, or the density a thicker layer",
-        Failure::LineFolded { .. } => {
-            "raise `iterations`, or give a tolerance in its place, which tells whether the iteration contracts"
-        }
-        Failure::DegenerateStencil { .. } => "make the cells around it less flat",
-        Failure::NotABox { .. } => "move the mesh of the unit square instead, and map it to the domain",
-        Failure::Subdomains { .. } => "give every axis between one subdomain and one a cell",
-        _ => return None,
+        Failure::Folded { .. } => format!("begin with a mesh without folded cells; where a step folded it, {help}"),
+        _ => help,
     })
 }
+
+/// Settings as arguments of functions and classes.
+struct Arguments;
+
+impl Door for Arguments {
+    fn name(&self, act: Act) -> Option<String> {
+        let name = match act.setting()? {
+            Setting::Smoothing => "the monitor's `smoothing`",
+            Setting::Strength => "its `relative` or `absolute`",
+            Setting::Gradient => "the monitor's `gradient`",
+            Setting::Relaxation => "`relaxation`",
+            Setting::TimeStep => "`dt`",
+            Setting::Cells => "`cells`",
+            Setting::Generator if act == Act::Set(Setting::Generator, &[WHOLE]) => "`method`",
+            Setting::Estimator => "the `estimator`",
+            Setting::Samples => "the `walks` or `paths` of the estimator",
+            Setting::Exchanges => "the `iterations` of Schwarz(…)",
+            Setting::Overlap => "the `overlap` of Schwarz(…)",
+            Setting::Density => "the density",
+            Setting::FaceDensity => "`face_density`",
+            Setting::Method => "`method`",
+            Setting::Linearized => "`linearized`",
+            Setting::Coarse => "`coarse`",
+            Setting::Sweep => "`sweep`",
+            Setting::Robin => "`robin`",
+            Setting::Integral => "`integral`",
+            Setting::Iterations => "`iterations`",
+            Setting::Tolerance => "`tolerance`",
+            _ => return None,
+        };
+        Some(name.into())
+    }
+
+    fn value(&self, setting: Setting, value: &'static str) -> String {
+        match (setting, value) {
+            (Setting::Generator, WHOLE) => "Whole()",
+            (Setting::Estimator, _) => "ResidualWalk()",
+            (_, "false") => "False",
+            (_, value) => value,
+        }
+        .into()
+    }
+}
+
+/// The generator that solves the whole domain, as a study writes it.
+const WHOLE: &str = "{ kind = \"whole\" }";

@@ -285,6 +285,8 @@ def test_a_node_of_one_in_a_field_of_zeros_folds_nothing():
 
 
 def test_settings_can_be_read_and_no_other_attribute_is_taken():
+    default = MeshGenerator()  # the mesh equation of studies and of the library
+    assert (default.relaxation, default.form, default.method) == ("auto", "conservative", Whole())
     generator = MeshGenerator(relaxation=0.5, form="gradient")
     assert (generator.relaxation, generator.form, generator.method) == (0.5, "gradient", Whole())
     for name, value in [("relaxation", 0.001), ("method", Fixed()), ("tau", 1.0)]:

@@ -1,7 +1,7 @@
 use super::LineDensity;
 use super::beyond::Beyond;
 use super::cumulative::Cumulative;
-use crate::error::Failure;
+use crate::error::{Act, Failure, Remedy, Setting};
 use crate::numerics::linear::tridiagonal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -313,6 +313,21 @@ impl Chain<'_> {
         }
     }
 
+    /// What helps where Newton's method stalls, in a step of time or without one.
+    fn unstalling(&self, in_time: bool) -> Remedy {
+        let exact = Act::Set(Setting::FaceDensity, &["\"exact\""]);
+        let finer = [Act::Lower(Setting::TimeStep), Act::Refine(Setting::Cells)];
+        match (self.face, in_time) {
+            (FaceDensity::Exact, true) => Remedy::any(finer),
+            (FaceDensity::Exact, false) => {
+                Remedy::any([Act::Set(Setting::Integral, &["\"exact\""]), Act::Refine(Setting::Cells)])
+            }
+            (_, true) => Remedy::any([exact, finer[0], finer[1]]),
+            (_, false) => Remedy::any([exact])
+                .with(": a density that jumps or peaks within a cell has no mesh by trapezoids or midpoints"),
+        }
+    }
+
     /// Newton's method, damped so that nodes keep their order.
     pub fn newton(
         &self,
@@ -326,13 +341,10 @@ impl Chain<'_> {
         let mut last = f64::INFINITY;
         // an iterate of conditions on the flux may run backwards, and pass through no order on its way
         let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
-        let remedy = match (self.face, step) {
-            (FaceDensity::Exact, Some(_)) => "lower time.step, or refine grid.cells",
-            (FaceDensity::Exact, None) => "set schwarz.integral to \"exact\"",
-            (_, Some(_)) => "set equidistribution.face_density to \"exact\", lower time.step, or refine grid.cells",
-            (_, None) => {
-                "set equidistribution.face_density to \"exact\": a density that jumps or peaks within a cell has no mesh by trapezoids or midpoints"
-            }
+        let stalled = |residual: f64, iterations: usize| Failure::LineStalled {
+            residual,
+            iterations,
+            remedies: vec![self.unstalling(step.is_some())],
         };
         let most = if free { MAX_NEWTON / 2 } else { MAX_NEWTON };
         for solves in 1..=most {
@@ -369,7 +381,7 @@ impl Chain<'_> {
                 }
             }
             let Some((tried, r, m, share)) = found else {
-                return Err(Failure::LineStalled { residual: before, iterations: solves, remedy });
+                return Err(stalled(before, solves));
             };
             (x, residual, rows) = (tried, r, m);
             // quadratic until rounding: then steps no longer shrink
@@ -381,7 +393,7 @@ impl Chain<'_> {
             }
             last = largest;
         }
-        Err(Failure::LineStalled { residual: norm(&residual), iterations: most, remedy })
+        Err(stalled(norm(&residual), most))
     }
 
     /// One linear solve with the face densities of given nodes frozen.

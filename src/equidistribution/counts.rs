@@ -3,7 +3,7 @@
 use super::chain::{Chain, End};
 use super::schwarz::Iteration;
 use super::{Line, Method, pieces};
-use crate::error::{Failure, Result};
+use crate::error::{Act, Failure, Remedy, Result};
 use crate::numerics::linear::tridiagonal;
 
 /// A step that is at most this ends Newton's method.
@@ -63,8 +63,8 @@ fn whole_steps(chain: &Chain<'_>, x: &mut [f64], ends: [End; 2]) -> Result<usize
             break;
         }
     }
-    let remedy = "begin nearer to the mesh: whole steps are counted, none is halved";
-    Err(Failure::LineStalled { residual: largest, iterations: MOST, remedy })
+    let remedy = Remedy::any([Act::Say("begin nearer to the mesh: whole steps are counted, none is halved")]);
+    Err(Failure::LineStalled { residual: largest, iterations: MOST, remedies: vec![remedy] })
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ pub use density::{LineDensity, check_ends};
 pub use predict::Prediction;
 pub use schwarz::{Coarse, Method, Robin, Sweep};
 
-use crate::error::{Error, Failure, Result};
+use crate::error::{Act, Error, Failure, Remedy, Result, Setting};
 use crate::parallel;
 use chain::{Chain, End, Step};
 use cumulative::Cumulative;
@@ -195,26 +195,40 @@ impl History {
             _ => "; it does not contract".into(),
         };
         let converges = !still && (more.is_some_and(|more| more <= MOST_ITERATIONS as f64) || count < FEW);
-        let remedy = match method {
-            _ if last <= rounding => "raise stop.tolerance",
-            Method::Optimized { robin: Robin::Value(_) } if converges => {
-                "raise stop.iterations, or set schwarz.robin to \"auto\" or \"lagged\""
-            }
-            _ if converges => "raise stop.iterations",
-            Method::Classical { linearized: true, .. } => "set schwarz.linearized to false",
-            Method::Classical { coarse: Coarse::None | Coarse::Galerkin, sweep: Sweep::Parallel, .. } => {
-                "give more overlap, or set schwarz.coarse to \"integral\""
-            }
-            Method::Classical { .. } => "give more overlap, or more grid.cells",
-            Method::Optimized { robin: Robin::Value(_) } => "set schwarz.robin to \"auto\" or \"lagged\"",
-            Method::Optimized { .. } => {
-                "set schwarz.method to \"optimal\" and equidistribution.face_density to \"exact\""
-            }
-            Method::Optimal { .. } => "set equidistribution.face_density to \"exact\", or give more grid.cells",
+        let remedies = match last <= rounding {
+            true => vec![Remedy::any([Act::Raise(Setting::Tolerance)])],
+            false => curing(method, converges),
         };
         let measure = stop.measure.name();
-        Some(Failure::NotConverged { measure, last, iterations: count, tolerance, advice, remedy })
+        Some(Failure::NotConverged { measure, last, iterations: count, tolerance, advice, remedies })
     }
+}
+
+/// What cures an iteration that missed its tolerance: more iterations where it converges, another method where not.
+fn curing(method: Method, converges: bool) -> Vec<Remedy> {
+    let robin = Act::Set(Setting::Robin, &["\"auto\"", "\"lagged\""]);
+    let exact = Act::Set(Setting::FaceDensity, &["\"exact\""]);
+    let overlap = Act::Say("give more overlap");
+    vec![match method {
+        Method::Optimized { robin: Robin::Value(_) } if converges => {
+            Remedy::any([Act::Raise(Setting::Iterations), robin])
+        }
+        _ if converges => Remedy::any([Act::Raise(Setting::Iterations)]),
+        Method::Classical { linearized: true, .. } => Remedy::any([Act::Set(Setting::Linearized, &["false"])]),
+        Method::Classical { coarse: Coarse::None | Coarse::Galerkin, sweep: Sweep::Parallel, .. } => {
+            Remedy::any([overlap, Act::Set(Setting::Coarse, &["\"integral\""])])
+        }
+        Method::Classical { .. } => Remedy::any([overlap, Act::Refine(Setting::Cells)]),
+        Method::Optimized { robin: Robin::Value(_) } => Remedy::any([robin]),
+        Method::Optimized { .. } => {
+            return vec![
+                Remedy::any([Act::Set(Setting::Method, &["\"optimal\""])]),
+                Remedy::any([Act::LeaveOut(Setting::Robin)]).when("and"),
+                Remedy::any([exact]).when("and"),
+            ];
+        }
+        Method::Optimal { .. } => Remedy::any([exact, Act::Refine(Setting::Cells)]),
+    }]
 }
 
 /// The factor of two iterations over the last half of them, where all of the last quarter are below all of the second: an

@@ -52,8 +52,9 @@ pub struct Failed {
     pub compared: bool,
 }
 
-impl From<&Error> for Failed {
-    fn from(error: &Error) -> Self {
+impl Failed {
+    /// What is told of an error, with the remedy in the words of the study.
+    pub(crate) fn of(error: &Error, help: Option<String>) -> Self {
         let (kind, moment) = match error.cause() {
             Error::Failed { failure, moment } => (failure.name(), *moment),
             Error::Interrupted(moment) => ("interrupted", Some(*moment)),
@@ -62,7 +63,7 @@ impl From<&Error> for Failed {
         Self {
             kind: kind.into(),
             message: error.to_string(),
-            help: error.help(),
+            help,
             t: moment.map(|m| m.t),
             step: moment.map(|m| m.step),
             compared: matches!(error, Error::Compared(_)),

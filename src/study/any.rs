@@ -1,6 +1,6 @@
 use super::moving_mesh::Header;
 use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
-use crate::error::{Error, Result, Unfit};
+use crate::error::{Act, Error, Failure, Result, Unfit};
 use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing};
 use crate::simulation::Observer;
 use schemars::generate::SchemaSettings;
@@ -128,8 +128,19 @@ impl Study {
     pub fn remedy(&self, error: &Error) -> Option<String> {
         match self {
             Self::MovingMesh(study) => study.remedy(error),
-            Self::Poisson(_) | Self::Stefan(_) => error.help_without_density(),
-            Self::Equidistribution(_) => error.help(),
+            Self::Poisson(study) => study.remedy(error),
+            Self::Stefan(study) => study.remedy(error),
+            Self::Equidistribution(study) => study.remedy(error),
+        }
+    }
+
+    /// What this study may change against a failure, each with the keys that take the change.
+    pub fn offers(&self, failure: &Failure) -> Vec<(Act, Vec<String>)> {
+        match self {
+            Self::MovingMesh(study) => super::remedy::offers(study, failure),
+            Self::Poisson(study) => super::remedy::offers(study, failure),
+            Self::Stefan(study) => super::remedy::offers(study, failure),
+            Self::Equidistribution(study) => super::remedy::offers(study, failure),
         }
     }
 

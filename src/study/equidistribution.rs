@@ -417,6 +417,11 @@ impl EquidistributionStudy {
         self.grid.cells[0] as u128 * BYTES_PER_CELL
     }
 
+    /// The remedy for an error in the keys of this study, with the value that each has now.
+    pub fn remedy(&self, error: &Error) -> Option<String> {
+        super::remedy::remedy(self, error)
+    }
+
     /// The study as a file, every default filled in.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a study is plain data")

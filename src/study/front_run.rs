@@ -307,7 +307,7 @@ impl StefanStudy {
         summary.seconds.output += output.elapsed().as_secs_f64();
         let note = |summary: &mut StefanSummary, failure: Option<&Error>, output: f64| {
             summary.status = status(failure).into();
-            summary.error = failure.map(Failed::from);
+            summary.error = failure.map(|error| Failed::of(error, self.remedy(error)));
             summary.seconds.output += output;
             [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         };

@@ -384,7 +384,7 @@ impl EquidistributionStudy {
         summary.seconds.output += output.elapsed().as_secs_f64();
         let note = |summary: &mut EquidistributionSummary, failure: Option<&Error>, output: f64| {
             summary.status = status(failure).into();
-            summary.failure = failure.map(Failed::from);
+            summary.failure = failure.map(|error| Failed::of(error, study.remedy(error)));
             summary.seconds.output += output;
             [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         };

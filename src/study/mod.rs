@@ -10,6 +10,7 @@ mod mapped;
 mod memory;
 mod moving_mesh;
 mod poisson;
+mod remedy;
 mod rest;
 mod run;
 mod source;
@@ -35,6 +36,7 @@ pub use poisson::{
     Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary,
     Sides, Solved, SolverKind, SolverTable, StencilReport,
 };
+pub use remedy::failures;
 pub use run::{Finished, compute, resume, run};
 pub use source::Source;
 pub use stefan::{

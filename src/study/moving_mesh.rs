@@ -555,22 +555,9 @@ impl MovingMesh {
         self.output.frames.clone().unwrap_or(FramesAt::Every(1))
     }
 
-    /// The remedy for an error, with the present value behind each key that it names.
+    /// The remedy for an error in the keys of this study, with the value that each has now.
     pub fn remedy(&self, error: &Error) -> Option<String> {
-        let table = toml::Table::try_from(self).ok()?;
-        let present = |key: &str| {
-            let (section, name) = key.split_once('.')?;
-            table.get(section)?.get(name).map(|value| format!("{key} (now {value})"))
-        };
-        let mut help = error.help()?;
-        if self.time.tolerance.is_some() {
-            help = help.replace("lower time.step", "lower time.tolerance or time.step");
-        }
-        let words = help.split(' ').map(|word| {
-            let key = word.trim_end_matches([',', ';']);
-            present(key).map_or(word.to_string(), |text| text + &word[key.len()..])
-        });
-        Some(words.collect::<Vec<_>>().join(" "))
+        super::remedy::remedy(self, error)
     }
 
     /// The study as a file, every default filled in.

@@ -296,6 +296,11 @@ impl PoissonStudy {
         self.grid.cells.iter().map(|&n| n as u128 + 1).product::<u128>() * BYTES_PER_NODE
     }
 
+    /// The remedy for an error in the keys of this study, with the value that each has now.
+    pub fn remedy(&self, error: &Error) -> Option<String> {
+        super::remedy::remedy(self, error)
+    }
+
     /// The study as a file, every default filled in.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a study is plain data")
@@ -465,7 +470,7 @@ impl PoissonStudy {
         };
         let note = |summary: &mut PoissonSummary, failure: Option<&Error>, output: f64| {
             summary.status = if failure.is_none() { "completed" } else { "failed" }.into();
-            summary.failure = failure.map(Failed::from);
+            summary.failure = failure.map(|error| Failed::of(error, self.remedy(error)));
             summary.seconds.output += output;
             [summary.seconds.wall, summary.seconds.cpu] = clock.elapsed();
         };

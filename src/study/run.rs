@@ -118,7 +118,7 @@ fn run_from(
 
     let note = |summary: &mut Summary, failure: Option<&Error>, output: f64| {
         summary.status = status(failure).into();
-        summary.error = failure.map(Failed::from);
+        summary.error = failure.map(|error| Failed::of(error, study.remedy(error)));
         summary.seconds.output += output;
         summary.seconds.wall += output;
     };

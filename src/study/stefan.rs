@@ -368,6 +368,11 @@ impl StefanStudy {
         across * (lower + upper) * BYTES_PER_NODE
     }
 
+    /// The remedy for an error in the keys of this study, with the value that each has now.
+    pub fn remedy(&self, error: &Error) -> Option<String> {
+        super::remedy::remedy(self, error)
+    }
+
     /// The study as a file, every default filled in.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a study is plain data")
@@ -500,7 +505,8 @@ impl StefanStudy {
         let table = toml::Table::try_from(self).unwrap_or_default();
         let present = key.split('.').try_fold(toml::Value::Table(table), |value, part| value.get(part).cloned());
         let value = present.map_or("not given".into(), |value| value.to_string());
-        Error::invalid(key, value, format!("{failure}; {}", failure.help_without_density()))
+        let help = self.remedy(&error).unwrap_or_default();
+        Error::invalid(key, value, format!("{failure}; {help}"))
     }
 
     /// Says so where an exact solution flows through sides that are insulated.

@@ -3,7 +3,7 @@
 use super::{LINEARISED, NONLINEAR, exactly, two, until};
 use crate::{Rerun, Table};
 use driftmesh::equidistribution::{Line, LineDensity, Method};
-use driftmesh::error::{Error, Failure, Moment, Result};
+use driftmesh::error::{Act, Error, Failure, Moment, Remedy, Result, Setting};
 use driftmesh::numerics::linear::tridiagonal;
 
 /// Burgers' equation u_t + (u²/2)_x = ν u_xx with the front u = 1/(1 + exp((x − x₀ − t/2)/(2ν))).
@@ -236,5 +236,6 @@ fn stepped(t: f64, old: &[f64], new: &[f64], u: &[f64]) -> Result<Vec<f64>, Fail
             return Ok(next);
         }
     }
-    Err(Failure::LineStalled { residual: f64::NAN, iterations: MOST_NEWTON, remedy: "lower the step" })
+    let remedies = vec![Remedy::any([Act::Lower(Setting::TimeStep)])];
+    Err(Failure::LineStalled { residual: f64::NAN, iterations: MOST_NEWTON, remedies })
 }
