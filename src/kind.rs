@@ -8,7 +8,7 @@
 macro_rules! kinds {
     ($(#[$attribute:meta])* $enum:ident { $($kind:literal = $type:ident: $line:literal),+ $(,)? }) => {
         $(#[$attribute])*
-        #[allow(clippy::large_enum_variant)] // one value a study
+        #[allow(clippy::large_enum_variant, clippy::enum_variant_names)] // one value a study, named after its table
         #[derive(Debug, Clone, serde::Deserialize)]
         pub enum $enum {
             $(
@@ -38,7 +38,7 @@ macro_rules! kinds {
             fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
                 #[derive(schemars::JsonSchema)]
                 #[schemars(tag = "kind")]
-                #[allow(dead_code, clippy::large_enum_variant)] // only its form is asked for
+                #[allow(dead_code, clippy::large_enum_variant, clippy::enum_variant_names)] // only its form is asked for
                 enum Tagged {
                     $(#[doc = $line] #[schemars(rename = $kind)] $type($type),)+
                 }
@@ -50,6 +50,7 @@ macro_rules! kinds {
             fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 #[derive(serde::Serialize)]
                 #[serde(tag = "kind")]
+                #[allow(clippy::enum_variant_names)] // named after its tables
                 enum Tagged<'a> {
                     $(#[serde(rename = $kind)] $type(&'a $type),)+
                 }

@@ -91,6 +91,7 @@ impl Door for Arguments {
             Setting::Generator if act == Act::Set(Setting::Generator, &[WHOLE]) => "`method`",
             Setting::Estimator => "the `estimator`",
             Setting::Samples => "the `walks` or `paths` of the estimator",
+            Setting::Substeps => "the `substeps` of the estimator",
             Setting::Exchanges => "the `iterations` of Schwarz(…)",
             Setting::Overlap => "the `overlap` of Schwarz(…)",
             Setting::Density => "the density",

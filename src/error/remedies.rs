@@ -112,6 +112,7 @@ impl Failure {
                     Lower(Setting::Strength),
                     Lower(Setting::TimeStep),
                     Raise(Setting::Relaxation),
+                    Raise(Setting::Substeps),
                 ]),
                 safe(),
             ],

@@ -50,6 +50,9 @@ pub enum Setting {
     /// Walks or paths from each point.
     #[strum(serialize = "the walks or paths of the estimator")]
     Samples,
+    /// Euler–Maruyama steps of a path within a time step.
+    #[strum(serialize = "the sub-steps of the paths")]
+    Substeps,
     /// Most iterations of overlapping subdomains in a step.
     #[strum(serialize = "the iterations of the generator")]
     Exchanges,

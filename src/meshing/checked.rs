@@ -39,8 +39,7 @@ pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
         for (axis, beyond) in lattice.beyond(k).into_iter().enumerate() {
             for end in (0..2).filter(|&end| beyond[end]) {
                 let off = (mesh.x()[k][axis] - ends[end][axis]).abs();
-                // NaN is off, too
-                if !(off <= ROUNDING * extent[axis]) {
+                if off.is_nan() || off > ROUNDING * extent[axis] {
                     let (node, x) = mesh.told(k);
                     return Err(Failure::NotABox { off, axis, node, x });
                 }

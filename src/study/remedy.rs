@@ -22,6 +22,7 @@ fn keys(setting: Setting) -> &'static [&'static str] {
         Setting::Generator => &["generator"],
         Setting::Estimator => &["generator.estimator"],
         Setting::Samples => &["generator.estimator.walks", "generator.estimator.paths"],
+        Setting::Substeps => &["generator.estimator.substeps"],
         Setting::Exchanges => &["generator.iterations"],
         Setting::Overlap => &["generator.overlap"],
         Setting::Density => &["density.value", "density.of"],
