@@ -3,9 +3,9 @@
 use driftmesh::geometry::{Lattice, Mesh, check_unfolded};
 use driftmesh::meshing::{MeshGenerator, Mmpde, Whole};
 
-/// ρ(x) = Π_d (1 + x_d) has the mesh of its factors: along each axis ∫(1 + x) = x + x²/2 is the same in all cells.
+/// ρ(x) = Π_d exp(x_d) has the mesh of its factors: along each axis ∫eˣ is the same in all cells.
 fn exact(xi: f64) -> f64 {
-    (1.0 + 3.0 * xi).sqrt() - 1.0
+    (1.0 + xi * (1.0_f64.exp() - 1.0)).ln()
 }
 
 /// The largest distance from that mesh, of the mesh at rest in ρ.
@@ -16,7 +16,7 @@ where
     let mut mesh = Mesh::uniform(Lattice::bounded([cells; D]).unwrap(), [0.0; D], [1.0; D]).unwrap();
     let mut whole = Whole::<D>::to(1e-9);
     for _ in 0..200 {
-        let rho: Vec<f64> = mesh.x().iter().map(|x| x.iter().map(|x| 1.0 + x).product()).collect();
+        let rho: Vec<f64> = mesh.x().iter().map(|x| x.iter().sum::<f64>().exp()).collect();
         let moved = whole.step(&Mmpde::default(), &mesh, &rho, 1.0).unwrap().mesh;
         let way = moved.farthest(&mesh);
         mesh = moved;

@@ -384,6 +384,7 @@ impl Observer for Pair {
 fn every_study_is_tested() {
     let tested = concat!(
         include_str!("studies.rs"),
+        include_str!("dam_break.rs"),
         include_str!("laplacian.rs"),
         include_str!("stefan.rs"),
         include_str!("equidistribution.rs")
