@@ -243,7 +243,7 @@ def test_schwarz_contracts_as_theory_says():
 def test_what_does_not_converge_is_an_error_with_its_history():
     with pytest.raises(NotConverged, match="not converged") as error:
         schwarz("300*(x - 0.5)^2 + 1", 100, overlap=(0.48, 0.52), linearized=True, iterations=300, tolerance=1e-8)
-    assert "set linearized to false" in str(error.value)
+    assert "set `linearized` to False" in str(error.value)
     assert error.value.result.iterations == 300 and error.value.result.error[-100:].min() > 0.03
 
 
