@@ -81,6 +81,35 @@ fn what_hides_between_the_nodes_is_told() {
     }
 }
 
+/// A blob far from a layer, where the cells of the adapted mesh are many times as wide as it is; a disk whose edge is all that
+/// nodes miss is seen. What follows u alone is not told to follow it.
+#[test]
+fn what_is_smaller_than_any_part_of_a_wide_cell_is_told() {
+    let at_start = |u: &str| {
+        let pde = format!(
+            "kind = \"formula\"\nunknowns = [\"u\"]\ndiffusivity = {{ u = \"1e-3\" }}\ninitial = {{ u = \"{u}\" }}\n\
+             boundary = {{ u = \"no-flux\" }}"
+        );
+        doubts(&study("start = 0\nend = 0.1", &pde, ""))
+    };
+    let said = at_start("tanh((x-0.7)/0.01) + exp(-((x-0.2125)^2+(y-0.7125)^2)/4e-5)");
+    assert!(
+        said.iter().any(|said| said.contains("the mesh does not see that; refine `grid.cells`, or make")),
+        "{said:?}"
+    );
+    let said = at_start("if((x-0.3)^2+(y-0.3)^2 < 0.04, 1, 0)");
+    assert!(!said.iter().any(|said| said.contains("does not see")), "{said:?}");
+}
+
+/// What is followed may be said of the default monitor without its name.
+#[test]
+fn what_the_mesh_follows_needs_no_kind() {
+    let pde = "kind = \"burgers\"\nviscosity = 0.01";
+    let short = study("start = 0.25\nend = 0.5", pde, "[monitor]\nof = \"u^2\"");
+    let long = study("start = 0.25\nend = 0.5", pde, "[monitor]\nkind = \"auto\"\nof = \"u^2\"");
+    assert_eq!(short.to_toml(), long.to_toml());
+}
+
 /// Data that go up and down from node to node are noise; a front or a ridge of one node is none.
 #[test]
 fn noise_is_named() {

@@ -346,7 +346,7 @@ impl Chain<'_> {
             iterations,
             remedies: vec![self.unstalling(step.is_some())],
         };
-        let most = if free { MAX_NEWTON / 2 } else { MAX_NEWTON };
+        let most = if free { MAX_NEWTON / 4 } else { MAX_NEWTON };
         for solves in 1..=most {
             let change = tridiagonal(&rows, &residual);
             let largest = change.iter().fold(0.0, |m: f64, c| m.max(c.abs()));

@@ -176,13 +176,13 @@ impl Cumulative {
             return b + (g - self.whole) / self.at(b)[1];
         }
         let piece = &self.pieces[self.pieces.partition_point(|piece| piece.below <= g).max(1) - 1];
-        piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + piece.inverted(g, -1.0))
+        piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + piece.inverted(g, -1.0, None)[0])
     }
 
     /// Where G is as large as each of some values that grow.
     pub fn inverted(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut k = 0;
-        let mut s = -1.0;
+        let (mut s, mut near) = (-1.0, None);
         let [a, b] = self.ends();
         let place = |g: f64| {
             if g < 0.0 {
@@ -192,10 +192,13 @@ impl Cumulative {
                 return b + (g - self.whole) / self.at(b)[1];
             }
             while k + 1 < self.pieces.len() && g >= self.pieces[k + 1].below {
-                (k, s) = (k + 1, -1.0);
+                (k, s, near) = (k + 1, -1.0, None);
             }
             let piece = &self.pieces[k];
-            s = piece.inverted(g, s);
+            // from where the last value was, as far as M there leads
+            let guess = near.map(|(before, slope)| s + (g - before) / slope);
+            let [found, slope] = piece.inverted(g, s, guess);
+            (s, near) = (found, Some((g, slope)));
             piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + s)
         };
         values.map(place).collect()
@@ -248,24 +251,27 @@ impl Piece {
         (Self { lower, upper, below: 0.0, integral, coefficients }, Tail { size, rounding })
     }
 
-    /// s where G is `g`, at or beyond `from`.
-    fn inverted(&self, g: f64, from: f64) -> f64 {
+    /// s where G is `g`, at or beyond `from`, and dG/ds there; the search begins at a guess.
+    fn inverted(&self, g: f64, from: f64, guess: Option<f64>) -> [f64; 2] {
         let half = 0.5 * (self.upper - self.lower);
         let wanted = (g - self.below) / half;
         let (mut low, mut high) = (from, 1.0_f64);
-        let mut s = (2.0 * (g - self.below) / self.integral - 1.0).clamp(low, high);
+        let mut s =
+            guess.filter(|s| s.is_finite()).unwrap_or(2.0 * (g - self.below) / self.integral - 1.0).clamp(low, high);
+        let mut slope = 0.0;
         for _ in 0..MOST_NEWTON {
-            let [value, slope] = clenshaw(&self.coefficients, s);
+            let value;
+            [value, slope] = clenshaw(&self.coefficients, s);
             let off = value - wanted;
             *(if off > 0.0 { &mut high } else { &mut low }) = s;
             let newton = s - off / slope;
             // where the step is lost in rounding, so is what is off
             if (newton - s).abs() <= f64::EPSILON || high - low <= f64::EPSILON {
-                return newton.clamp(low, high);
+                return [newton.clamp(low, high), half * slope];
             }
             s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         }
-        s
+        [s, half * slope]
     }
 }
 

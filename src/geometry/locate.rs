@@ -36,6 +36,18 @@ pub fn interpolate(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
         .collect()
 }
 
+/// The cell of a mesh, by its lowest corner, that holds each of some points; neighbours among them cost a few tests each.
+pub(crate) fn cells_of(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -> Vec<[usize; 2]> {
+    let cells = Cells { mesh };
+    let mut near = [0; 2];
+    let cell = |point| {
+        let (nodes, _) = cells.find(point, near.map(|i: usize| i as isize));
+        near = mesh.lattice().node(nodes[0]);
+        near
+    };
+    points.map(cell).collect()
+}
+
 /// Cells by signed index: on a periodic axis the cells continue beyond the box.
 struct Cells<'a> {
     mesh: &'a Mesh<2>,

@@ -18,6 +18,7 @@ pub(crate) use field::largest;
 pub use folded::check_unfolded;
 pub use lattice::Lattice;
 pub(crate) use lattice::strides;
+pub(crate) use locate::cells_of;
 pub use locate::interpolate;
 pub use mesh::Mesh;
 pub(crate) use nodal::{check_length, check_positive};

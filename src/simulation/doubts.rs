@@ -2,7 +2,7 @@
 
 use super::{Simulation, State};
 use crate::density::{NOISE_WORTH_A_WARNING, noise};
-use crate::geometry::{Field, Lattice, Mesh, node_areas};
+use crate::geometry::{Field, Lattice, Mesh, cells_of, node_areas};
 use crate::numerics::{larger, sum};
 
 /// Share of the content of an unknown whose loss is told.
@@ -42,7 +42,7 @@ fn missed(simulation: &Simulation, state: &State) -> Vec<String> {
     let Some(finer) = (2..=FINER).rev().step_by(2).find(|f| f * f * nodes <= MOST_NODES) else { return Vec::new() };
     let names = simulation.physics.unknowns();
     let lost = References::new(simulation, state, finer);
-    let lost = names.iter().enumerate().map(|(c, name)| lost.as_ref()?.lost(state, c, name));
+    let lost = names.iter().enumerate().map(|(c, name)| lost.as_ref()?.lost(simulation, state, c, name));
     let hidden = hidden(simulation, state, finer).into_iter().chain(std::iter::repeat(None));
     lost.zip(hidden).filter_map(|(lost, hidden)| lost.or(hidden)).collect()
 }
@@ -61,7 +61,8 @@ impl References {
 
     /// The content of an unknown is ∫|u − m|, m its median over the domain. Where it on the finer cells and on the coarser
     /// ones differ as much as it and that of the mesh do, nothing is known.
-    fn lost(&self, state: &State, c: usize, name: &str) -> Option<String> {
+    fn lost(&self, simulation: &Simulation, state: &State, c: usize, name: &str) -> Option<String> {
+        let nodal: Vec<f64> = state.u.component(c).collect();
         let values: Vec<f64> = self.finer.1.component(c).collect();
         let size = values.iter().fold(0.0, |m, u| larger(m, *u)) * of_box(&state.mesh);
         let median = median(values);
@@ -74,48 +75,87 @@ impl References {
         (off > LOSS * there && there > ROUNDING * size && (there - twice).abs() < 0.5 * off).then(|| {
             format!(
                 "`{name}`: the mesh at the start holds {} % of what its initial data hold (∫|{name} − m|, m its median): what \
-                 lies between its nodes is {}; refine `grid.cells`, or let the mesh follow it by `monitor.of`",
+                 lies between its nodes is {}; {}",
                 (1000.0 * seen / there).round() / 10.0,
-                if seen < there { "missed" } else { "taken for more than it is" }
+                if seen < there { "missed" } else { "taken for more than it is" },
+                remedy(simulation, state, &nodal)
             )
         })
     }
 }
 
-/// What is small and lies between the nodes: a value within a cell that is far outside of those at its corners.
+/// What is small and lies between the nodes: a value within a cell that is far outside of those at the nodes around it. It
+/// is looked for within every cell, and on equal cells, since a blob may be smaller than what divides a wide cell.
 fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<String>> {
-    let mesh = &state.mesh;
-    let cells = mesh.lattice().cells();
+    let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
+    let cells = lattice.cells();
     let Ok(within) = mesh.resampled(cells.map(|n| finer * n)) else { return Vec::new() };
-    let data = simulation.physics.initial(state.t, &within);
+    let own = |k: usize| {
+        let node = within.lattice().node(k);
+        std::array::from_fn(|d| (node[d] / finer).min(cells[d] - 1))
+    };
+    let mut looked = vec![(simulation.physics.initial(state.t, &within), (0..within.x().len()).map(own).collect())];
+    let mut places = vec![within];
+    if let Some((equal, data)) = initial_on_equal_cells(simulation, state, finer) {
+        looked.push((data, cells_of(mesh, equal.x().iter().copied())));
+        places.push(equal);
+    }
     let names = simulation.physics.unknowns();
     let told = names.iter().enumerate().map(|(c, name)| {
-        let values: Vec<f64> = data.component(c).collect();
-        let [low, high] = ends(values.iter().copied());
         let nodal: Vec<f64> = state.u.component(c).collect();
-        let corners = mesh.lattice().closed(&nodal);
-        let bounds = |k: usize| {
-            let [i, j] = within.lattice().node(k).map(|i| i / finer);
-            let [i, j] = [i.min(cells[0] - 1), j.min(cells[1] - 1)];
-            let [lower, upper] = [i, i + 1].map(|i| i * (cells[1] + 1) + j);
-            ends([lower, lower + 1, upper, upper + 1].map(|k| corners[k]).into_iter())
-        };
-        let beyond = |k: usize| {
-            let [least, most] = bounds(k);
-            (least - values[k]).max(values[k] - most)
-        };
-        let k = (0..values.len()).max_by(|a, b| beyond(*a).total_cmp(&beyond(*b)))?;
-        (beyond(k) > HIDDEN * (high - low)).then(|| {
-            let ([x, y], [least, most]) = (within.image(within.x()[k]), bounds(k));
+        let [low, high] = ends(looked[0].0.component(c).chain(nodal.iter().copied()));
+        let worst = looked.iter().zip(&places).map(|((data, cells), places)| worst(lattice, &nodal, data, c, cells, places));
+        let (off, x, value, [least, most]) = worst.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let [x, y] = mesh.image(x);
+        (off > HIDDEN * (high - low)).then(|| {
             format!(
-                "`{name}`: within a cell of the mesh at the start, at x = {x:.6}, y = {y:.6}, its initial data are {:.3e}, and \
-                 {least:.3e} to {most:.3e} at its corners: too small for this mesh to see; refine `grid.cells`, or let the mesh \
-                 follow it by `monitor.of`",
-                values[k]
+                "`{name}`: between the nodes of the mesh at the start, at x = {x:.6}, y = {y:.6}, its initial data are {value:.3e}, \
+                 and {least:.3e} to {most:.3e} at the nodes around: the mesh does not see that; {}",
+                remedy(simulation, state, &nodal)
             )
         })
     });
     told.collect()
+}
+
+/// The value of some data that is farthest beyond those at the nodes around its cell: by how much, where, and what both are.
+fn worst(
+    lattice: &Lattice<2>,
+    nodal: &[f64],
+    data: &Field,
+    c: usize,
+    cells: &[[usize; 2]],
+    places: &Mesh<2>,
+) -> (f64, [f64; 2], f64, [f64; 2]) {
+    let mut worst = (f64::NEG_INFINITY, [0.0; 2], 0.0, [0.0; 2]);
+    for ((value, &cell), &x) in data.component(c).zip(cells).zip(places.x()) {
+        let around @ [least, most] = around(lattice, nodal, cell);
+        let off = (least - value).max(value - most);
+        if off > worst.0 {
+            worst = (off, x, value, around);
+        }
+    }
+    worst
+}
+
+/// The least and the largest value at the corners of a cell and the nodes next to them.
+fn around(lattice: &Lattice<2>, nodal: &[f64], cell: [usize; 2]) -> [f64; 2] {
+    let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
+    let place = |d: usize, step: usize| match periodic[d] {
+        true => (cell[d] + nodes[d] + step - 1) % nodes[d],
+        false => (cell[d] + step).saturating_sub(1).min(nodes[d] - 1),
+    };
+    let all = (0..4).flat_map(|i| (0..4).map(move |j| [i, j]));
+    ends(all.map(|[i, j]| nodal[lattice.index([place(0, i), place(1, j)])]))
+}
+
+/// What makes a mesh see an unknown at the start.
+fn remedy(simulation: &Simulation, state: &State, nodal: &[f64]) -> &'static str {
+    let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u);
+    match followed.is_ok_and(|followed| followed == nodal) {
+        true => "refine `grid.cells`, or make it wider",
+        false => "refine `grid.cells`, or let the mesh follow it by `monitor.of`",
+    }
 }
 
 /// The least and the largest.

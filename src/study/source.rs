@@ -210,6 +210,13 @@ impl Source {
     fn name_kind(&self, root: &mut DeTable<'_>, path: &str) -> Result<()> {
         let Some((name, value)) = entry(root, path) else { return Ok(()) };
         let DeValue::Table(table) = value.get_mut() else { return Ok(()) };
+        // what the mesh follows may be said of the default alone
+        if path == "monitor" && table.keys().all(|key| key.get_ref() == "of") {
+            table.insert(
+                Spanned::new(name.clone(), "kind".into()),
+                Spanned::new(name.clone(), DeValue::String("auto".into())),
+            );
+        }
         let Some((_, kind)) = table.remove_entry("kind") else {
             let help = format!("add kind = \"…\"; `driftmesh list` shows the kinds of {path}");
             return Err(self.diagnostic(&format!("`{path}` does not say its kind"), name, Some(help)));
