@@ -56,7 +56,7 @@ impl InterfaceStep {
     /// Where the run up to there fails.
     pub fn case_a(cells: usize) -> Result<Self> {
         let dt = 1e-3;
-        let monitor = Arclength { strength: Strength::Relative(10.0), smoothing: 0, ..Arclength::default() };
+        let monitor = Arclength { strength: Strength::Relative(10.0), smoothing: 0 };
         let mut simulation = Simulation {
             physics: Box::new(Burgers::new(0.005, Convection::Advective)?),
             monitor: Box::new(monitor),
