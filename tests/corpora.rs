@@ -16,6 +16,11 @@ fn formulas() {
 }
 
 #[test]
+fn lines() {
+    replay("fuzz/corpus/equidistribution", targets::equidistribution);
+}
+
+#[test]
 fn checkpoints() {
     replay("fuzz/corpus/checkpoint", targets::checkpoint);
 }
