@@ -39,7 +39,7 @@
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
 //! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`equidistribution`], [`laplacian`], [`meshing`] and
-//! [`physics`], then [`mover`] and [`stefan`], then [`simulation`], then [`report`], then [`study`].
+//! [`physics`], then [`mover`] and [`stefan`], then [`simulation`], [`output`], [`report`] and [`study`].
 
 // What only studies and their checkpoints use is dead code in a library without them.
 #![cfg_attr(not(feature = "studies"), allow(dead_code, unused_imports))]
