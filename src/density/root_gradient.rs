@@ -1,6 +1,6 @@
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
-use crate::geometry::{Mesh, check_length};
+use crate::geometry::{Lattice, Mesh, check_length};
 use crate::numerics::{larger, sum};
 
 /// The root of the slope, over its mean: no number to set
@@ -18,7 +18,8 @@ use crate::numerics::{larger, sum};
 /// where u changes by more than a quarter of its range over one somewhere. The largest ρ over the smallest is at most 10⁶.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a twentieth of
-/// the domain. Their cost does not depend on their number. Where u is constant, ρ = 1.
+/// the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their cost does not
+/// depend on their number. Where u is constant, ρ = 1.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RootGradient {}
 
@@ -32,6 +33,9 @@ const UNRESOLVED: f64 = 0.25;
 const CONTRAST: f64 = 1e6;
 /// Passes of the filter on 41 × 41 nodes.
 const PASSES: f64 = 8.0;
+/// So many layers on a line are smoothed as one is. Were two of them smoothed less, on periodic axes or where a front winds
+/// across the lines, a mesh of 40 cells would not come to rest around layers thinner than a hundredth of the box.
+const FEW: f64 = 2.0;
 /// Differences of u below this share of its size are rounding.
 const ROUNDING: f64 = 1e-10;
 
@@ -39,63 +43,30 @@ impl Monitor for RootGradient {
     fn density(&self, mesh: &Mesh<2>, u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
         let lattice = mesh.lattice();
         check_length(lattice, "what the mesh follows", u.len())?;
-        let ([n, m], periodic) = (lattice.cells(), lattice.periodic());
-        let (x, values) = (mesh.closed(), lattice.closed(u));
-        let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
-        // slopes of u over its range, so that squares of no unit overflow
+        let even = || Ok(vec![1.0; lattice.len()]);
+        let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
         let (range, size) = (high - low, high.max(-low));
-        let unit = if range > 0.0 { range } else { 1.0 };
-        let h = [0, 1].map(|d| mesh.extent()[d] / lattice.cells()[d] as f64);
-        let cells = || (0..n).flat_map(|i| i * (m + 1)..i * (m + 1) + m);
-        // the four corners of a cell and its diagonals
-        let corners = |k: usize| [k, k + m + 2, k + 1, k + m + 1];
-        let diagonals = |[a, c, b, d]: [usize; 4]| (minus(x[c], x[a]), minus(x[b], x[d]));
-        let twice_area = |([px, py], [qx, qy]): ([f64; 2], [f64; 2])| px * qy - py * qx;
-        let mut rho = Vec::with_capacity(n * m);
-        let mut steepest = 0.0;
-        let domain = mesh.extent()[0] * mesh.extent()[1];
-        let background = sum(cells().map(|k| {
-            let corners @ [a, c, b, d] = corners(k);
-            let diagonals = diagonals(corners);
-            let ([px, py], [qx, qy]) = diagonals;
-            let (p, q) = ((values[c] - values[a]) / unit, (values[b] - values[d]) / unit);
-            let twice = twice_area(diagonals);
-            let (gx, gy) = (h[0] * (p * qy - q * py), h[1] * (q * px - p * qx));
-            let slope = (gx * gx + gy * gy).sqrt() / twice;
-            steepest = larger(steepest, slope);
-            let root = slope.sqrt();
-            rho.push(root);
-            0.5 * twice * root.sqrt().sqrt()
-        }));
-        let background = (background / domain).powi(4);
-        let excess = |root: f64| (root - background).max(0.0);
-        let areas = cells().map(|k| 0.5 * twice_area(diagonals(corners(k))));
-        let mean = sum(rho.iter().zip(areas).map(|(root, area)| excess(*root) * area)) / domain;
-        // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
-        let mean = mean.max(BETA * excess(steepest.sqrt()) / CONTRAST);
-        if mean <= ROUNDING * background || steepest * unit * n.max(m) as f64 <= ROUNDING * size {
-            return Ok(vec![1.0; lattice.len()]);
+        let Roots { mut roots, background, mean, steepest } = Roots::of(mesh, u, range);
+        let longest = lattice.cells().into_iter().max().unwrap_or(1) as f64;
+        if mean <= ROUNDING * background || steepest * range * longest <= ROUNDING * size {
+            return even();
         }
         let beta = BETA * need(steepest);
-        rho.iter_mut().for_each(|root| *root = 1.0 + beta * excess(*root) / mean);
-        // from cells to nodes and back is a pass
-        let passes = [n, m].map(|n| ((PASSES * ((n + 1) as f64 / 41.0).powi(2)).round() - 1.0).max(0.0));
-        smooth_widely([n, m], periodic, &mut rho, passes);
-        // the cells on both sides of node i along an axis of n cells
-        let beside = |i: usize, n: usize, wraps: bool| match i {
-            0 if wraps => [n - 1, 0],
-            0 => [0, 0],
-            i if i == n => [n - 1, n - 1],
-            i => [i - 1, i],
-        };
-        let [rows, columns] = lattice.nodes();
-        let columns: Vec<[usize; 2]> = (0..columns).map(|j| beside(j, m, periodic[1])).collect();
-        let mut nodal = Vec::with_capacity(lattice.len());
-        for i in 0..rows {
-            let [below, above] = beside(i, n, periodic[0]).map(|i| &rho[i * m..(i + 1) * m]);
-            let means = columns.iter().map(|&[c, d]| 0.25 * ((below[c] + above[d]) + (below[d] + above[c])));
-            nodal.extend(means);
+        if beta == 0.0 {
+            return even();
         }
+        // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
+        let mean = mean.max(BETA * (steepest.sqrt() - background) / CONTRAST);
+        roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
+        let mut rho = roots;
+        let (cells, layers) = (lattice.cells(), layers(lattice, &rho));
+        let passes = [0, 1].map(|d| {
+            let passes = (PASSES * ((cells[d] + 1) as f64 / 41.0).powi(2)).round() * (FEW / layers[d].max(FEW)).powi(2);
+            // from cells to nodes is one of them
+            (passes - 1.0).max(0.0)
+        });
+        smooth_widely(cells, lattice.periodic(), &mut rho, passes);
+        let nodal = at_nodes(lattice, &rho);
         match nodal.iter().position(|rho| !rho.is_finite()) {
             None => Ok(nodal),
             Some(k) => Err(Failure::NonFinite {
@@ -114,6 +85,91 @@ pub(crate) fn need(share: f64) -> f64 {
     s * s * (3.0 - 2.0 * s)
 }
 
+/// √|∇u| of the cells of a mesh, u in units of its range so that squares of no unit overflow.
+struct Roots {
+    /// One a cell, last axis fastest.
+    roots: Vec<f64>,
+    /// ⟨|∇u|^⅛⟩⁴.
+    background: f64,
+    /// Of what exceeds the background.
+    mean: f64,
+    /// The largest |∇u|.
+    steepest: f64,
+}
+
+impl Roots {
+    fn of(mesh: &Mesh<2>, u: &[f64], range: f64) -> Self {
+        let lattice = mesh.lattice();
+        let ([n, m], x, values) = (lattice.cells(), mesh.closed(), lattice.closed(u));
+        let unit = if range > 0.0 { range } else { 1.0 };
+        let [width, height] = mesh.extent();
+        let h = [width / n as f64, height / m as f64];
+        let cells = || (0..n).flat_map(|i| i * (m + 1)..i * (m + 1) + m);
+        // both diagonals of a cell, and twice its area
+        let diagonals = |k: usize| (minus(x[k + m + 2], x[k]), minus(x[k + 1], x[k + m + 1]));
+        let twice_area = |([px, py], [qx, qy]): ([f64; 2], [f64; 2])| px * qy - py * qx;
+        let mut roots = Vec::with_capacity(n * m);
+        let mut steepest = 0.0;
+        let background = sum(cells().map(|k| {
+            let diagonals = diagonals(k);
+            let ([px, py], [qx, qy]) = diagonals;
+            let (p, q) = ((values[k + m + 2] - values[k]) / unit, (values[k + 1] - values[k + m + 1]) / unit);
+            let twice = twice_area(diagonals);
+            let (gx, gy) = (h[0] * (p * qy - q * py), h[1] * (q * px - p * qx));
+            let slope = (gx * gx + gy * gy).sqrt() / twice;
+            steepest = larger(steepest, slope);
+            let root = slope.sqrt();
+            roots.push(root);
+            0.5 * twice * root.sqrt().sqrt()
+        }));
+        let background = (background / (width * height)).powi(4);
+        let areas = cells().map(|k| 0.5 * twice_area(diagonals(k)));
+        let above = sum(roots.iter().zip(areas).map(|(root, area)| (root - background).max(0.0) * area));
+        Self { roots, background, mean: above / (width * height), steepest }
+    }
+}
+
+/// How many layers the lattice lines along each axis meet: half of all that ρ, given by the cell, rises and falls along them
+/// over the sum of the largest ρ − 1 of each line, so that the lines through the strongest layers count most.
+fn layers(lattice: &Lattice<2>, rho: &[f64]) -> [f64; 2] {
+    let ([n, m], [wraps, wraps_across]) = (lattice.cells(), lattice.periodic());
+    // length and stride of the lines, how many there are, and the stride between them
+    [(n, m, m, 1, wraps), (m, 1, n, m, wraps_across)].map(|(length, stride, lines, across, wraps)| {
+        let (mut changes, mut highest) = (0.0, 0.0);
+        for line in 0..lines {
+            let at = |i: usize| rho[line * across + i * stride];
+            let (mut last, mut most) = (at(if wraps { length - 1 } else { 0 }), 1.0);
+            for i in 0..length {
+                changes += (at(i) - last).abs();
+                last = at(i);
+                most = f64::max(most, last);
+            }
+            highest += most - 1.0;
+        }
+        if highest > 0.0 { 0.5 * changes / highest } else { 0.0 }
+    })
+}
+
+/// The means of the cells around each node; beyond bounded sides stand the cells beside them again.
+fn at_nodes(lattice: &Lattice<2>, rho: &[f64]) -> Vec<f64> {
+    let ([n, m], [rows, columns], periodic) = (lattice.cells(), lattice.nodes(), lattice.periodic());
+    // the cells on both sides of node i along an axis of n cells
+    let beside = |i: usize, n: usize, wraps: bool| match i {
+        0 if wraps => [n - 1, 0],
+        0 => [0, 0],
+        i if i == n => [n - 1, n - 1],
+        i => [i - 1, i],
+    };
+    let columns: Vec<[usize; 2]> = (0..columns).map(|j| beside(j, m, periodic[1])).collect();
+    let mut nodal = Vec::with_capacity(lattice.len());
+    for i in 0..rows {
+        let [below, above] = beside(i, n, periodic[0]).map(|i| &rho[i * m..(i + 1) * m]);
+        let means = columns.iter().map(|&[c, d]| 0.25 * ((below[c] + above[d]) + (below[d] + above[c])));
+        nodal.extend(means);
+    }
+    nodal
+}
+
 fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
@@ -121,7 +177,7 @@ fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Lattice;
+    use std::f64::consts::PI;
 
     /// Equal cells that resolve u have an even density; ten times thinner, the layer has most of it.
     #[test]
@@ -155,6 +211,21 @@ mod tests {
             let u: Vec<f64> = (0..mesh.x().len()).map(|k| 3.0 + noise * (k % 3) as f64).collect();
             assert_eq!(RootGradient::default().density(&mesh, &u, None).unwrap(), vec![1.0; mesh.x().len()]);
         }
+    }
+
+    /// Eight fronts in a row are as thick after smoothing, as shares of what each has, as two are, and each has as much of ρ.
+    #[test]
+    fn each_of_many_layers_has_its_share() {
+        let contrast = |fronts: f64| {
+            let cells = [20 * fronts as usize, 2];
+            let mesh = Mesh::uniform(Lattice::new(cells, [true, false]).unwrap(), [0.0; 2], [fronts, 1.0]).unwrap();
+            let u: Vec<f64> = mesh.x().iter().map(|x| (50.0 * (PI * (x[0] + 0.2)).sin()).tanh()).collect();
+            let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
+            let [low, high] = rho.iter().fold([f64::INFINITY, 0.0], |[l, h], rho| [l.min(*rho), h.max(*rho)]);
+            high / low
+        };
+        let (few, many) = (contrast(2.0), contrast(8.0));
+        assert!((many / few - 1.0).abs() < 0.2, "{many} against {few}");
     }
 
     /// ∇u is exact for linear u on any cells, and so ρ is even, whatever the unit of u is.

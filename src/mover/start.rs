@@ -29,8 +29,9 @@ pub enum Ending {
 const MOST_STEPS: usize = 500;
 /// A mesh with more cells along an axis starts from one with half as many.
 const COARSE: usize = 100;
-/// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there.
-const HALF: f64 = 0.5;
+/// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there: a layer
+/// that the mesh resolves changes by less over each of its edges, however thin it is.
+const JUMP: f64 = 0.2;
 const THIN: f64 = 1e-3;
 /// Motion in one step, as a share of the shortest edge, below which a mesh stands still.
 const AT_REST: f64 = 4e-3;
@@ -38,8 +39,8 @@ const AT_REST: f64 = 4e-3;
 /// The mesh that rests on a density, from a given mesh
 ///
 /// Steps of a [`Mover`], each with the density at the nodes that the last one led to, until no node moves by more than a
-/// small share of the shortest edge, or until one edge, a thousandth of a uniform cell, still holds half of all that u
-/// changes: data that jump would draw all nodes together without end.
+/// small share of the shortest edge, or until one edge, a thousandth of a uniform cell, still holds a fifth of all that
+/// u changes: data that jump would draw all nodes together without end.
 ///
 /// # Errors
 /// What `followed` returns, which gives u and the density of a mesh.
@@ -100,7 +101,7 @@ fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start>
     Ok(Start { mesh, end: Ending::Restless, steps: gait.steps() })
 }
 
-/// True where an edge that is much shorter than a uniform cell holds half of the range of u.
+/// True where an edge that is much shorter than a uniform cell holds a fifth of the range of u.
 fn jumps(mesh: &Mesh<2>, u: &[f64]) -> bool {
     let lattice = mesh.lattice();
     let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());
@@ -111,7 +112,7 @@ fn jumps(mesh: &Mesh<2>, u: &[f64]) -> bool {
         let rows = (0..x.len()).filter(|k| if d == 0 { k / strides[0] < cells[0] } else { k % strides[0] < cells[1] });
         rows.map(|k| (k, k + strides[d])).any(|(a, b)| {
             let way = (0..2).map(|c| ((x[b][c] - x[a][c]) / size[c]).powi(2)).sum::<f64>().sqrt();
-            (u[b] - u[a]).abs() > HALF * (high - low) && way < THIN
+            (u[b] - u[a]).abs() > JUMP * (high - low) && way < THIN
         })
     })
 }
