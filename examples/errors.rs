@@ -7,16 +7,17 @@ use driftmesh::study::failures;
 const HEAD: &str = "\
 # How a run may fail
 
-A run that cannot go on ends with exit status 1 and one of the names below: on the terminal with the time, the step and the
-place, in `summary.json` as `error.kind` (`failure.kind` of `poisson` and `equidistribution`), with `\"status\": \"failed\"`.
-Everything up to the last good state is kept. In Python the same name is a class of `driftmesh.errors`, `mesh-folded` being `MeshFolded`. `driftmesh list errors` prints the list.
+A run that cannot go on ends with exit status 1 and one of the names below: on the terminal with the time, the step and
+the place, in `summary.json` as `error.kind` (`failure.kind` of `poisson` and `equidistribution`), with `\"status\":
+\"failed\"`. Everything up to the last good state is kept. In Python the same name is a class of `driftmesh.errors`,
+`mesh-folded` being `MeshFolded`. `driftmesh list errors` prints the list.
 
-What is asked for wrongly, a key, a formula, a directory that is not ours, ends with exit status 2 before anything is
-written, and is shown where it stands. A run that was told to end has `\"status\": \"interrupted\"`, one whose disk is full
-names the file that could not be written.
+A mistake in what was asked for (an unknown key, a formula that cannot be read, a directory that is no run) ends with
+exit status 2 before anything is written, and is shown where it stands. A run that was told to end has `\"status\":
+\"interrupted\"`. One whose disk is full names the file that could not be written.
 
-A run says what helps in the keys of its own study: those that it has and takes, with the value that each has now. The last
-column has those of all studies.
+A run says what helps in the keys of its own study: those that it has and takes, with the value that each has now. The
+last column has those of all studies.
 
 | name | what happened | what helps |
 |---|---|---|

@@ -1,5 +1,5 @@
-//! Elementary functions of our own: branch-free, so that the compiler can take several at once, and the same bits on every
-//! machine, which the functions of its library have not.
+//! Elementary functions of our own: branch-free, so that the compiler can take several at once, and the same bits on
+//! every machine, which the functions of its library have not.
 
 /// e^x of any number, to two units in the last place.
 #[inline(always)]

@@ -8,8 +8,8 @@ use crate::numerics::linear::tridiagonal;
 /// φ(x) = M y_ξ at the cut,   (τ/Δt)(y − y_old) = (M y_ξ)_ξ beyond it,   y = x at the cut, y given at the other end
 /// ```
 ///
-/// Without time φ is ∫M over the rest by its length, (4.3) of the source. With time no integral is left: φ costs a solve of the
-/// rest, and its derivative a linear one more.
+/// Without time φ is ∫M over the rest by its length, (4.3) of the source. With time no integral is left: φ costs a
+/// solve of the rest, and its derivative a linear one more.
 ///
 /// # Source
 /// M. J. Gander and R. D. Haynes (2012), who leave the extension of section 4 to section 7 to the future.

@@ -77,8 +77,8 @@ pub(super) struct Chain<'a> {
     pub cumulative: Option<&'a Cumulative>,
 }
 
-/// Steps of Newton's method on a piece between given nodes. With conditions on the flux, where many pieces have no discrete
-/// solution near their iterates, a quarter of them: of 2000 random lines as many converge with it.
+/// Steps of Newton's method on a piece between given nodes. With conditions on the flux, where many pieces have no
+/// discrete solution near their iterates, a quarter of them: of 2000 random lines as many converge with it.
 const MAX_NEWTON: usize = 200;
 const MAX_BISECTIONS: usize = 400;
 const HALVINGS: i32 = 40;
@@ -91,8 +91,8 @@ enum Way {
     Curved,
 }
 
-/// The whole step; shorter and shorter ones along the path of even ∫M; then straight ones. With nodes in order or, where
-/// they are free, after few tries in any.
+/// The whole step; shorter and shorter ones along the path of even ∫M; then straight ones. With nodes in order or,
+/// where they are free, after few tries in any.
 fn ways(free: bool) -> impl Iterator<Item = (bool, Way, f64)> {
     let halved = |ordered: bool, way: Way, halvings: std::ops::Range<i32>| {
         halvings.map(move |n| (ordered, way, 0.5_f64.powi(n)))
@@ -148,15 +148,15 @@ impl Chain<'_> {
         }
     }
 
-    /// The nodes of a piece where M is averaged exactly: all cells then have the same ∫M, and the ends are where the laws there
-    /// let the flux F be what it is. With G = ∫M from the beginning of the line, and n cells,
+    /// The nodes of a piece where M is averaged exactly: all cells then have the same ∫M, and the ends are where the
+    /// laws there let the flux F be what it is. With G = ∫M from the beginning of the line, and n cells,
     ///
     /// ```text
     /// G_right(F) − G_left(F) = n h F,   G_end(F) = G(x) at a given node,   G(to) − length (F − g),   G((F − g)/slope)
     /// ```
     ///
-    /// by what the law is. The left side falls with F, so that there is one solution. None where ∫M is not known, or a law is
-    /// none of these.
+    /// by what the law is. The left side falls with F, so that there is one solution. None where ∫M is not known, or a
+    /// law is none of these.
     fn even(&self, guess: &[f64], ends: [End<'_>; 2]) -> Option<Vec<f64>> {
         let (cumulative, n) = (self.cumulative?, guess.len() - 1);
         let length = n as f64 * self.h;
@@ -289,8 +289,8 @@ impl Chain<'_> {
         Ok((residual, rows))
     }
 
-    /// The nodes of a piece, and the number of linear solves: by inversion of ∫M where M is averaged exactly; else by Newton's
-    /// method from a guess and, where that stalls, from the nodes that exact averages have.
+    /// The nodes of a piece, and the number of linear solves: by inversion of ∫M where M is averaged exactly; else by
+    /// Newton's method from a guess and, where that stalls, from the nodes that exact averages have.
     ///
     /// # Errors
     /// [`Failure::LineDensity`], [`Failure::LineStalled`].
@@ -420,8 +420,8 @@ impl Chain<'_> {
     }
 }
 
-/// Where a function that falls is zero, given with its derivative: Newton's method between two bounds. None where it has no
-/// value, or no bounds are found.
+/// Where a function that falls is zero, given with its derivative: Newton's method between two bounds. None where it
+/// has no value, or no bounds are found.
 fn falling_root(first: f64, size: f64, f: impl Fn(f64) -> Option<[f64; 2]>) -> Option<f64> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut at = first;

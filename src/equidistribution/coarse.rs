@@ -18,9 +18,10 @@ const SHORTEST: f64 = 1e-3;
 /// with a coarse node on each side of every cut, where the glued mesh jumps. J is tridiagonal and a node lies under two
 /// hats, so that the coarse system is tridiagonal too. The step is halved until nodes keep their order.
 ///
-/// Σ c_j hat_j is the change of ∫M up to a node. [`Coarse::Galerkin`] divides it by M at the old node, which is right for small
-/// changes only: where M varies over the way of a node, nodes pass each other, and halved steps are taken over and over.
-/// [`Coarse::Integral`] moves each node to where ∫M has changed by so much, which is right for changes of any size.
+/// Σ c_j hat_j is the change of ∫M up to a node. [`Coarse::Galerkin`] divides it by M at the old node, which is right
+/// for small changes only: where M varies over the way of a node, nodes pass each other, and halved steps are taken
+/// over and over. [`Coarse::Integral`] moves each node to where ∫M has changed by so much, which is right for changes
+/// of any size.
 pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coarse) -> Result<Vec<f64>, Failure> {
     let (chain, n) = (&iteration.chain, iteration.cells);
     let mut nodes = vec![0];

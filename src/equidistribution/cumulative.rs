@@ -4,15 +4,15 @@ use std::f64::consts::PI;
 
 /// G(x) = ∫M from the beginning of a line to x, and its inverse
 ///
-/// M is interpolated by polynomials in Chebyshev points on pieces that are halved until their last coefficients are below
-/// 1e-12 of the mean of M on the piece, or do not count beside ∫M over the line, or are of rounding: what M changes by where x
-/// is rounded, or what halving does not lower on either half. Integrated, they give G in every place; as
-/// M > 0, G grows, and Newton's method held between two bounds inverts it. M is asked for inside the line only, many places at
-/// once.
+/// M is interpolated by polynomials in Chebyshev points on pieces that are halved until their last coefficients are
+/// below 1e-12 of the mean of M on the piece, or do not count beside ∫M over the line, or are of rounding: what M
+/// changes by where x is rounded, or what halving does not lower on either half. Integrated, they give G in every
+/// place; as M > 0, G grows, and Newton's method held between two bounds inverts it. M is asked for inside the line
+/// only, many places at once.
 ///
-/// Where M is the arc length of u, no piece may be shorter than its chord: layers thinner than the distance of the places
-/// are found so. Elsewhere the user names the places of spikes. Where M jumps, pieces are halved down to neighbouring
-/// numbers.
+/// Where M is the arc length of u, no piece may be shorter than its chord: layers thinner than the distance of the
+/// places are found so. Elsewhere the user names the places of spikes. Where M jumps, pieces are halved down to
+/// neighbouring numbers.
 ///
 /// # Source
 /// Trefethen, *Approximation Theory and Approximation Practice* (2013), chapters 3, 4 and 19.
@@ -228,7 +228,8 @@ const JUMP: f64 = 2.0;
 const NOTICEABLE: f64 = 1e-12;
 
 impl Piece {
-    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and its last coefficients.
+    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and its last
+    /// coefficients.
     fn through([lower, upper]: [f64; 2], values: &[f64], transform: &[[f64; POINTS]; POINTS]) -> (Self, Tail) {
         let c: [f64; POINTS] =
             std::array::from_fn(|k| transform[k].iter().zip(values).map(|(weight, value)| weight * value).sum());
@@ -299,7 +300,8 @@ fn points([lower, upper]: &[f64; 2]) -> impl Iterator<Item = f64> + use<> {
     })
 }
 
-/// From values in the Chebyshev points, s_j = cos(jπ/n), to coefficients: c_k = (2/n) Σ″ f_j cos(jkπ/n), halved for k = 0 and n.
+/// From values in the Chebyshev points, s_j = cos(jπ/n), to coefficients: c_k = (2/n) Σ″ f_j cos(jkπ/n), halved for k =
+/// 0 and n.
 fn transform() -> [[f64; POINTS]; POINTS] {
     let half = |k: usize| if k == 0 || k == DEGREE { 0.5 } else { 1.0 };
     std::array::from_fn(|k| {
@@ -355,7 +357,8 @@ mod tests {
         }
     }
 
-    /// A layer of an arc length, however thin and wherever it is, is not missed; where M is a formula, its place is named.
+    /// A layer of an arc length, however thin and wherever it is, is not missed; where M is a formula, its place is
+    /// named.
     #[test]
     fn thin_layers_are_found() {
         for width in [1e-2, 1e-5, 1e-9, 1e-12_f64] {

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 /// M(x, t) > 0 on a line, with its exact derivative by x
 ///
-/// A formula itself, or the arc length √(1 + u_x²) of one. Only its ratios count. Iterates of Robin conditions may go beyond
-/// the ends of the line: see [`within`](Self::within).
+/// A formula itself, or the arc length √(1 + u_x²) of one. Only its ratios count. Iterates of Robin conditions may go
+/// beyond the ends of the line: see [`within`](Self::within).
 #[derive(Debug, Clone)]
 pub struct LineDensity {
     kind: Kind,
@@ -108,8 +108,8 @@ impl fmt::Debug for Kind {
     }
 }
 
-/// Nodes and weights of the Gauss–Kronrod rule of 15 points on [−1, 1], of the half with x ≥ 0, and of the 7-point Gauss
-/// rule inside it.
+/// Nodes and weights of the Gauss–Kronrod rule of 15 points on [−1, 1], of the half with x ≥ 0, and of the 7-point
+/// Gauss rule inside it.
 ///
 /// # Source
 /// Piessens et al., *QUADPACK* (1983).
@@ -200,14 +200,15 @@ impl LineDensity {
     /// M at some places, linear between them and constant beyond; best with [`FaceDensity::Exact`](super::FaceDensity).
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless there are two places or more that grow from left to right, with a finite M above 0 each. Where
-    /// M jumps, a place comes twice.
+    /// [`Error::Invalid`] unless there are two places or more that grow from left to right, with a finite M above 0
+    /// each. Where M jumps, a place comes twice.
     ///
     /// # Example
     /// ```
     /// use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
     /// // ∫M = x + x²/2: half of it lies left of √2.5 − 1
-    /// let line = Line { face: FaceDensity::Exact, ..Line::new(LineDensity::sampled(vec![0.0, 1.0], vec![1.0, 2.0])?, 20) };
+    /// let density = LineDensity::sampled(vec![0.0, 1.0], vec![1.0, 2.0])?;
+    /// let line = Line { face: FaceDensity::Exact, ..Line::new(density, 20) };
     /// let x = line.solve(0.0, &line.uniform(), None)?.0;
     /// assert!((x[10] - (2.5_f64.sqrt() - 1.0)).abs() < 1e-12);
     /// # Ok::<(), driftmesh::Error>(())
@@ -266,7 +267,8 @@ impl LineDensity {
         Ok(out)
     }
 
-    /// The same with places where M may have spikes that are too thin to be found among a few thousand equal parts of the line.
+    /// The same with places where M may have spikes that are too thin to be found among a few thousand equal parts of
+    /// the line.
     ///
     /// # Example
     /// ```
@@ -437,8 +439,8 @@ impl LineDensity {
         Ok(looks)
     }
 
-    /// ∫ M from a to b, to round-off: the rule of Gauss and Kronrod, halved where its error estimate asks for it. Where M
-    /// jumps, that is down to the last bit; what swings more often than can be followed is taken as it is.
+    /// ∫ M from a to b, to round-off: the rule of Gauss and Kronrod, halved where its error estimate asks for it. Where
+    /// M jumps, that is down to the last bit; what swings more often than can be followed is taken as it is.
     ///
     /// # Errors
     /// As [`at_each`](Self::at_each).

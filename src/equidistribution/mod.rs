@@ -1,12 +1,12 @@
 //! Equidistribution in one dimension, and every Schwarz method for it.
 //!
-//! The mesh x(ξ) on \[0, 1\] solves (M(x) x_ξ)_ξ = 0 with its ends fixed, or in time x_t = (1/τ) (M x_ξ)_ξ. Pieces of it
-//! are solved by themselves and told of each other's ends until they agree.
+//! The mesh x(ξ) on \[0, 1\] solves (M(x) x_ξ)_ξ = 0 with its ends fixed, or in time x_t = (1/τ) (M x_ξ)_ξ. Pieces of
+//! it are solved by themselves and told of each other's ends until they agree.
 //!
 //! # Source
-//! M. J. Gander and R. D. Haynes, *Domain decomposition approaches for mesh generation via the equidistribution principle*
-//! (2012). Its theorem 3.4, that linearised Schwarz always converges, does not hold: for M = 300 (x − ½)² + 1 and pieces
-//! that overlap in (.48, .52) the iteration oscillates for ever.
+//! M. J. Gander and R. D. Haynes, *Domain decomposition approaches for mesh generation via the equidistribution
+//! principle* (2012). Its theorem 3.4, that linearised Schwarz always converges, does not hold: for M = 300 (x − ½)² +
+//! 1 and pieces that overlap in (.48, .52) the iteration oscillates for ever.
 
 mod beyond;
 mod chain;
@@ -231,8 +231,8 @@ fn curing(method: Method, converges: bool) -> Vec<Remedy> {
     }]
 }
 
-/// The factor of two iterations over the last half of them, where all of the last quarter are below all of the second: an
-/// iteration that only swings may fall for a while.
+/// The factor of two iterations over the last half of them, where all of the last quarter are below all of the second:
+/// an iteration that only swings may fall for a while.
 fn contraction(measured: &[f64]) -> Option<f64> {
     let count = measured.len() - 1;
     let (first, middle) = (1.max(count / 4), 1.max(count / 2));
@@ -247,7 +247,8 @@ const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
 const NEAR: f64 = 1e-6;
 /// Iterations that may be asked for.
 pub(crate) const MOST_ITERATIONS: usize = 1_000_000;
-/// The tolerance that a message recommends where an iteration no longer improves, as a multiple of the error that it reached.
+/// The tolerance that a message recommends where an iteration no longer improves, as a multiple of the error that it
+/// reached.
 const STILL: f64 = 1.5;
 /// Iterations before which a message does not call an error that has not fallen yet a stalled iteration.
 const FEW: usize = 4;
@@ -291,12 +292,12 @@ impl Line {
         x
     }
 
-    /// The mesh on which all cells have the same ∫M: its nodes are those of the continuous problem, found by inversion of
-    /// ∫M, which no density hinders that is finite and positive.
+    /// The mesh on which all cells have the same ∫M: its nodes are those of the continuous problem, found by inversion
+    /// of ∫M, which no density hinders that is finite and positive.
     ///
     /// # Errors
-    /// [`Failure::LineDensity`]; [`Failure::LineUnresolved`] where a layer is so thin, and so many cells lie in it, that neighbours
-    /// would be the same number.
+    /// [`Failure::LineDensity`]; [`Failure::LineUnresolved`] where a layer is so thin, and so many cells lie in it,
+    /// that neighbours would be the same number.
     pub fn equidistributed(&self, t: f64) -> Result<Vec<f64>, Failure> {
         self.in_order(self.cumulative(t)?.divided(self.ends, self.cells))
     }
@@ -308,8 +309,9 @@ impl Line {
         }
     }
 
-    /// The discrete mesh of the whole line, and the linear solves that it took: none for [`FaceDensity::Exact`] without time,
-    /// which is [`equidistributed`](Self::equidistributed). The others start there, or at the guess where there is time.
+    /// The discrete mesh of the whole line, and the linear solves that it took: none for [`FaceDensity::Exact`] without
+    /// time, which is [`equidistributed`](Self::equidistributed). The others start there, or at the guess where there
+    /// is time.
     ///
     /// # Errors
     /// As [`iterate`](Self::iterate), and those of [`equidistributed`](Self::equidistributed).
@@ -341,8 +343,8 @@ impl Line {
         }
     }
 
-    /// The discrete mesh of the whole line, or where Newton's method finds none the one that has the same ∫M in all cells: M
-    /// that jumps or peaks within a cell may have no mesh by trapezoids or midpoints.
+    /// The discrete mesh of the whole line, or where Newton's method finds none the one that has the same ∫M in all
+    /// cells: M that jumps or peaks within a cell may have no mesh by trapezoids or midpoints.
     ///
     /// # Errors
     /// As [`equidistributed`](Self::equidistributed).
@@ -382,8 +384,8 @@ impl Line {
     /// method, and meet in a node for the others. No convergence is no error: see [`History::converged`].
     ///
     /// # Errors
-    /// [`Error::Invalid`] for ranges that do not fit ([`pieces::check`]) or a start that is no mesh; [`Error::Failed`] with
-    /// [`Failure::LineDensity`] or [`Failure::LineStalled`].
+    /// [`Error::Invalid`] for ranges that do not fit ([`pieces::check`]) or a start that is no mesh; [`Error::Failed`]
+    /// with [`Failure::LineDensity`] or [`Failure::LineStalled`].
     pub fn iterate(
         &self,
         t: f64,

@@ -42,7 +42,8 @@ pub fn equal(cells: usize, subdomains: usize, overlap: usize) -> Result<Vec<[usi
         let near: Vec<String> =
             [width, width + 1].into_iter().filter_map(fits).map(|cells| cells.to_string()).collect();
         return invalid(format!(
-            "(cells + {} × {overlap})/{subdomains} must be whole; with {overlap} cells of overlap the nearest grid.cells are {}",
+            "(cells + {} × {overlap})/{subdomains} must be whole; with {overlap} cells of overlap the nearest \
+             grid.cells are {}",
             subdomains - 1,
             near.join(" and ")
         ));
@@ -93,8 +94,8 @@ pub fn check(key: &str, ranges: &[[usize; 2]], cells: usize, method: Method) -> 
         }
         if overlapping && next == end {
             return invalid(format!(
-                "{between} do not overlap: with each other's values at their ends they would never learn of each other; \
-                 give an overlap, or use the method \"optimized\""
+                "{between} do not overlap: with each other's values at their ends they would never learn of each \
+                 other; give an overlap, or use the method \"optimized\""
             ));
         }
         if !overlapping && next < end {

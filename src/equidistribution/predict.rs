@@ -99,7 +99,8 @@ impl Prediction {
     }
 }
 
-/// ρ(A): errors of ∫M are linear between the ends of a piece, so that the one at a node inside it is their mean by distance.
+/// ρ(A): errors of ∫M are linear between the ends of a piece, so that the one at a node inside it is their mean by
+/// distance.
 fn interface_radius(pieces: &[[f64; 2]]) -> f64 {
     let count = pieces.len();
     if count < 2 {

@@ -22,7 +22,8 @@ pub enum Method {
     },
     /// Pieces that meet, with the flux of the rest of the domain as the law at their ends: I iterations.
     Optimal {
-        /// Panels of the trapezoidal rule for the integrals; exact where there are none. In time there are no integrals.
+        /// Panels of the trapezoidal rule for the integrals; exact where there are none. In time there are no
+        /// integrals.
         panels: Option<usize>,
     },
     /// Pieces that meet, with F ± p x as the law at their ends.
@@ -222,8 +223,8 @@ impl Iteration<'_> {
         }
     }
 
-    /// The law where pieces j and j + 1 meet, for the `Right` end of the left one or the `Left` end of the right one, with
-    /// what the other knows.
+    /// The law where pieces j and j + 1 meet, for the `Right` end of the left one or the `Left` end of the right one,
+    /// with what the other knows.
     fn end(&self, pieces: &[Vec<f64>], j: usize, side: Side) -> Result<End<'_>, Failure> {
         let cut = self.ranges[j][1];
         let xi = cut as f64 / self.cells as f64;
@@ -252,8 +253,8 @@ impl Iteration<'_> {
         Ok(End::Flux { g: flux + sign * more - self.chain.law(law, x)?, law })
     }
 
-    /// p: for a flux that answers a node like that of the rest, M̃/L without time and M̃ √θ coth(√θ L), θ = τ/(Δt M̃), with it,
-    /// L the length of the rest.
+    /// p: for a flux that answers a node like that of the rest, M̃/L without time and M̃ √θ coth(√θ L), θ = τ/(Δt M̃),
+    /// with it, L the length of the rest.
     fn robin(&self, xi: f64, x: f64, side: Side) -> Result<f64, Failure> {
         let Method::Optimized { robin } = self.method else { return Ok(0.0) };
         let like_rest = |length: f64| -> Result<f64, Failure> {

@@ -180,7 +180,8 @@ impl Remedy {
 
 /// How a door names what may be changed.
 pub trait Door {
-    /// The name of the setting that an act changes; none where there is no such setting here, or where it is so already.
+    /// The name of the setting that an act changes; none where there is no such setting here, or where it is so
+    /// already.
     fn name(&self, act: Act) -> Option<String>;
 
     /// A value of a setting.

@@ -1,12 +1,12 @@
 //! Formulas of a few variables, with exact derivatives of any order.
 //!
-//! A [`Formula`] is read from text by whoever owns its variables: `x y t` for a prescribed field, `u v x y t` for a PDE,
-//! `x` for a density. A [`Program`] evaluates several of them at many points, each common part once.
+//! A [`Formula`] is read from text by whoever owns its variables: `x y t` for a prescribed field, `u v x y t` for a
+//! PDE, `x` for a density. A [`Program`] evaluates several of them at many points, each common part once.
 //!
 //! | | |
 //! |---|---|
 //! | numbers | `1`, `.5`, `1e-3`, `2.5E+4`; the constants `pi` and `e` |
-//! | operators | `+ - * / ^ ( )`; `^` goes before a sign and to the right: `-2^2` is -4, `2^3^2` is 512, `2^-1` is 0.5 |
+//! | operators | `+ - * / ^ ( )`; `^` binds tighter than a sign, and to the right: `-2^2` is -4, `2^3^2` is 512 |
 //! | functions | `sin cos tan sinh cosh tanh exp log sqrt abs erf min max`; `log` is the natural logarithm |
 //! | cases | `if(x < 0, a, b)`, with one of `< <= > >= == !=` in its first place and nowhere else |
 //!
@@ -16,7 +16,8 @@
 //! # Derivatives
 //!
 //! Derivatives are again formulas, by the rules of calculus. Where there is none, they take a side: |f|′ = 0 at f = 0;
-//! `min`, `max` and `if` have the derivative of the branch taken, `min` and `max` that of their first argument in a tie.
+//! `min`, `max` and `if` have the derivative of the branch taken, `min` and `max` that of their first argument in a
+//! tie.
 //!
 //! ```text
 //! (fᶜ)′ = c fᶜ⁻¹ f′,   (f^g)′ = g f^(g−1) f′ + f^g log(f) g′

@@ -6,8 +6,8 @@ const CACHE: usize = 16384;
 
 /// Several formulas compiled for many points, their common parts computed once
 ///
-/// The first P variables have a value a point; the others, such as the time, are shared by all points of a call, and what
-/// depends on these alone is computed once a call. Formulas meet by the place of a variable, not by its name.
+/// The first P variables have a value a point; the others, such as the time, are shared by all points of a call, and
+/// what depends on these alone is computed once a call. Formulas meet by the place of a variable, not by its name.
 ///
 /// Points pass in blocks, operation by operation. Every value has the bits of [`Formula::eval`].
 ///

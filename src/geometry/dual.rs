@@ -5,7 +5,8 @@ use crate::parallel;
 /// Finite-volume geometry of a mesh: the dual cell of every node
 ///
 /// ```text
-/// c_ij = ¼ (x_ij + x_{i+1,j} + x_{i,j+1} + x_{i+1,j+1}),   dual cell of node (i, j): c_{i−1,j−1}, c_{i,j−1}, c_ij, c_{i−1,j}
+/// c_ij = ¼ (x_ij + x_{i+1,j} + x_{i,j+1} + x_{i+1,j+1})
+/// dual cell of node (i, j): c_{i−1,j−1}, c_{i,j−1}, c_ij, c_{i−1,j}
 /// face to (i+1, j):  t = c_ij − c_{i,j−1},      face to (i, j+1):  t = c_{i−1,j} − c_ij,      N = (t_y, −t_x)
 /// ```
 ///
@@ -100,7 +101,8 @@ impl DualCells {
     /// the geometric conservation law.
     ///
     /// # Source
-    /// Thomas and Lombard, *Geometric conservation law and its application to flow computations on moving grids* (1979).
+    /// Thomas and Lombard, *Geometric conservation law and its application to flow computations on moving grids*
+    /// (1979).
     pub fn swept(&self, later: &Self) -> Vec<[f64; 2]> {
         debug_assert_eq!(self.patch, later.patch);
         let ([n, m], s) = (self.patch.size, self.patch.size[1] + 2);
@@ -127,8 +129,8 @@ impl DualCells {
     }
 }
 
-/// Nodal values with a ring around them, padded like [`DualCells::patch`]: images across periodic axes, `jump[d]` further
-/// for each turn around axis d, and beyond bounded sides the side's own values again.
+/// Nodal values with a ring around them, padded like [`DualCells::patch`]: images across periodic axes, `jump[d]`
+/// further for each turn around axis d, and beyond bounded sides the side's own values again.
 pub fn padded<const K: usize>(lattice: &Lattice<2>, values: &[[f64; K]], jump: [[f64; K]; 2]) -> Vec<[f64; K]> {
     let ([n, m], wraps) = (lattice.nodes(), lattice.periodic());
     // the node at a padded place, and how often it lies around the axis
@@ -153,7 +155,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A mesh of [0, 2] × [−1, 2] with every node up to 0.3 cells away from its uniform place, side nodes on their sides.
+    /// A mesh of [0, 2] × [−1, 2] with every node up to 0.3 cells away from its uniform place, side nodes on their
+    /// sides.
     fn random(cells: [usize; 2], periodic: [bool; 2], seed: u64) -> Mesh<2> {
         let mesh = Mesh::uniform(Lattice::new(cells, periodic).unwrap(), [0.0, -1.0], [2.0, 2.0]).unwrap();
         let mut state = seed;

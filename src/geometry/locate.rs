@@ -3,9 +3,9 @@ use super::Mesh;
 /// Carries a nodal field from one mesh to the nodes of another over the same lattice and box
 ///
 /// Every cell is two triangles, cut along its diagonal from (i, j) to (i+1, j+1), and the field is linear on each. A
-/// node is searched from its own cell outwards, so meshes that differ by one time step cost a few tests a node; on periodic
-/// axes the image next to that cell is searched for, so that meshes may have drifted by any number of periods. Points outside
-/// a bounded box take the value of the nearest point of the cell where the search ends.
+/// node is searched from its own cell outwards, so meshes that differ by one time step cost a few tests a node; on
+/// periodic axes the image next to that cell is searched for, so that meshes may have drifted by any number of periods.
+/// Points outside a bounded box take the value of the nearest point of the cell where the search ends.
 ///
 /// # Example
 /// ```
@@ -36,7 +36,8 @@ pub fn interpolate(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
         .collect()
 }
 
-/// The cell of a mesh, by its lowest corner, that holds each of some points; neighbours among them cost a few tests each.
+/// The cell of a mesh, by its lowest corner, that holds each of some points; neighbours among them cost a few tests
+/// each.
 pub(crate) fn cells_of(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -> Vec<[usize; 2]> {
     let cells = Cells { mesh };
     let mut near = [0; 2];

@@ -87,8 +87,8 @@ impl<const D: usize> Mesh<D> {
     /// The same lattice and box with other positions, one a node in lattice order.
     ///
     /// # Errors
-    /// [`Failure::WrongLength`] where the number of positions is not the number of nodes; [`Failure::NonFinite`] for the
-    /// first position that is not finite.
+    /// [`Failure::WrongLength`] where the number of positions is not the number of nodes; [`Failure::NonFinite`] for
+    /// the first position that is not finite.
     pub fn moved(&self, x: Vec<[f64; D]>) -> Result<Self, Failure> {
         check_length(&self.lattice, "the mesh", x.len())?;
         if let Some(k) = x.iter().position(|x| !x.iter().all(|v| v.is_finite())) {
@@ -99,8 +99,8 @@ impl<const D: usize> Mesh<D> {
         Ok(Self { x, ..*self })
     }
 
-    /// The map from the computational domain to the mesh on a lattice of other `cells`, linear between the nodes of this one
-    /// along each axis.
+    /// The map from the computational domain to the mesh on a lattice of other `cells`, linear between the nodes of
+    /// this one along each axis.
     ///
     /// # Errors
     /// [`Error::Invalid`] where `cells` make no lattice.

@@ -67,8 +67,8 @@ impl Row<'_> {
     }
 }
 
-/// Calls `visit(nodes before, nodes after, row)` for every row of cells, in lattice order: the ranges of arrays of shape
-/// cells + 1 in which they stand, and where they are.
+/// Calls `visit(nodes before, nodes after, row)` for every row of cells, in lattice order: the ranges of arrays of
+/// shape cells + 1 in which they stand, and where they are.
 #[inline(always)]
 fn for_each_row_of_cells(mesh: &Mesh<2>, mut visit: impl FnMut([Range<usize>; 2], &Row<'_>)) {
     let x = mesh.closed();
@@ -195,8 +195,8 @@ pub(crate) fn quality_and_integral(mesh: &Mesh<2>, rho: &[f64], values: &[f64]) 
     pulp::Arch::new().dispatch(AllCells { mesh, rho: &rho, values: &values })
 }
 
-/// All cells as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has. Products
-/// and sums are not fused: the same bits on every machine.
+/// All cells as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has.
+/// Products and sums are not fused: the same bits on every machine.
 struct AllCells<'a> {
     mesh: &'a Mesh<2>,
     /// Of shape cells + 1.

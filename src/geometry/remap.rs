@@ -4,18 +4,20 @@ use crate::error::Failure;
 /// Carries a nodal field from one mesh to another over the same lattice and domain and keeps its integral
 ///
 /// ```text
-/// A′ u′ = A u + Σ_faces s u_f,   A, A′ = areas of the dual cell before and after,   s = the area that a face sweeps outward
+/// A′ u′ = A u + Σ_faces s u_f
+/// A, A′ = areas of the dual cell before and after,   s = the area that a face sweeps outward
 /// ```
 ///
-/// Σ A u ([`DualCells::areas`]) is kept to round-off, constants exactly. u_f is the value upwind with van Leer's limited
-/// slope, of second order in the mean where u is smooth (of first at nodes on sides and at extrema), and no value leaves the
-/// range of its neighbours. Nodes go from one mesh to the other in straight lines, in as many steps as keep what the faces of a
-/// dual cell sweep below half of it: one for meshes that differ by a time step. On periodic axes they begin at the nodes,
-/// counted from another one, that lie nearest in the mean: meshes may have drifted by any number of periods.
+/// Σ A u ([`DualCells::areas`]) is kept to round-off, constants exactly. u_f is the value upwind with van Leer's
+/// limited slope, of second order in the mean where u is smooth (of first at nodes on sides and at extrema), and no
+/// value leaves the range of its neighbours. Nodes go from one mesh to the other in straight lines, in as many steps as
+/// keep what the faces of a dual cell sweep below half of it: one for meshes that differ by a time step. On periodic
+/// axes they begin at the nodes, counted from another one, that lie nearest in the mean: meshes may have drifted by any
+/// number of periods.
 ///
 /// # Errors
-/// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where values
-/// are not finite or so large that their integrals are not.
+/// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where
+/// values are not finite or so large that their integrals are not.
 ///
 /// # Example
 /// ```
@@ -24,7 +26,9 @@ use crate::error::Failure;
 /// let b = a.moved(a.x().iter().map(|&[x, y]| [x * x, y]).collect())?;
 /// let u: Vec<f64> = a.x().iter().map(|[x, _]| x.exp()).collect();
 /// let v = remap(&a, &u, &b)?;
-/// let sum = |mesh: &Mesh<2>, u: &[f64]| -> f64 { DualCells::new(mesh).areas().iter().zip(u).map(|(a, u)| a * u).sum() };
+/// let sum = |mesh: &Mesh<2>, u: &[f64]| -> f64 {
+///     DualCells::new(mesh).areas().iter().zip(u).map(|(a, u)| a * u).sum()
+/// };
 /// assert!((sum(&a, &u) - sum(&b, &v)).abs() < 1e-14);
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
@@ -33,7 +37,8 @@ use crate::error::Failure;
 /// If the two meshes have different lattices or `values` has not one value a node.
 ///
 /// # Source
-/// van Leer, *Towards the ultimate conservative difference scheme V* (1979), with faces that move through a field at rest.
+/// van Leer, *Towards the ultimate conservative difference scheme V* (1979), with faces that move through a field at
+/// rest.
 pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, Failure> {
     assert_eq!(from.lattice(), to.lattice(), "both meshes need the same lattice");
     assert_eq!(values.len(), from.lattice().len(), "one value a node");
@@ -63,8 +68,8 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
     }
 }
 
-/// The same mesh and values with the nodes along periodic axes counted from where those of `to` begin, to the nearest cell
-/// in the mean.
+/// The same mesh and values with the nodes along periodic axes counted from where those of `to` begin, to the nearest
+/// cell in the mean.
 fn counted_from_near(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<(Mesh<2>, Vec<f64>), Failure> {
     let (lattice, extent) = (from.lattice(), from.extent());
     let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
@@ -175,7 +180,8 @@ mod tests {
     }
 
     proptest! {
-        /// The integral is kept to round-off and the range is not left, for any values, motion, sides and periodic axes.
+        /// The integral is kept to round-off and the range is not left, for any values, motion, sides and periodic
+        /// axes.
         #[test]
         fn keeps_the_integral_and_the_range(
             n in 3_usize..14, periodic: bool, there in -0.1..0.1, back in -0.1..0.1, seed: u64,
@@ -223,8 +229,8 @@ mod tests {
         assert!(carried.iter().all(|u| u / f64::MAX > 1.0 - 1e-14));
     }
 
-    /// A periodic mesh that went around any number of times, and by whole cells, has the very values of the nodes that it
-    /// meets.
+    /// A periodic mesh that went around any number of times, and by whole cells, has the very values of the nodes that
+    /// it meets.
     #[test]
     fn meshes_that_drifted_by_periods_are_carried_to() {
         let mesh = bent(16, true, 0.0);

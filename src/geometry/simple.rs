@@ -4,8 +4,8 @@ use crate::error::Failure;
 
 /// Refuses a bounded mesh whose sides touch or cross each other
 ///
-/// With [`check_unfolded`](super::check_unfolded) this makes the mapping one to one: no cell is folded, and the sides are
-/// one simple curve.
+/// With [`check_unfolded`](super::check_unfolded) this makes the mapping one to one: no cell is folded, and the sides
+/// are one simple curve.
 ///
 /// # Errors
 /// [`Failure::SelfTouching`] with the two cells at the first place found. Nothing is said of periodic meshes.
@@ -58,7 +58,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Lattice, check_unfolded};
 
-    /// An annulus of 1.1 turns folds no cell but lies on itself, one of a whole turn but for rounding; one of 0.9 does not.
+    /// An annulus of 1.1 turns folds no cell but lies on itself, one of a whole turn but for rounding; one of 0.9 does
+    /// not.
     #[test]
     fn a_mesh_that_lies_on_itself_is_refused() {
         let annulus = |turns: f64| {

@@ -4,8 +4,8 @@
 //! Δu(x₀) ≈ Σ_j a_j (u(x_j) − u(x₀))        or, for `compact25`,        Σ_j a_j u(x_j) = Σ_j b_j Δu(x_j)
 //! ```
 //!
-//! The weights a of each node follow from the positions of its neighbours alone: no elements, no assembly, every node by
-//! itself. [`stencils`] gives those of a whole mesh, for any [`Laplacian`].
+//! The weights a of each node follow from the positions of its neighbours alone: no elements, no assembly, every node
+//! by itself. [`stencils`] gives those of a whole mesh, for any [`Laplacian`].
 //!
 //! # Source
 //! Castillo and Izsák, *Efficient discretization of the Laplacian: application to moving boundary problems* (2024).
@@ -31,8 +31,8 @@ pub enum Laplacian {
     /// meshes that a smooth mapping makes, and on perturbed ones.
     #[default]
     Optimised,
-    /// Exact for all quadratics; the rest by least squares on the harmonic polynomials of degree 3 to 5 in the unit of the
-    /// coordinates. More accurate on sheared meshes, unstable on moving ones.
+    /// Exact for all quadratics; the rest by least squares on the harmonic polynomials of degree 3 to 5 in the unit of
+    /// the coordinates. More accurate on sheared meshes, unstable on moving ones.
     Harmonic,
     /// The slides' least squares on eleven weighted polynomials: exact for nothing but constants.
     Published {
@@ -106,8 +106,8 @@ pub const NEAR_DEGENERATE: f64 = 3e3;
 ///
 /// # Errors
 /// [`Failure::Folded`] or [`Failure::NonFinite`] where the mesh is no mesh; [`Failure::DegenerateStencil`] where the
-/// neighbours of a node determine no Laplacian; [`Error::Invalid`] for `compact25` on a periodic axis or with fewer than 4
-/// cells. Nodes that come near that are in [`Stencils::near_degenerate`].
+/// neighbours of a node determine no Laplacian; [`Error::Invalid`] for `compact25` on a periodic axis or with fewer
+/// than 4 cells. Nodes that come near that are in [`Stencils::near_degenerate`].
 ///
 /// # Example
 /// ```

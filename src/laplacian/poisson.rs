@@ -89,11 +89,13 @@ impl Poisson<'_> {
         Ok(u)
     }
 
-    /// The solution by an iteration, for nine-point stencils on a mesh with values on all sides: less memory than the direct
-    /// solver, and faster on fine meshes. The work tells the iterations, and whether the direct solver had to step in.
+    /// The solution by an iteration, for nine-point stencils on a mesh with values on all sides: less memory than the
+    /// direct solver, and faster on fine meshes. The work tells the iterations, and whether the direct solver had to
+    /// step in.
     ///
     /// # Errors
-    /// As [`Poisson::solve`]; [`Failure::WrongLength`] for stencils of 25 points or Neumann sides, which it does not take.
+    /// As [`Poisson::solve`]; [`Failure::WrongLength`] for stencils of 25 points or Neumann sides, which it does not
+    /// take.
     pub fn iterate(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<(Vec<f64>, Work), Failure> {
         let lattice = mesh.lattice();
         let expected = lattice.len();
@@ -152,13 +154,13 @@ pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f
 
 /// n·∇u at a node of a side from the 3 × 3 nodes next to it, exact for quadratics: (lattice index, weight)
 ///
-/// Among those rows the one with the smallest Σ(|ξ_j|³ a_j)², ξ = J⁻¹(x − x₀). J is a length; where cells are so flat that
-/// rounding is all that is left then, its columns are half the way across the nodes along each axis: a quadratic of x is one
-/// of ξ, n·∇ₓ = (J⁻¹n)·∇_ξ, and distances are measured in cells.
+/// Among those rows the one with the smallest Σ(|ξ_j|³ a_j)², ξ = J⁻¹(x − x₀). J is a length; where cells are so flat
+/// that rounding is all that is left then, its columns are half the way across the nodes along each axis: a quadratic
+/// of x is one of ξ, n·∇ₓ = (J⁻¹n)·∇_ξ, and distances are measured in cells.
 ///
-/// The node itself may end up with next to no weight, and its value would be anything. Where it has less than half of what it
-/// has in the one-sided difference inward, (d₁ + d₂)/(d₁ d₂) with distances d from the side, it is given that, unless cells
-/// are flat.
+/// The node itself may end up with next to no weight, and its value would be anything. Where it has less than half of
+/// what it has in the one-sided difference inward, (d₁ + d₂)/(d₁ d₂) with distances d from the side, it is given that,
+/// unless cells are flat.
 fn derivative(
     mesh: &Mesh<2>,
     index: usize,
@@ -211,8 +213,8 @@ fn derivative(
     Err(Failure::DegenerateStencil { node, x: x[index], condition })
 }
 
-/// The a with the smallest Σ(|ξ_j|³ a_j)² among those with Σ a_j p_k(ξ_j) as wanted, p = x, y, xy, x² − y², x², 1, and the
-/// condition number.
+/// The a with the smallest Σ(|ξ_j|³ a_j)² among those with Σ a_j p_k(ξ_j) as wanted, p = x, y, xy, x² − y², x², 1, and
+/// the condition number.
 fn shortest<const N: usize>(places: &[[f64; 2]; 8], wanted: [f64; N]) -> ([f64; 8], f64) {
     let share = places.map(|[x, y]| x.hypot(y).powi(-3));
     let mut columns = [[Lanes::ZERO; 8]; N];

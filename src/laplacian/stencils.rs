@@ -201,8 +201,8 @@ impl Stencils {
         worst
     }
 
-    /// The highest degree up to which the Laplacian of every polynomial is exact at every node, to 1e-9 in local units or of
-    /// the terms that cancel, which are large where cells are flat; none where constants are not.
+    /// The highest degree up to which the Laplacian of every polynomial is exact at every node, to 1e-9 in local units
+    /// or of the terms that cancel, which are large where cells are flat; none where constants are not.
     pub fn exact_degree(&self, mesh: &Mesh<2>) -> Option<usize> {
         let residuals = self.residuals_in(mesh, |size| size.max(1.0));
         residuals.iter().take_while(|&&residual| residual <= 1e-9).count().checked_sub(1)

@@ -19,8 +19,8 @@ use crate::work::Work;
 /// (2.4) of Bihlo, Haynes and Walsh (2015), MMPDE5 divided by ρ before it is relaxed.
 ///
 /// The default is that of studies and of Python: the conservative form, and a τ that the mesh chooses, which is
-/// [`STEPS_TO_BEGIN_WITH`](super::STEPS_TO_BEGIN_WITH) time steps for a generator by itself. [`Mmpde::published`] is that of
-/// the paper.
+/// [`STEPS_TO_BEGIN_WITH`](super::STEPS_TO_BEGIN_WITH) time steps for a generator by itself. [`Mmpde::published`] is
+/// that of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mmpde {
     /// τ.

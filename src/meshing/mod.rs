@@ -36,13 +36,13 @@ use serde::{Deserialize, Serialize};
 /// Laws, tested for every implementation: the mesh does not change under ρ → cρ; constant ρ leaves a uniform mesh at
 /// rest; side nodes stay exactly on the box.
 pub trait MeshGenerator<const D: usize = 2>: Send {
-    /// The mesh at t + `dt` from the mesh at t and the density on it, one value a node: [`solve`](Self::solve), with checks
-    /// of what it is given and of what it returns.
+    /// The mesh at t + `dt` from the mesh at t and the density on it, one value a node: [`solve`](Self::solve), with
+    /// checks of what it is given and of what it returns.
     ///
     /// # Errors
     /// [`Failure::OutOfRange`] for a `dt` or τ that is not finite and positive, and for a prediction, which takes a
-    /// [`Mover`](crate::mover::Mover); [`Failure::WrongLength`], [`Failure::NonFinite`] or [`Failure::NotPositive`] for the
-    /// density; [`Failure::NotABox`] for a mesh whose sides are not those of the box around it;
+    /// [`Mover`](crate::mover::Mover); [`Failure::WrongLength`], [`Failure::NonFinite`] or [`Failure::NotPositive`] for
+    /// the density; [`Failure::NotABox`] for a mesh whose sides are not those of the box around it;
     /// [`Failure::Folded`] for a new mesh with a folded cell; or what `solve` fails with.
     ///
     /// # Example
@@ -142,7 +142,8 @@ kinds! {
     /// `mesh.generator` of a study.
     GeneratorKind {
         "whole" = Whole: "one implicit solve of the mesh equation on the whole domain",
-        "stochastic" = Stochastic: "walks or strips give the interfaces between subdomains, then each is solved by itself",
+        "stochastic" = Stochastic: "walks or strips give the interfaces between subdomains, then each is solved by \
+                                    itself",
         "schwarz" = Schwarz: "overlapping subdomains, solved in parallel and iterated to a tolerance or so many times",
         "fixed" = Fixed: "the mesh does not move",
     }

@@ -75,8 +75,8 @@ impl From<Relaxation> for Written {
 pub struct Steps {
     /// τ over Δt.
     pub steps: f64,
-    /// γ, from 0 (no prediction) to ½. It takes a [`Mover`](crate::mover::Mover), which studies have: a generator by itself
-    /// keeps no velocities, and refuses a γ above 0.
+    /// γ, from 0 (no prediction) to ½. It takes a [`Mover`](crate::mover::Mover), which studies have: a generator by
+    /// itself keeps no velocities, and refuses a γ above 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prediction: f64,
 }

@@ -5,11 +5,12 @@ use crate::geometry::{Lattice, Mesh, Patch, strides};
 use crate::numerics::linear::{LinearSolver, Robust};
 use crate::work::Work;
 
-/// Moves the nodes on the bounded sides of the box: the mesh equation on each side by itself, in as many dimensions as the side has
+/// Moves the nodes on the bounded sides of the box: the mesh equation on each side by itself, in as many dimensions as
+/// the side has
 ///
-/// On a side the coordinates across it are fixed and those along it solve the mesh equation with the ρ of the side, between
-/// the edges around it, which are moved before; corners stay. `x` holds the old positions of all nodes and receives the new
-/// ones on the sides.
+/// On a side the coordinates across it are fixed and those along it solve the mesh equation with the ρ of the side,
+/// between the edges around it, which are moved before; corners stay. `x` holds the old positions of all nodes and
+/// receives the new ones on the sides.
 ///
 /// # Errors
 /// What the solves fail with.
@@ -52,8 +53,8 @@ impl<'a, const D: usize> Sides<'a, D> {
         Self { equation, mesh, rho, cells, dt }
     }
 
-    /// Moves the nodes of all sides that lie along some axes, S = 2E + 1 points of a star; none where an axis across them is
-    /// periodic, or none is.
+    /// Moves the nodes of all sides that lie along some axes, S = 2E + 1 points of a star; none where an axis across
+    /// them is periodic, or none is.
     fn solve<const E: usize, const S: usize>(
         &self,
         along: [usize; E],

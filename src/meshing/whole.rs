@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 
 /// One implicit solve of the mesh equation on the whole domain: the sides first, then all other nodes at once
 ///
-/// In one, two or three dimensions. The gradient form is solved to round-off. The conservative form is solved by conjugate
-/// gradients from the mesh that the last step would lead to if it went on, to a hundredth of the shortest edge or better.
+/// In one, two or three dimensions. The gradient form is solved to round-off. The conservative form is solved by
+/// conjugate gradients from the mesh that the last step would lead to if it went on, to a hundredth of the shortest
+/// edge or better.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Whole")]
@@ -40,8 +41,8 @@ struct Step<const D: usize> {
     dt: f64,
 }
 
-/// Tolerance of the linear solve, as a share of the shortest edge of the mesh. With ten times as much, errors of the solution
-/// still agree in the digits that a run prints.
+/// Tolerance of the linear solve, as a share of the shortest edge of the mesh. With ten times as much, errors of the
+/// solution still agree in the digits that a run prints.
 fn closeness() -> f64 {
     1e-2
 }

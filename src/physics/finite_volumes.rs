@@ -15,8 +15,8 @@ use std::borrow::Cow;
 pub(super) trait Law<const B: usize>: Sync {
     /// What faces need to know of a node.
     type Node: Copy + Send + Sync;
-    /// Newton stops where all residuals are below this share of the size of their unknown, once a step is solved at all:
-    /// far below what a step leaves out.
+    /// Newton stops where all residuals are below this share of the size of their unknown, once a step is solved at
+    /// all: far below what a step leaves out.
     const TOLERANCE: f64 = 1e-6;
 
     /// Names of the unknowns, for messages.
@@ -57,9 +57,10 @@ pub(super) struct Crossing<const B: usize> {
 /// g = Δt (F·N − D ∇u·N) − s (u_i + u_k)/2,   ∇u·N = (|N|² (u_k − u_i) − (d·t) (u_b − u_a)) / J
 /// ```
 ///
-/// over the faces of each dual cell, N the normal and t the face from a to b, d = x_k − x_i, J = d·N, s the area that the
-/// face sweeps between the meshes, u_a and u_b the means of the four nodes around its ends. What leaves a cell enters the
-/// next, and a constant stays constant on any moving mesh. Crank and Nicolson in time, Newton with the true Jacobian.
+/// over the faces of each dual cell, N the normal and t the face from a to b, d = x_k − x_i, J = d·N, s the area that
+/// the face sweeps between the meshes, u_a and u_b the means of the four nodes around its ends. What leaves a cell
+/// enters the next, and a constant stays constant on any moving mesh. Crank and Nicolson in time, Newton with the true
+/// Jacobian.
 #[derive(Debug, Clone)]
 pub(super) struct FiniteVolumes<const B: usize> {
     solver: RobustTransport<B>,
@@ -254,8 +255,8 @@ fn inside<'a>(mesh: &Mesh<2>, x: &'a [[f64; 2]]) -> Cow<'a, [[f64; 2]]> {
     }
 }
 
-/// Adds what the residuals leave of each sum that is closed to all values alike: sums are then conserved to round-off, however well the
-/// step was solved.
+/// Adds what the residuals leave of each sum that is closed to all values alike: sums are then conserved to round-off,
+/// however well the step was solved.
 fn settle<const B: usize>(
     cells: &DualCells,
     residual: &[[f64; B]],
@@ -428,7 +429,8 @@ pub(super) mod tests {
     use crate::geometry::Lattice;
     use crate::physics::{Burgers, BurgersFlux, Convection, Physics};
 
-    /// A mesh of the unit square with every node up to 0.3 cells away from its uniform place, side nodes on their sides.
+    /// A mesh of the unit square with every node up to 0.3 cells away from its uniform place, side nodes on their
+    /// sides.
     fn random(cells: [usize; 2], periodic: [bool; 2], seed: u64) -> Mesh<2> {
         let mesh = Mesh::uniform(Lattice::new(cells, periodic).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
@@ -452,8 +454,8 @@ pub(super) mod tests {
     const FLUXES: [BurgersFlux; 3] = [BurgersFlux::Product, BurgersFlux::Energy, BurgersFlux::Central];
     const WAVE: &str = "1.5 + sin(2*pi*x)*cos(2*pi*y)";
 
-    /// Without viscosity, on a random mesh at rest, Σ A ln u changes only by round-off with the product flux, and Σ A u²
-    /// with the energy-conserving one; neither does with the other.
+    /// Without viscosity, on a random mesh at rest, Σ A ln u changes only by round-off with the product flux, and Σ A
+    /// u² with the energy-conserving one; neither does with the other.
     #[test]
     fn each_flux_keeps_its_own_invariant() {
         let mesh = random([13, 17], [true, true], 5);
@@ -509,8 +511,8 @@ pub(super) mod tests {
     /// max |R(u + ε v) − R(u) − ε J v| = O(ε^order)
     /// ```
     ///
-    /// R being the residual at the end of a step, J the matrix of [`FiniteVolumes::step`] and v random: 2 where J is the
-    /// derivative, and Newton's method converges quadratically; 1 where an entry of it is wrong.
+    /// R being the residual at the end of a step, J the matrix of [`FiniteVolumes::step`] and v random: 2 where J is
+    /// the derivative, and Newton's method converges quadratically; 1 where an entry of it is wrong.
     pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
         law: &L,
         motion: Motion<'_>,
@@ -569,8 +571,8 @@ pub(super) mod tests {
         (left(4e-3) / left(1e-3)).log(4.0)
     }
 
-    /// With every flux the matrix of Newton's method is the derivative of the residual, on a moving mesh with bounded and
-    /// periodic sides: what a step leaves out falls with the square of its length.
+    /// With every flux the matrix of Newton's method is the derivative of the residual, on a moving mesh with bounded
+    /// and periodic sides: what a step leaves out falls with the square of its length.
     #[test]
     fn newton_converges_quadratically() {
         for (flux, periodic) in FLUXES.into_iter().flat_map(|flux| [[false, true], [true, false]].map(|p| (flux, p))) {

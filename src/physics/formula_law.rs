@@ -289,8 +289,8 @@ mod tests {
         }
     }
 
-    /// The matrix of Newton's method is the derivative of the residual for two unknowns that convect, diffuse and make each
-    /// other: what a step leaves out falls with the square of its length.
+    /// The matrix of Newton's method is the derivative of the residual for two unknowns that convect, diffuse and make
+    /// each other: what a step leaves out falls with the square of its length.
     #[test]
     fn newton_converges_quadratically() {
         let pde: FormulaPde = toml::from_str(
@@ -317,7 +317,8 @@ mod tests {
         assert!((order - 2.0).abs() < 0.1, "order {order:.3}");
     }
 
-    /// Burgers' equation with central fluxes is the same equation as formulas, to round-off over 50 steps of a moving mesh.
+    /// Burgers' equation with central fluxes is the same equation as formulas, to round-off over 50 steps of a moving
+    /// mesh.
     #[test]
     fn burgers_as_formulas_is_burgers() {
         let viscosity = 0.01;

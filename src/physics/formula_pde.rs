@@ -13,17 +13,17 @@ use std::collections::BTreeMap;
 /// u_t + ∇·F(u, x, y, t) = ∇·(D(u, x, y, t) ∇u) + S(u, x, y, t)
 /// ```
 ///
-/// for every unknown u; F (`flux`, along x and along y), D ≥ 0 (`diffusivity`) and S (`source`) may hold all unknowns and
-/// are 0 where they are left out. `initial`, a formula of x and y (and t, the time at the start), is needed for each. On
-/// bounded sides `boundary` gives the value there, a formula of x, y and t, or says `"no-flux"`: then F·N − D ∇u·N = 0.
-/// `exact`, where it is known, gives the errors of a report: the largest and the mean square over the unknowns that have
-/// one.
+/// for every unknown u; F (`flux`, along x and along y), D ≥ 0 (`diffusivity`) and S (`source`) may hold all unknowns
+/// and are 0 where they are left out. `initial`, a formula of x and y (and t, the time at the start), is needed for
+/// each. On bounded sides `boundary` gives the value there, a formula of x, y and t, or says `"no-flux"`: then F·N − D
+/// ∇u·N = 0. `exact`, where it is known, gives the errors of a report: the largest and the mean square over the
+/// unknowns that have one.
 ///
-/// Finite volumes on [dual cells](crate::geometry::DualCells), Crank and Nicolson in time, solved by Newton's method with
-/// the derivatives of the formulas: second order in space and time. At a face F is the mean of its two nodes, and so is
-/// D. That is central: it does not stop wiggles where the mesh does not resolve a front. Σ A u changes only by what
-/// passes the sides and what S gives, on any moving mesh; with a field of one value a node and unknown, in the order of
-/// `unknowns`.
+/// Finite volumes on [dual cells](crate::geometry::DualCells), Crank and Nicolson in time, solved by Newton's method
+/// with the derivatives of the formulas: second order in space and time. At a face F is the mean of its two nodes, and
+/// so is D. That is central: it does not stop wiggles where the mesh does not resolve a front. Σ A u changes only by
+/// what passes the sides and what S gives, on any moving mesh; with a field of one value a node and unknown, in the
+/// order of `unknowns`.
 ///
 /// # Errors
 /// A step ends with [`Failure::Formula`](crate::Failure::Formula) where a formula is not finite.
@@ -102,8 +102,8 @@ impl FormulaPde {
     /// Refuses what makes no equation.
     ///
     /// # Errors
-    /// [`Error::Formula`] where a formula is none or D is a negative number; [`Error::Invalid`] where names do not serve
-    /// as such, an initial value is missing, or a key is no unknown.
+    /// [`Error::Formula`] where a formula is none or D is a negative number; [`Error::Invalid`] where names do not
+    /// serve as such, an initial value is missing, or a key is no unknown.
     pub fn check(&self) -> Result<()> {
         self.read().map(|_| ())
     }
@@ -122,7 +122,8 @@ impl FormulaPde {
             ([true, true], _, None) | (_, None, _) => Ok(()),
             (_, Some(name), _) => {
                 let rule = format!(
-                    "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to [true, true]"
+                    "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to [true, \
+                     true]"
                 );
                 Err(Error::invalid("boundary", format!("not given for `{name}`"), rule))
             }

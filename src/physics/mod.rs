@@ -92,7 +92,8 @@ kinds! {
     /// `[pde]` of a study.
     PdeKind {
         "burgers" = Burgers: "u_t + u u_x + u u_y = nu (u_xx + u_yy), an oblique front with exact solution",
-        "shallow-water" = ShallowWater: "h_t + div(h u) = 0, (h u)_t + div(h u u) + grad(g h^2/2) = 0, a pile of water that collapses",
+        "shallow-water" = ShallowWater: "h_t + div(h u) = 0, (h u)_t + div(h u u) + grad(g h^2/2) = 0, a pile of water \
+                                         that collapses",
         "formula" = FormulaPde: "u_t + div(F) = div(D grad u) + S, up to four unknowns with F, D and S as formulas",
         "prescribed" = Prescribed: "no equation: the solution or the mesh density is a formula of x, y and t",
     }

@@ -206,7 +206,8 @@ impl Palette {
 mod tests {
     use super::*;
 
-    /// Every colour of the map, bare or under a mesh line, is met within a few levels; black, white and a front exactly.
+    /// Every colour of the map, bare or under a mesh line, is met within a few levels; black, white and a front
+    /// exactly.
     #[test]
     fn the_palette_meets_the_colours_of_the_drawings() {
         let mut palette = Palette::of_maps();

@@ -25,14 +25,14 @@ pub struct Built {
     pub notes: Vec<String>,
 }
 
-/// (Re)builds `report.html` and the plots over time, with the picture of the mesh where there is none, and `animation.gif`
-/// where the study asks for it.
+/// (Re)builds `report.html` and the plots over time, with the picture of the mesh where there is none, and
+/// `animation.gif` where the study asks for it.
 ///
 /// The run may be finished, interrupted or still going on. What is damaged is left out and told of.
 ///
 /// # Errors
-/// [`Error::NotARun`](crate::Error::NotARun) for any other directory; [`Error::Unreadable`](crate::Error::Unreadable) or
-/// [`Error::Unwritable`](crate::Error::Unwritable).
+/// [`Error::NotARun`](crate::Error::NotARun) for any other directory; [`Error::Unreadable`](crate::Error::Unreadable)
+/// or [`Error::Unwritable`](crate::Error::Unwritable).
 pub fn build(directory: &Path) -> Result<Built> {
     let mut run = RunFiles::read(directory)?;
     // a run that goes on, or was killed, has not drawn it; one that goes on draws it at its end

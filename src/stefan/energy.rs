@@ -55,7 +55,8 @@ pub(super) struct Phase<'a> {
     pub u: &'a [f64],
 }
 
-/// What two-point Gauss quadrature meets in a cell: its share of the area, values of a bilinear function and its gradient.
+/// What two-point Gauss quadrature meets in a cell: its share of the area, values of a bilinear function and its
+/// gradient.
 struct Point {
     area: f64,
     value: [f64; 4],
@@ -67,7 +68,8 @@ impl Phase<'_> {
         self.columns.rows(self.phase) + 1
     }
 
-    /// Calls `f(corners, first row, point)` for all quadrature points; corners are (i, j), (i+1, j), (i, j+1), (i+1, j+1).
+    /// Calls `f(corners, first row, point)` for all quadrature points; corners are (i, j), (i+1, j), (i, j+1), (i+1,
+    /// j+1).
     fn integrate(&self, mut f: impl FnMut([usize; 4], &Point)) {
         let (m, dx) = (self.nodes(), self.columns.spacing());
         let gauss = [0.5 - 0.5 / 3.0_f64.sqrt(), 0.5 + 0.5 / 3.0_f64.sqrt()];

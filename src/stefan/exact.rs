@@ -47,8 +47,8 @@ enum Shape {
 }
 
 impl Similarity {
-    /// Neumann's solution: temperatures at the wall and far away, diffusivities below and above the front, mobility, tilt
-    /// in degrees, offset of the wall.
+    /// Neumann's solution: temperatures at the wall and far away, diffusivities below and above the front, mobility,
+    /// tilt in degrees, offset of the wall.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless the wall is warm, the other end not, and the tilt below 60 degrees.
@@ -73,8 +73,8 @@ impl Similarity {
         Ok(Self { shape: Shape::Planar { wall, tilt: [sin, cos], offset }, far, diffusivity, lambda })
     }
 
-    /// Melting around a line: heat given off per length and time, temperature far away, diffusivities below and above the
-    /// front, mobility, place of the line.
+    /// Melting around a line: heat given off per length and time, temperature far away, diffusivities below and above
+    /// the front, mobility, place of the line.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless the strength is positive and the temperature far away not.

@@ -113,8 +113,8 @@ impl HeatStep<'_> {
     }
 }
 
-/// Values of a column carried to other heights by straight lines; its front node moves to the new front at once, and nodes
-/// that the front has passed are dropped.
+/// Values of a column carried to other heights by straight lines; its front node moves to the new front at once, and
+/// nodes that the front has passed are dropped.
 pub(super) fn carry(y: &[f64], u: &[f64], front: usize, new: &[f64], to: &mut [f64]) {
     let last = y.len() - 1;
     // from the wall to the front

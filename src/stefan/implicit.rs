@@ -12,9 +12,9 @@ use std::f64::consts::PI;
 /// δJ = −Σ_i |D_i ∂u_i/∂y| √(k² + 1/(D_i Δt)) δh   for each wave number k
 /// ```
 ///
-/// A front that is a little higher takes the temperature −∂u/∂y δh to where it stood, and within a step of implicit Euler
-/// that dies away over 1/√(k² + 1/(DΔt)). Depths of phases are taken to be larger than that. A fixed point without this
-/// would have half the explicit step limit.
+/// A front that is a little higher takes the temperature −∂u/∂y δh to where it stood, and within a step of implicit
+/// Euler that dies away over 1/√(k² + 1/(DΔt)). Depths of phases are taken to be larger than that. A fixed point
+/// without this would have half the explicit step limit.
 pub(super) struct Response {
     /// √(k² + 1/(D_i Δt)) as a matrix over the columns, for each phase.
     roots: [Vec<f64>; 2],

@@ -171,8 +171,8 @@ impl Estimates {
 /// A way to compute the solution of a mesh step at single nodes.
 ///
 /// # Example
-/// An estimator that solves the whole domain and hands out what is asked for: the subdomains of [`Stochastic`] then make the
-/// mesh of [`Whole`](crate::meshing::Whole).
+/// An estimator that solves the whole domain and hands out what is asked for: the subdomains of [`Stochastic`] then
+/// make the mesh of [`Whole`](crate::meshing::Whole).
 ///
 /// ```
 /// use driftmesh::geometry::{Lattice, Mesh};
@@ -218,7 +218,8 @@ pub trait Estimator: Send + Sync {
 kinds! {
     /// `mesh.generator.estimator` of a study.
     EstimatorKind {
-        "residual-walk" = ResidualWalk: "strips around the interfaces, then random walks on the lattice for what they leave",
+        "residual-walk" = ResidualWalk: "strips around the interfaces, then random walks on the lattice for what they \
+                                         leave",
         "strip" = Strip: "every subdomain solved once with a strip of its neighbours, after a coarse lattice; no walks",
         "grid-walk" = GridWalk: "random walks on the lattice, unbiased for the discrete equation",
         "monte-carlo" = MonteCarlo: "as published: Euler-Maruyama paths with a Brownian-bridge exit test",

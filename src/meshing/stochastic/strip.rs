@@ -54,7 +54,8 @@ impl Strip {
             )),
             Self { width: Auto::Value(width), .. } if width > narrowest => {
                 let rule = format!(
-                    "must be at most the {narrowest} cells of the narrowest subdomain; lower it, or give fewer subdomains"
+                    "must be at most the {narrowest} cells of the narrowest subdomain; lower it, or give fewer \
+                     subdomains"
                 );
                 Err(Error::invalid("width", width, rule))
             }

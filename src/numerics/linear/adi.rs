@@ -9,12 +9,14 @@ use crate::parallel;
 /// ```
 ///
 /// X and Y are the parts of the star along each axis with half of the identity each. Sweep j damps best the modes for
-/// which X and Y are near R_j, and the R_j divide the spectrum [λ, κλ] geometrically, row by row: the number J of sweeps
-/// in a cycle grows like ln κ, and a sweep leaves a quarter to a third of the error. Each sweep solves the tridiagonal
-/// systems along all lines of the lattice, axis by axis, eliminated once for all cycles and right-hand sides. In one
-/// dimension a single sweep is the inverse itself. Corners and couplings around periodic axes are left to the residual.
+/// which X and Y are near R_j, and the R_j divide the spectrum [λ, κλ] geometrically, row by row: the number J of
+/// sweeps in a cycle grows like ln κ, and a sweep leaves a quarter to a third of the error. Each sweep solves the
+/// tridiagonal systems along all lines of the lattice, axis by axis, eliminated once for all cycles and right-hand
+/// sides. In one dimension a single sweep is the inverse itself. Corners and couplings around periodic axes are left to
+/// the residual.
 ///
-/// Made for one and two axes: with three, the same product of factors multiplies some modes by 3. More axes do not compile.
+/// Made for one and two axes: with three, the same product of factors multiplies some modes by 3. More axes do not
+/// compile.
 ///
 /// # Source
 /// Wachspress, *The ADI Model Problem*, Springer (2013).

@@ -6,8 +6,8 @@ use crate::work::Work;
 /// Alternating-direction cycles, and BiCGSTAB preconditioned by them where they are slow, for all right-hand sides at
 /// once
 ///
-/// A mesh equation takes a few cycles, whose sweeps grow with the logarithm of Δt/h² (`make bench` counts them). Corners,
-/// strong convection and periodic axes call for the Krylov method. An iteration is a sweep.
+/// A mesh equation takes a few cycles, whose sweeps grow with the logarithm of Δt/h² (`make bench` counts them).
+/// Corners, strong convection and periodic axes call for the Krylov method. An iteration is a sweep.
 ///
 /// For lattices of one and two axes; alternating directions of three diverge, and do not compile:
 ///

@@ -3,18 +3,20 @@ use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalle
 use crate::error::Failure;
 use crate::work::Work;
 
-/// BiCGSTAB preconditioned by incomplete elimination, for B coupled unknowns a node on the nine points of two dimensions
+/// BiCGSTAB preconditioned by incomplete elimination, for B coupled unknowns a node on the nine points of two
+/// dimensions
 ///
 /// ILU(0), lines of the lattice one after the other; couplings around periodic axes are left to the iteration. Made for
 /// implicit steps of convection and diffusion, whose matrices are neither symmetric nor dominated by their star. An
 /// iteration is a product with the matrix.
 ///
 /// # Source
-/// Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed. (2003), section 10.3; van der Vorst, *Bi-CGSTAB* (1992).
+/// Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed. (2003), section 10.3; van der Vorst, *Bi-CGSTAB*
+/// (1992).
 #[derive(Debug, Clone, Default)]
 pub struct IluBicgstab<const B: usize> {
-    /// At each place of a padded vector: the inverse of the pivot, then the entries of both factors, those above over the
-    /// pivot; zero on the ring.
+    /// At each place of a padded vector: the inverse of the pivot, then the entries of both factors, those above over
+    /// the pivot; zero on the ring.
     rows: Vec<[[[f64; B]; B]; 9]>,
     krylov: Krylov<B>,
 }

@@ -1,8 +1,8 @@
 //! Linear systems on a patch of the lattice.
 //!
 //! A [`LatticeMatrix`] couples every unknown of a [`Patch`] to its nearest neighbours. [`LinearSolver`] is the seam:
-//! [`Bicgstab`] is the fast way, [`BlockBicgstab`] that of several unknowns a node, [`SparseLu`] the oracle and the last
-//! resort, [`Fallback`] one after the other.
+//! [`Bicgstab`] is the fast way, [`BlockBicgstab`] that of several unknowns a node, [`SparseLu`] the oracle and the
+//! last resort, [`Fallback`] one after the other.
 
 mod adi;
 mod bicgstab;

@@ -10,16 +10,18 @@ use crate::numerics::larger;
 /// xᵀ A x = Σ_i W_i x_i² + Σ_edges a (x_i − x_k)²,   rings being 0 or images
 /// ```
 ///
-/// Along an axis every second node is kept, and x is linear between them. Of the network of the kept nodes, each edge has
-/// half the mean of the conductances of the two that it replaces, and what lies between goes half to each side. That is the
-/// Galerkin product where x varies along the axis alone and more than it elsewhere, so that the cycle has a spectrum in
-/// (0, 1] for any network. Lattices of any number of nodes are halved: the last edge is then as long as before.
+/// Along an axis every second node is kept, and x is linear between them. Of the network of the kept nodes, each edge
+/// has half the mean of the conductances of the two that it replaces, and what lies between goes half to each side.
+/// That is the Galerkin product where x varies along the axis alone and more than it elsewhere, so that the cycle has a
+/// spectrum in (0, 1] for any network. Lattices of any number of nodes are halved: the last edge is then as long as
+/// before.
 ///
 /// Only axes along which the network couples most are halved at a time: nodes are relaxed in two colours, which damps
 /// what changes along those. Each cycle costs a fixed number of operations a node.
 ///
 /// # Source
-/// Trottenberg, Oosterlee, Schüller, *Multigrid*, Academic Press (2001), 5.1 (halving along single axes) and 2.5 (cycles).
+/// Trottenberg, Oosterlee, Schüller, *Multigrid*, Academic Press (2001), 5.1 (halving along single axes) and 2.5
+/// (cycles).
 #[derive(Debug, Clone)]
 pub(super) struct Multigrid<const D: usize, const K: usize> {
     /// From the finest to the coarsest.
@@ -245,8 +247,8 @@ impl<const D: usize, const K: usize> Level<D, K> {
         patch.wrap(x);
     }
 
-    /// True where two nodes of one colour are neighbours: around an axis with an odd number of nodes. They see each other as
-    /// they were before.
+    /// True where two nodes of one colour are neighbours: around an axis with an odd number of nodes. They see each
+    /// other as they were before.
     fn has_odd_period(&self) -> bool {
         (0..D).any(|d| self.patch.wraps[d] && self.patch.size[d] % 2 == 1)
     }
@@ -487,7 +489,13 @@ mod tests {
         /// The cycle is symmetric, and its spectrum lies in (0, 1]: v·Mv > 0, and Mv never overshoots, in any network.
         #[test]
         fn the_cycle_is_an_inner_product(
-            n in 1_usize..20, m in 1_usize..20, wx: bool, wy: bool, log_a in -3.0..6.0_f64, skew in -3.0..3.0_f64, seed: u64
+            n in 1_usize..20,
+            m in 1_usize..20,
+            wx: bool,
+            wy: bool,
+            log_a in -3.0..6.0_f64,
+            skew in -3.0..3.0_f64,
+            seed: u64,
         ) {
             let cell = |[i, j]: [usize; 2]| {
                 let mixed = (seed ^ (i * 1009 + j) as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
@@ -512,13 +520,14 @@ mod tests {
             a.multiply(&z, &mut az);
             for c in 0..2 {
                 let energy: f64 = a.patch.places().map(|k| z[k][c] * az[k][c]).sum();
-                prop_assert!(product(c, c) > 0.0 && energy <= (1.0 + 1e-9) * product(c, c), "{energy} {}", product(c, c));
+                let norm = product(c, c);
+                prop_assert!(norm > 0.0 && energy <= (1.0 + 1e-9) * norm, "{energy} {norm}");
             }
         }
     }
 
-    /// At most a third more iterations on 64 times as many nodes, bounded and periodic, of odd and even numbers, with any ratio of
-    /// couplings, where the coefficient is smooth.
+    /// At most a third more iterations on 64 times as many nodes, bounded and periodic, of odd and even numbers, with
+    /// any ratio of couplings, where the coefficient is smooth.
     #[test]
     fn iterations_do_not_grow_with_the_lattice() {
         for (wraps, ratio) in

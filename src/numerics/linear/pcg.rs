@@ -3,18 +3,18 @@ use super::multigrid::Multigrid;
 use super::{LatticeMatrix, larger, solved, stalled};
 use crate::error::Failure;
 
-/// Conjugate gradients for symmetric M-matrices on a star, preconditioned by multigrid where they are stiff, by modified
-/// incomplete elimination where they are not
+/// Conjugate gradients for symmetric M-matrices on a star, preconditioned by multigrid where they are stiff, by
+/// modified incomplete elimination where they are not
 ///
-/// A V-cycle takes six to nine iterations for any lattice and stiffness. Elimination takes about 3.4 (8a)^¼ for conductances a
-/// over the mass of a node, each of a third of the cost:
+/// A V-cycle takes six to nine iterations for any lattice and stiffness. Elimination takes about 3.4 (8a)^¼ for
+/// conductances a over the mass of a node, each of a third of the cost:
 ///
 /// ```text
 /// M = (L + E) E⁻¹ (E + Lᵀ),   e_i = a_ii − Σ_k a_ik (a_ik + Σ_j a_kj) / e_k,   k below i, j ≠ i above k
 /// ```
 ///
-/// that is MIC(0), lines of the lattice one after the other: what elimination would fill in is added to the diagonal, so
-/// that smooth errors are met at once. Couplings around periodic axes are left to the iteration. An iteration is a
+/// that is MIC(0), lines of the lattice one after the other: what elimination would fill in is added to the diagonal,
+/// so that smooth errors are met at once. Couplings around periodic axes are left to the iteration. An iteration is a
 /// product with the matrix; all right-hand sides go together.
 ///
 /// # Source

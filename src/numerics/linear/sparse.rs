@@ -8,8 +8,8 @@ const PASSES: usize = 4;
 
 /// A square sparse system of any pattern, solved by faer's sparse LU with refinement
 ///
-/// For rows that are no stencil of a patch: one-sided differences on sides, windows that are shifted near walls. Runs on
-/// one thread.
+/// For rows that are no stencil of a patch: one-sided differences on sides, windows that are shifted near walls. Runs
+/// on one thread.
 ///
 /// # Example
 /// ```

@@ -33,7 +33,8 @@ impl Flux<'_> {
         Face { normal, passed, h, u, v, depths: [a[0], b[0]] }
     }
 
-    /// Mass and momentum through the face above place k: h̄(ū·N) (1, ū) + ½g \overline{h²} N, less what the face sweeps.
+    /// Mass and momentum through the face above place k: h̄(ū·N) (1, ū) + ½g \overline{h²} N, less what the face
+    /// sweeps.
     fn through(&self, cells: &DualCells, w: &[Water], k: usize, axis: usize) -> Water {
         let Face { normal, passed, h, u, v, depths: [a, b] } = self.face(cells, w, k, axis);
         let mass = h * passed;

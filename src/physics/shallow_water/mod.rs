@@ -24,7 +24,8 @@ use serde::{Deserialize, Serialize};
 /// Unknowns: the depth h > 0 and the velocity (u, v). Both axes must be periodic; r then reaches to the nearest image.
 /// Time is trapezoidal, solved by Newton's method with the true Jacobian; second order in space and time.
 ///
-/// **Flux form.** Finite volumes on the [dual cells](DualCells) of areas A, over faces of normal N that sweep the area s:
+/// **Flux form.** Finite volumes on the [dual cells](DualCells) of areas A, over faces of normal N that sweep the area
+/// s:
 ///
 /// ```text
 /// A′ q′ − A q = − ½ Σ [Δt F(q, N) − s q̄] − ½ Σ [Δt F(q′, N′) − s q̄′],   q = (h, h u)
@@ -53,8 +54,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// # Source
 /// Fjordholm, Mishra and Tadmor, *Well-balanced and energy stable schemes for the shallow water equations with
-/// discontinuous topography* (2011), for F. (4.2) of Bihlo, Haynes and Walsh (2015) for the advective form; the shape of
-/// their pile is not published.
+/// discontinuous topography* (2011), for F. (4.2) of Bihlo, Haynes and Walsh (2015) for the advective form; the shape
+/// of their pile is not published.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShallowWater {

@@ -396,8 +396,8 @@ struct Stages<'s, const G: usize> {
     by: [Stencil<G>; 4],
 }
 
-/// A band as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has. Products
-/// and sums are not fused, so that the bits are the same with any.
+/// A band as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has.
+/// Products and sums are not fused, so that the bits are the same with any.
 struct Band<'s, const G: usize> {
     stages: &'s Stages<'s, G>,
     first: usize,
