@@ -327,8 +327,8 @@ def test_everything_on_the_page_has_a_name(run, chromium):
     opened(chromium, run)
     unnamed = chromium.execute_script(
         """const named = (e) => e.labels?.length || e.getAttribute('aria-label') || e.textContent.trim();
-        return [...document.querySelectorAll('button, input, select, .stages canvas, .plot, .scroll')].filter((e) =>
-        !named(e)).map((e) => e.outerHTML)"""
+        const used = document.querySelectorAll('button, input, select, .stages canvas, .plot, .scroll');
+        return [...used].filter((e) => !named(e)).map((e) => e.outerHTML)"""
     )
     assert unnamed == []
     label = chromium.find_element("css selector", ".stages canvas").get_attribute("aria-label")
@@ -339,8 +339,8 @@ def test_everything_on_the_page_has_a_name(run, chromium):
 def overflowing(browser):
     """Texts that are cut, or leave the page."""
     return browser.execute_script("""const wide = document.documentElement.clientWidth + 1, out = [];
-        for (const e of document.querySelectorAll('h1, h2, p, button, label, output, figcaption, dd, dt, select, canvas,
-        .box, .ticks span')) {
+        const shown = 'h1, h2, p, button, label, output, figcaption, dd, dt, select, canvas, .box, .ticks span';
+        for (const e of document.querySelectorAll(shown)) {
           const r = e.getBoundingClientRect();
           if (r.width && (r.right > wide || r.left < -1)) out.push(e.outerHTML.slice(0, 120));
         }
@@ -383,11 +383,11 @@ def test_long_names_have_room(chromium, tmp_path):
         opened(chromium, directory, width=width)
         screenshot(chromium, f"long-names-{look}")
         assert overflowing(chromium) == []
-        shares = chromium.execute_script("""const box = document.getElementById('viewer').getBoundingClientRect(), bar =
-            document.querySelector('.bar'); const inside = [...document.querySelectorAll('#viewer :is(select, label,
-            button, canvas, dt, dd, .name)')]; return [inside.every((e) => { const r = e.getBoundingClientRect(); return
-            !r.width || r.left >= box.left && r.right <= box.right }),
-              bar.querySelector('canvas').clientWidth / bar.clientWidth]""")
+        shares = chromium.execute_script("""const bar = document.querySelector('.bar');
+            const place = (e) => e.getBoundingClientRect(), box = place(document.getElementById('viewer'));
+            const inside = [...document.querySelectorAll('#viewer :is(select, label, button, canvas, dt, dd, .name)')];
+            const fits = (r) => !r.width || r.left >= box.left && r.right <= box.right;
+            return [inside.every((e) => fits(place(e))), bar.querySelector('canvas').clientWidth / bar.clientWidth]""")
         assert shares[0] and shares[1] > 0.5, shares
 
 
@@ -400,8 +400,8 @@ def test_the_viewer_draws_161_by_161_nodes(chromium, tmp_path):
     rate = max(
         chromium.execute_async_script("""const done = arguments[0], start = viewer.drawn, from = performance.now();
         viewer.play(true);
-        setTimeout(() => { const rate = (viewer.drawn - start) / (performance.now() - from) * 1000; viewer.play(false);
-        done(rate) }, 500)""") for _ in range(4)
+        const rate = () => (viewer.drawn - start) / (performance.now() - from) * 1000;
+        setTimeout(() => { const found = rate(); viewer.play(false); done(found) }, 500)""") for _ in range(4)
     )
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
     (SCREENSHOTS / "frames-a-second.json").write_text(json.dumps({"nodes": [161, 161], "frames_a_second": rate}) + "\n")
