@@ -81,8 +81,8 @@ pub(super) struct Chain<'a> {
 /// taken: then many pieces have no discrete solution near an iterate and never converge. Of 2000 random lines as many
 /// converged with the quarter as with all.
 const MAX_NEWTON: usize = 200;
-/// Largest number of steps in the search for a flux: Newton's, or doublings and halvings of a bracket. From a bracket on,
-/// some 60 halvings reach rounding.
+/// Largest number of steps in the search for a flux: Newton's, or doublings and halvings of a bracket. From a bracket
+/// on, some 60 halvings reach rounding.
 const MAX_BISECTIONS: usize = 400;
 /// Halvings of a Newton step along straight lines before it is given up: 2⁻⁴⁰ of a step changes next to nothing.
 const HALVINGS: i32 = 40;

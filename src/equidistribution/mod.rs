@@ -249,7 +249,8 @@ const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// An iteration whose mesh no longer changes counts as converged up to rounding if its error is below this share of the
 /// length of the line; farther away it is stuck.
 const NEAR: f64 = 1e-6;
-/// Largest number of iterations that may be asked for. A message calls an iteration that needs more too slow to wait for.
+/// Largest number of iterations that may be asked for. A message calls an iteration that needs more too slow to wait
+/// for.
 pub(crate) const MOST_ITERATIONS: usize = 1_000_000;
 /// Where rounding stops an iteration, the message recommends this multiple of the error reached as the tolerance.
 const STILL: f64 = 1.5;
