@@ -56,7 +56,7 @@ function shape(x, y, a, row, uniform) {
 
 // ---- pixels ----
 
-/** Where a row of pixels enters and leaves a quadrilateral, and the values there. One for all rows: it is filled anew. */
+/** Where a row of pixels enters and leaves a quadrilateral, and the values there; filled anew for each row. */
 const span = { from: 0, to: 0, first: 0, last: 0 };
 
 /** Takes the place where an edge crosses the middle of a row, if it does; `per` is 1 over its height. */

@@ -1,7 +1,7 @@
 /**
  * What the viewers of a mesh and of a line share: controls, time, the part of the plane in sight, and the readout. A
- * viewer says what it draws (`drawStage`, `drawBar`), which figures it has of cells (`figures`, `cellValues`), what lies
- * under the pointer (`point`), and what is known of a node (`known`).
+ * viewer has methods for what it draws (`drawStage`, `drawBar`), the figures of its cells (`figures`, `cellValues`),
+ * what lies under the pointer (`point`), and what is known of a node (`known`).
  */
 class Viewer {
     constructor(data, arrays) {

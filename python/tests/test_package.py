@@ -85,7 +85,7 @@ def test_the_examples_of_the_readme_run(tmp_path):
 
 def test_every_failure_has_its_exception():
     page = (ROOT / "docs/errors.md").read_text("utf-8")
-    names = re.findall(r"^\| `([a-z-]+)` \|", page, re.MULTILINE)
+    names = re.findall(r"^- `([a-z-]+)`: ", page, re.MULTILINE)
     assert len(names) > 20
     for name in names:
         error = getattr(errors, "".join(word.capitalize() for word in name.split("-")))
