@@ -53,9 +53,10 @@ const POINTS: usize = DEGREE + 1;
 const FIRST: usize = 128;
 /// Pieces beyond which none is halved any more: M is then taken as its polynomials have it.
 const MOST: usize = 1 << 16;
-/// A piece is resolved where its last coefficients are below this share of the mean of M on it …
+/// A piece is resolved where its last coefficients are below this share of the mean of M on it.
 const RESOLVED: f64 = 1e-12;
-/// … or change ∫M over the line by less than this share, which is below its rounding.
+/// A piece also counts as resolved where its last coefficients change ∫M over the line by less than this share, which is
+/// below rounding.
 const ROUNDING: f64 = 1e-16;
 /// Last coefficients that halving does not lower are taken for rounding only below this share of the mean of M.
 const NOISY: f64 = 1e-6;
@@ -228,9 +229,9 @@ impl Cumulative {
     }
 }
 
-/// u jumps between two neighbouring floating-point numbers where its chord is longer than this multiple of the arc …
+/// u jumps between two neighbouring floating-point numbers where its chord is longer than this multiple of the arc.
 const JUMP: f64 = 2.0;
-/// … and longer than this share of the arc length of the whole line: what is shorter is rounding of u.
+/// A chord shorter than this share of the arc length of the whole line is no jump: it may be rounding of u.
 const NOTICEABLE: f64 = 1e-12;
 
 impl Piece {

@@ -268,9 +268,9 @@ const PARTS: usize = 64;
 const CELLS_AT_ONCE: usize = 4096;
 /// Largest number of cells that are divided into the finer parts.
 const MOST: usize = 1000;
-/// Largest number of glued meshes that are stored …
+/// Largest number of glued meshes that are stored.
 const MOST_MESHES: usize = 100;
-/// … and of nodes in them: 8 MB.
+/// Largest number of nodes in all glued meshes that are stored: 8 MB.
 const MOST_KEPT: usize = 1 << 20;
 
 impl Line {

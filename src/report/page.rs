@@ -6,6 +6,7 @@ use minijinja::Environment;
 use serde::Serialize;
 use serde_json::Value;
 
+/// Files of `assets/report` that make up the page.
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
 const STYLE: &str = include_str!("../../assets/report/style.css");
 const SCRIPT: &str = concat!(
