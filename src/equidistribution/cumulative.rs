@@ -55,8 +55,8 @@ const FIRST: usize = 128;
 const MOST: usize = 1 << 16;
 /// A piece is resolved where its last coefficients are below this share of the mean of M on it.
 const RESOLVED: f64 = 1e-12;
-/// A piece also counts as resolved where its last coefficients change ∫M over the line by less than this share, which is
-/// below rounding.
+/// A piece also counts as resolved where its last coefficients change ∫M over the line by less than this share, which
+/// is below rounding.
 const ROUNDING: f64 = 1e-16;
 /// Last coefficients that halving does not lower are taken for rounding only below this share of the mean of M.
 const NOISY: f64 = 1e-6;

@@ -16,7 +16,7 @@ pub enum Relaxation {
     /// Chosen from step to step by how the mesh moves, with a prediction: see [`Gait`](crate::mover::Gait).
     #[default]
     Auto,
-    /// τ in units of time.
+    /// τ in units of time: how long the mesh takes to follow its density.
     Time(f64),
     /// τ in units of the time step.
     Steps(Steps),
@@ -28,7 +28,7 @@ pub enum Relaxation {
 enum Written {
     /// Chosen from step to step by how the mesh moves.
     Auto(Word),
-    /// τ in units of time.
+    /// τ in units of time: how long the mesh takes to follow its density.
     Time(f64),
     /// τ in units of the time step.
     Steps(Steps),
@@ -73,10 +73,12 @@ impl From<Relaxation> for Written {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Steps {
-    /// τ/Δt.
+    /// τ as a number of time steps, at least 2. How many are enough depends on how many cells resolve the thinnest
+    /// layer.
     pub steps: f64,
-    /// γ, from 0 (no prediction) to ½. A generator used alone keeps no velocities and refuses a γ above 0; studies have
-    /// a [`Mover`](crate::mover::Mover), which does.
+    /// γ: the share of each correction that the velocity of a node learns, from 0 (no prediction) to ½. It needs a
+    /// [`Mover`](crate::mover::Mover), as studies have; a generator used alone keeps no velocities, and refuses a γ
+    /// above 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prediction: f64,
 }
