@@ -12,7 +12,9 @@ from scipy.sparse.linalg import splu
 root = Path(__file__).resolve().parent.parent
 with tempfile.TemporaryDirectory() as directory:
     file = Path(directory) / "system.npz"
-    subprocess.run(["cargo", "bench", "--quiet", "-p", "driftmesh", "--bench", "mesh_solve", "--", file], cwd=root, check=True)
+    subprocess.run(
+        ["cargo", "bench", "--quiet", "-p", "driftmesh", "--bench", "mesh_solve", "--", file], cwd=root, check=True
+    )
     system = dict(np.load(file))
 
 rows, b, known, ours = (system[key] for key in ("rows", "b", "known", "x"))

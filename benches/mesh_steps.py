@@ -34,9 +34,18 @@ def in_python():
 runs = [(in_rust(), in_python()) for _ in range(4)]
 rust, python = (min(run[k][0] for run in runs) for k in (0, 1))
 off = abs(runs[0][0][1] - runs[0][1][1])
-print(f"100 steps of 113²: Rust {rust:.3f} s, Python {python:.3f} s, ratio {python / rust:.2f}; the meshes differ by {off:.1e}")
+print(
+    f"100 steps of 113²: Rust {rust:.3f} s, Python {python:.3f} s, ratio {python / rust:.2f}; "
+    f"the meshes differ by {off:.1e}"
+)
 
-code = "import time; t = time.perf_counter(); import driftmesh, sys; print(time.perf_counter() - t, 'matplotlib' in sys.modules)"
-imports = [subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split() for _ in range(7)]
+code = (
+    "import time; t = time.perf_counter(); import driftmesh, sys; "
+    "print(time.perf_counter() - t, 'matplotlib' in sys.modules)"
+)
+imports = [
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    for _ in range(7)
+]
 seconds = sorted(float(seconds) for seconds, _ in imports)
 print(f"import driftmesh: {seconds[0]:.3f} s (middle of seven {seconds[3]:.3f}), matplotlib with it: {imports[0][1]}")

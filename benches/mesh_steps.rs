@@ -1,5 +1,5 @@
-//! Mesh stepping by itself: the mesh of 113² nodes follows a front for 100 steps. `benches/mesh_steps.py` does the same from
-//! Python.
+//! Mesh stepping by itself: the mesh of 113² nodes follows a front for 100 steps. `benches/mesh_steps.py` does the same
+//! from Python.
 
 use driftmesh::density::{Arclength, Monitor};
 use driftmesh::geometry::{Lattice, Mesh};

@@ -1,5 +1,5 @@
-"""The boundary layer u = (1 - e^20x)/(1 - e^20): seconds to a mesh x(ξ) of equal arc length with a given largest error, by
-SciPy's solve_bvp and by ours (cargo bench --bench schwarz_line -- layer CELLS). Ours is also run on a million cells.
+"""The boundary layer u = (1 - e^20x)/(1 - e^20): seconds to a mesh x(ξ) of equal arc length with a given largest error,
+by SciPy's solve_bvp and by ours (cargo bench --bench schwarz_line -- layer CELLS). Ours is also run on a million cells.
 
     python benches/schwarz_line.py
 """
@@ -57,7 +57,8 @@ for cells in [40, 160, 640]:
             break
     print(
         f"{cells} cells: error {error:.1e} in {1e3 * seconds:.3f} ms; "
-        f"solve_bvp, tol {tolerance:.0e}, {nodes} nodes: {their_error:.1e} in {1e3 * theirs:.2f} ms, {theirs / seconds:.0f} times"
+        f"solve_bvp, tol {tolerance:.0e}, {nodes} nodes: {their_error:.1e} in {1e3 * theirs:.2f} ms, "
+        f"{theirs / seconds:.0f} times"
     )
 
 subprocess.run(["cargo", "bench", "--quiet", "-p", "driftmesh", "--bench", "schwarz_line"], cwd=ROOT, check=True)

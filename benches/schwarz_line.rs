@@ -1,7 +1,7 @@
 //! Equidistribution on a million cells and 64 subdomains, and of a boundary layer to a given accuracy.
 //!
-//! With `layer CELLS` as arguments it times that alone and prints seconds and the error against the continuous mesh, for
-//! the script that puts SciPy's `solve_bvp` beside it.
+//! With `layer CELLS` as arguments it times that alone and prints seconds and the error against the continuous mesh,
+//! for the script that puts SciPy's `solve_bvp` beside it.
 
 use driftmesh::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Measure, Method, Stop, Sweep, pieces};
 use std::time::Instant;
@@ -30,7 +30,8 @@ fn million() {
         let history = line.iterate(0.0, &ranges, method, &line.uniform(), None, stop).expect("solvable");
         let seconds = clock.elapsed().as_secs_f64();
         println!(
-            "{name:8} {cells} cells, 64 subdomains: {} iterations, {} linear solves, to {:.1e} in {seconds:.2} s, {} threads",
+            "{name:8} {cells} cells, 64 subdomains: {} iterations, {} linear solves, to {:.1e} in {seconds:.2} s, \
+             {} threads",
             history.count(),
             history.iterates[history.count()].linear_solves,
             history.iterates[history.count()].error,

@@ -39,7 +39,8 @@ a {{ color: light-dark(#0063a3, #63b3ed); }}
 </head>
 <body>
 <h1>driftmesh gallery</h1>
-<p style="margin-left: 0">Each picture is the outcome of a study in <code>studies/</code>; its report has the viewer, the figures and the settings.</p>
+<p style="margin-left: 0">Each picture is the outcome of a study in <code>studies/</code>;
+its report has the viewer, the figures and the settings.</p>
 <main>
 {articles}
 </main>
@@ -47,7 +48,9 @@ a {{ color: light-dark(#0063a3, #63b3ed); }}
 </html>
 """
 ARTICLE = """<article>
-<a href="{name}/report.html" aria-label="Report of {name}"><picture><source srcset="{name}/animation.gif" media="(prefers-reduced-motion: no-preference)"><img src="{name}/mesh.png" alt="{title}: the mesh over the solution" loading="lazy"></picture></a>
+<a href="{name}/report.html" aria-label="Report of {name}"><picture>
+<source srcset="{name}/animation.gif" media="(prefers-reduced-motion: no-preference)">
+<img src="{name}/mesh.png" alt="{title}: the mesh over the solution" loading="lazy"></picture></a>
 <h2>{title}</h2>
 <p>{words} <a href="{name}/report.html">Report</a>; the run took {seconds:.2g} s.</p>
 </article>"""
@@ -56,12 +59,16 @@ ARTICLE = """<article>
 def words(study):
     """The comment at the head of a study file."""
     lines = study.read_text().splitlines()
-    return " ".join(line.lstrip("# ") for line in lines[: next(k for k, line in enumerate(lines) if not line.startswith("#"))])
+    return " ".join(
+        line.lstrip("# ") for line in lines[: next(k for k, line in enumerate(lines) if not line.startswith("#"))]
+    )
 
 
 def article(program, name, title, out):
     study = ROOT / f"studies/{name}.toml"
-    subprocess.run([program, "run", study, "--quiet", "--out", out / name, "--set", "output.animation=true"], check=True)
+    subprocess.run(
+        [program, "run", study, "--quiet", "--out", out / name, "--set", "output.animation=true"], check=True
+    )
     seconds = json.loads((out / name / "summary.json").read_text())["seconds"]["wall"]
     return ARTICLE.format(name=name, title=title, words=html.escape(words(study)), seconds=seconds)
 

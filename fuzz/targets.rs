@@ -68,6 +68,7 @@ pub fn checkpoint(data: &[u8]) {
     }
 }
 
-/// The studies of the corpus: `driftmesh run` leaves a checkpoint of them when it is interrupted; its first 55 bytes go.
+/// The studies of the corpus: `driftmesh run` leaves a checkpoint of them when it is interrupted; its first 55 bytes
+/// go.
 const MOVING: &str = include_str!("studies/moving.toml");
 const FRONT: &str = include_str!("studies/front.toml");

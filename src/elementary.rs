@@ -1,5 +1,5 @@
-//! Elementary functions of our own: branch-free, so that the compiler can take several at once, and the same bits on every
-//! machine, which the functions of its library have not.
+//! Elementary functions without branches, so that the compiler can evaluate several at once, and with the same bits on
+//! every machine, which those of the system's library do not have.
 
 /// e^x of any number, to two units in the last place.
 #[inline(always)]
@@ -10,13 +10,13 @@ pub(crate) fn exp(x: f64) -> f64 {
     const HIGH: f64 = f64::from_bits(0x3FE6_2E42_FEE0_0000);
     const LOW: f64 = 1.908_214_929_270_587_7e-10;
     const TERMS: [f64; 14] = factorials();
-    // beyond lie 0 and infinity; a NaN stays
+    // the result beyond is 0 or infinite; a NaN stays
     let x = if x > 710.0 { 710.0 } else { x };
     let x = if x < -746.0 { -746.0 } else { x };
     // x = n ln 2 + r with |r| ≤ ½ ln 2: the first term left out is below 1e-17
     let n = (x * std::f64::consts::LOG2_E + WHOLE) - WHOLE;
     let r = (x - n * HIGH) - n * LOW;
-    // 2ⁿ in two parts, since n goes beyond the exponents that there are
+    // 2ⁿ as a product of two powers, since n may exceed the range of exponents
     let half = 0.5 * n + WHOLE;
     let rest = n - (half - WHOLE) + WHOLE;
     let power = |bits: f64| f64::from_bits(bits.to_bits().wrapping_add(1023) << 52);

@@ -1,8 +1,8 @@
 //! Everything that can go wrong, as data.
 //!
 //! Two enums: a [`Failure`] is what the mathematics can do wrong in a step (it knows *what* and *where*), an [`Error`]
-//! is what reaches the caller (it adds *when*, and covers settings and files). A failure offers [remedies](Remedy) by their
-//! meaning; a study says those that it has in its own keys, Python in its arguments, and `help` in plain words.
+//! is what reaches the caller (it adds *when*, and covers settings and files). A failure offers [remedies](Remedy) by
+//! their meaning; a study says those that it has in its own keys, Python in its arguments, and `help` in plain words.
 
 mod cause;
 mod diagnostic;
@@ -223,7 +223,8 @@ impl Error {
             Self::NotARun { .. } => Some("name the directory that `driftmesh run` printed behind `run`".into()),
             Self::Checkpoint { refused } => Some(match refused.first() {
                 Some((_, Unfit::Study { .. })) => {
-                    "go on with the settings in its study.toml; or leave --resume out to begin anew, or name another directory with --out"
+                    "go on with the settings in its study.toml; or leave --resume out to begin anew, or name another \
+                     directory with --out"
                 }
                 Some((_, Unfit::Version { .. })) => "go on with that version, or leave --resume out to begin anew",
                 _ => "leave --resume out to begin anew",

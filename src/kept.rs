@@ -1,4 +1,4 @@
-//! What the parts of a run carry from step to step, put together under names: what a checkpoint is made of.
+//! The state that the parts of a run carry from step to step, stored under names: the contents of a checkpoint.
 
 use crate::error::Unfit;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -39,7 +39,7 @@ pub(crate) fn encoded(value: &impl Serialize) -> Vec<u8> {
     rmp_serde::to_vec_named(value).expect("writing plain data to memory cannot fail")
 }
 
-/// Refuses an array that has not one finite entry a node.
+/// Refuses an array that does not hold one finite entry for each node.
 pub(crate) fn check_nodal<const K: usize>(what: &str, values: &[[f64; K]], nodes: usize) -> Result<(), Unfit> {
     if values.len() != nodes {
         return Err(Unfit::Damaged(format!("its {what} has {} entries for {nodes} nodes", values.len())));

@@ -38,7 +38,8 @@ macro_rules! kinds {
             fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
                 #[derive(schemars::JsonSchema)]
                 #[schemars(tag = "kind")]
-                #[allow(dead_code, clippy::large_enum_variant, clippy::enum_variant_names)] // only its form is asked for
+                // only its form is asked for
+                #[allow(dead_code, clippy::large_enum_variant, clippy::enum_variant_names)]
                 enum Tagged {
                     $(#[doc = $line] #[schemars(rename = $kind)] $type($type),)+
                 }

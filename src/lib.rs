@@ -6,7 +6,7 @@
 //! | part | trait | here |
 //! |---|---|---|
 //! | where the mesh should be fine | [`density::Monitor`] | [`density::Arclength`] |
-//! | how the mesh follows | [`meshing::MeshGenerator`] | [`meshing::Stochastic`], [`meshing::Schwarz`], [`meshing::Whole`] |
+//! | how it follows | [`meshing::MeshGenerator`] | [`meshing::Stochastic`], [`meshing::Schwarz`], [`meshing::Whole`] |
 //! | what is solved on it | [`physics::Physics`] | [`physics::Burgers`] |
 //!
 //! # A tour
@@ -38,8 +38,9 @@
 //!
 //! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
 //!
-//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`], [`equidistribution`], [`laplacian`], [`meshing`] and
-//! [`physics`], then [`mover`] and [`stefan`], then [`simulation`], [`output`], [`report`] and [`study`].
+//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`],
+//! [`equidistribution`], [`laplacian`], [`meshing`] and [`physics`], then [`mover`] and [`stefan`], then
+//! [`simulation`], [`output`], [`report`] and [`study`].
 
 // What only studies and their checkpoints use is dead code in a library without them.
 #![cfg_attr(not(feature = "studies"), allow(dead_code, unused_imports))]

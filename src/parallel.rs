@@ -1,13 +1,14 @@
-//! The one parallel seam.
+//! All parallel loops of the library.
 //!
-//! Work is cut by the size of the arrays alone, never by the number of threads, and each piece is computed by itself;
-//! sums are added up piece by piece in order. Results therefore have the same bits for any number of threads.
+//! Work is divided by the size of the arrays alone, never by the number of threads, and each piece is computed
+//! independently. Sums are added piece by piece in order. Results therefore have the same bits for any number of
+//! threads.
 
 use rayon::prelude::*;
 
-/// Arrays shorter than this stay on one thread: handing them out costs more than it saves.
+/// Arrays shorter than this stay on one thread: distributing them costs more than it saves.
 const WORTHWHILE: usize = 1 << 14;
-/// Elements that one thread takes at least.
+/// Smallest number of elements in a piece.
 const PIECE: usize = 1 << 12;
 
 /// Calls `f(number, row)` for every row of an array cut into rows of `len`.
@@ -43,22 +44,22 @@ pub(crate) fn for_each_piece<T: Send>(array: &mut [T], f: impl Fn(usize, &mut [T
     }
 }
 
-/// Two pieces of work that know nothing of each other.
+/// Runs two independent pieces of work in parallel.
 pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     rayon::join(a, b)
 }
 
-/// `f` of every item, in order, for items that have so many elements in all.
+/// `f` of every item, in order; in parallel if the items have enough elements in all.
 pub(crate) fn map_large<T: Sync, R: Send>(elements: usize, items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     if elements < WORTHWHILE { items.iter().map(f).collect() } else { map(items, f) }
 }
 
-/// `f` of every item, in order; for work that is worth handing out item by item.
+/// `f` of every item, in order; for items that are each worth a thread.
 pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     items.par_iter().map(f).collect()
 }
 
-/// The same for items that change.
+/// `f` of every item, in order, for items that `f` changes.
 pub(crate) fn map_mut<T: Send, R: Send>(items: &mut [T], f: impl Fn(&mut T) -> R + Sync + Send) -> Vec<R> {
     items.par_iter_mut().map(f).collect()
 }

@@ -1,9 +1,9 @@
-//! Seconds that a run takes.
+//! Time that a run takes.
 
 use cpu_time::ProcessTime;
 use std::time::Instant;
 
-/// Seconds by the clock, and of the processor over all threads.
+/// Wall-clock seconds, and processor seconds over all threads.
 pub(crate) struct Stopwatch {
     wall: Instant,
     cpu: ProcessTime,
@@ -15,17 +15,17 @@ impl Stopwatch {
         Self { wall: Instant::now(), cpu: ProcessTime::now(), before: [0.0; 2] }
     }
 
-    /// Goes on from what an earlier part of the run took.
+    /// Continues from the times of an earlier part of the run.
     pub fn after(self, before: [f64; 2]) -> Self {
         Self { before, ..self }
     }
 
-    /// By the clock, and of the processor.
+    /// Wall-clock seconds and processor seconds so far.
     pub fn elapsed(&self) -> [f64; 2] {
         [self.wall(), self.before[1] + self.cpu.elapsed().as_secs_f64()]
     }
 
-    /// By the clock alone, which is cheap to ask.
+    /// Wall-clock seconds so far, which are cheap to get.
     pub fn wall(&self) -> f64 {
         self.before[0] + self.wall.elapsed().as_secs_f64()
     }

@@ -1,4 +1,4 @@
-//! What a step cost, counted rather than timed.
+//! The work of a step, counted instead of timed.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,15 +8,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Work {
-    /// Right-hand sides solved for, of every size (the sides of the domain included).
+    /// Right-hand sides that were solved for, in systems of every size (those of the sides of the domain included).
     pub linear_solves: usize,
-    /// Iterations of the linear solver over all systems, alternating-direction sweeps or products with a block matrix; none
-    /// of a direct solve. Those of an iteration that gave up are counted, too.
+    /// Iterations of the linear solvers over all systems: alternating-direction sweeps, or products with the matrix.
+    /// Direct solves have none; those of an iteration that failed are counted, too.
     pub linear_iterations: usize,
-    /// Right-hand sides of `linear_solves` that sparse elimination solved because the iteration could not begin: a pivot of
-    /// its preconditioner was not positive, or the guess was not finite.
+    /// Right-hand sides of `linear_solves` that sparse elimination solved because the iteration could not begin: a
+    /// pivot of its preconditioner was not positive, or the guess was not finite.
     pub direct_unstarted: usize,
-    /// Right-hand sides of `linear_solves` that sparse elimination solved because the iteration ended above its tolerance.
+    /// Right-hand sides of `linear_solves` that sparse elimination solved because the iteration ended above its
+    /// tolerance.
     pub direct_stalled: usize,
     /// Newton iterations of the physics.
     pub newton_iterations: usize,

@@ -102,8 +102,8 @@ fn iterations_converge_to_the_simultaneous_solution() {
     assert!(changes[1] < changes[0] && changes[2] < 0.25 * changes[0], "{changes:?}");
 }
 
-/// With a tolerance rounds end when the mesh no longer changes, well before the most, and the mesh is that of many rounds;
-/// sub-steps are doubled no further than the mesh needs.
+/// With a tolerance rounds end when the mesh no longer changes, well before the most, and the mesh is that of many
+/// rounds; sub-steps are doubled no further than the mesh needs.
 #[test]
 fn a_tolerance_ends_rounds_and_doubling() {
     let run = |coupling| {

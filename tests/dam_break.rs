@@ -1,4 +1,5 @@
-//! The collapsing pile of water of `studies/dam-break.toml`: what is conserved, and the solution of the radial equations.
+//! The collapsing pile of water of `studies/dam-break.toml`: what is conserved, and the solution of the radial
+//! equations.
 
 use driftmesh::geometry::{DualCells, Field, Mesh};
 use driftmesh::output::Summary;
@@ -43,8 +44,8 @@ fn worst(summary: &Summary) -> [f64; 2] {
     all.fold([0.0; 2], |m, c| [m[0].max((c.r_max - 1.0).abs()), m[1].max(c.mesh_rms)])
 }
 
-/// Mass and momentum to round-off on the moving mesh, energy to the order of the scheme; 4 × 4 subdomains make the mesh of
-/// the single domain, with the default and with eight sweeps by Jacobi.
+/// Mass and momentum to round-off on the moving mesh, energy to the order of the scheme; 4 × 4 subdomains make the mesh
+/// of the single domain, with the default and with eight sweeps by Jacobi.
 #[test]
 fn mass_and_momentum_are_conserved_and_subdomains_agree() {
     let (summary, passed) = rerun(&[]);
@@ -84,7 +85,8 @@ struct Radial {
 
 /// Where the radial equations end: the water there is still.
 const END: f64 = 3.6;
-/// Radius of the pile: so large that its slope at the centre, where r has a kink, is two ten-thousandths of its steepest.
+/// Radius of the pile: so large that its slope at the centre, where r has a kink, is two ten-thousandths of its
+/// steepest.
 const RADIUS: f64 = 1.5;
 
 impl Radial {
@@ -168,8 +170,8 @@ fn errors(radial: &Radial, (mesh, u): (&Mesh<2>, &Field)) -> [f64; 2] {
     largest
 }
 
-/// The pile on the moving mesh is the one of the radial equations, to second order in cells and steps together. These are
-/// converged themselves: four times as coarse, they are off by less than a fiftieth of what the study leaves.
+/// The pile on the moving mesh is the one of the radial equations, to second order in cells and steps together. These
+/// are converged themselves: four times as coarse, they are off by less than a fiftieth of what the study leaves.
 #[test]
 fn the_pile_is_that_of_the_radial_equations() {
     let [radial, coarse] = [1440, 360].map(|points| {

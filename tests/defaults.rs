@@ -7,7 +7,8 @@ use driftmesh::study::{MovingMesh, Source};
 /// A study that says as little as it may.
 fn resolved(more: &str) -> MovingMesh {
     let text = format!(
-        "[study]\nname = \"short\"\nkind = \"moving-mesh\"\n[grid]\ncells = [8, 8]\n[time]\nstart = 0.25\nend = 0.5\n{more}"
+        "[study]\nname = \"short\"\nkind = \"moving-mesh\"\n[grid]\ncells = [8, 8]\n[time]\nstart = 0.25\nend = 0.5\n\
+         {more}"
     );
     MovingMesh::from_source(&Source::new("short.toml", text)).unwrap()
 }

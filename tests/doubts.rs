@@ -6,7 +6,8 @@ use driftmesh::study::{MovingMesh, Source, compute};
 
 fn study(time: &str, pde: &str, more: &str) -> MovingMesh {
     let text = format!(
-        "[study]\nname = \"doubts\"\nkind = \"moving-mesh\"\n[grid]\ncells = [40, 40]\n[time]\n{time}\n[pde]\n{pde}\n{more}\n"
+        "[study]\nname = \"doubts\"\nkind = \"moving-mesh\"\n[grid]\ncells = [40, 40]\n[time]\n{time}\n[pde]\n{pde}\n\
+         {more}\n"
     );
     MovingMesh::from_source(&Source::new("the study", text)).unwrap()
 }
@@ -65,8 +66,8 @@ fn what_the_mesh_misses_of_an_unknown_is_told() {
     assert_eq!(doubts(&blob(0.15, "u")), [""; 0]);
 }
 
-/// A blob too small to matter for the content of an unknown that slopes is told by its place; peaks, jumps and ridges that
-/// the mesh sees are not.
+/// A blob too small to matter for the content of an unknown that slopes is told by its place; peaks, jumps and ridges
+/// that the mesh sees are not.
 #[test]
 fn what_hides_between_the_nodes_is_told() {
     let given = |u: &str| study("start = 0\nend = 0.1", &format!("kind = \"prescribed\"\nu = \"{u}\""), "");
@@ -81,8 +82,8 @@ fn what_hides_between_the_nodes_is_told() {
     }
 }
 
-/// A blob far from a layer, where the cells of the adapted mesh are many times as wide as it is; a disk whose edge is all that
-/// nodes miss is seen. What follows u alone is not told to follow it.
+/// A blob far from a layer, where the cells of the adapted mesh are many times as wide as it is; a disk whose edge is
+/// all that nodes miss is seen. What follows u alone is not told to follow it.
 #[test]
 fn what_is_smaller_than_any_part_of_a_wide_cell_is_told() {
     let at_start = |u: &str| {

@@ -90,8 +90,8 @@ fn other_lines() {
     assert!(summary["warnings"].is_null() && run("boundary-layer", &[]).1["warnings"].is_null());
 }
 
-/// What is said of an iteration that misses its tolerance is true: one that swings is not said to contract, whenever it ends;
-/// rounding is named; the remedy is one of the method.
+/// What is said of an iteration that misses its tolerance is true: one that swings is not said to contract, whenever it
+/// ends; rounding is named; the remedy is one of the method.
 #[test]
 fn advice_is_true() {
     let said = |study: &str, set: &[&str]| {
@@ -290,7 +290,8 @@ fn bad_settings_are_refused() {
         (schwarz("overlap = [0.4, 0.6]\n[start]\nmesh = { formula = \"xi + sin(2*pi*xi)\" }"), &["start.mesh.formula"]),
         (
             schwarz(
-                "method = \"optimal\"\ncut = 0.5\nintegral = { trapezoid = 20 }\n[time]\nstart = 0.0\nend = 1.0\nstep = 0.1\nrelaxation = 1.0",
+                "method = \"optimal\"\ncut = 0.5\nintegral = { trapezoid = 20 }\n[time]\nstart = 0.0\nend = 1.0\n\
+                 step = 0.1\nrelaxation = 1.0",
             ),
             &["schwarz.integral", "no integral"],
         ),

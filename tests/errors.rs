@@ -95,7 +95,8 @@ fn negative_diffusivities() {
         let text = format!(
             "[study]\nname = \"negative\"\nkind = \"moving-mesh\"\n[grid]\ncells = [10, 10]\n\
              [time]\nstart = 0\nend = 0.4\nstep = 0.01\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\n\
-             initial = {{ u = \"sin(3*x)\" }}\nboundary = {{ u = \"no-flux\" }}\ndiffusivity = {{ u = \"{diffusivity}\" }}\n"
+             initial = {{ u = \"sin(3*x)\" }}\nboundary = {{ u = \"no-flux\" }}\n\
+             diffusivity = {{ u = \"{diffusivity}\" }}\n"
         );
         let study = driftmesh::study::Study::from_source(&driftmesh::study::Source::new("the study", text)).unwrap();
         let out = tempfile::tempdir().unwrap();
@@ -175,8 +176,9 @@ fn newton_stalled() {
 
 #[test]
 fn vanishing_step() {
-    let text = "[study]\nname = \"blow-up\"\nkind = \"moving-mesh\"\n[grid]\ncells = [40, 40]\n[time]\nstart = 0\nend = 1\n\
-                [pde]\nkind = \"formula\"\nunknowns = [\"u\"]\nsource = { u = \"u^2\" }\ndiffusivity = { u = \"1e-4\" }\n\
+    let text = "[study]\nname = \"blow-up\"\nkind = \"moving-mesh\"\n[grid]\ncells = [40, 40]\n[time]\nstart = 0\n\
+                end = 1\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\nsource = { u = \"u^2\" }\n\
+                diffusivity = { u = \"1e-4\" }\n\
                 initial = { u = \"1 + exp(-((x-0.5)^2 + (y-0.5)^2)/0.1^2)\" }\nboundary = { u = \"no-flux\" }";
     let study = MovingMesh::from_source(&Source::new("blow-up.toml", text)).unwrap();
     let (_, failure) = driftmesh::study::compute(&study).unwrap();

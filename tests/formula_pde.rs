@@ -131,8 +131,8 @@ fn two_unknowns_are_second_order_in_space() {
     assert_second_order("space", coarse, fine, 3.0);
 }
 
-/// 1e-9 takes four iterations at most in a step in which waves cross two cells, as it does where Newton's method converges
-/// quadratically, which is measured beside the Jacobian itself. With a transposed one it stalls.
+/// 1e-9 takes four iterations at most in a step in which waves cross two cells, as it does where Newton's method
+/// converges quadratically, which is measured beside the Jacobian itself. With a transposed one it stalls.
 #[test]
 fn newton_takes_few_iterations() {
     let [old, new] = [0.0, 0.1].map(|t| distorted(16, t));
@@ -202,8 +202,8 @@ fn a_constant_state_stays_constant_on_random_meshes() {
     assert!(off < 1e-12, "off by {off:.1e} of 10 after 100 steps");
 }
 
-/// An unknown that starts as 0, one that is a million times smaller, and one that hardly changes in a step are all solved:
-/// u = 1e-8 t, v = 1e6 exp(−t), w = exp(−t).
+/// An unknown that starts as 0, one that is a million times smaller, and one that hardly changes in a step are all
+/// solved: u = 1e-8 t, v = 1e6 exp(−t), w = exp(−t).
 #[test]
 fn unknowns_of_any_size_are_solved() {
     let mut physics = physics(

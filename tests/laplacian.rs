@@ -81,8 +81,8 @@ fn optimised_converges_on_perturbed_meshes() {
 /// An image of the unit square, `n` nodes each way.
 fn mapped(n: usize, domain: &str, u: &str, kind: &str) -> PoissonStudy {
     let text = format!(
-        "[study]\nname = \"image\"\nkind = \"poisson\"\n[domain]\n{domain}\n[grid]\ncells = {:?}\n[exact]\nu = \"{u}\"\n\
-         [laplacian]\n{kind}\n",
+        "[study]\nname = \"image\"\nkind = \"poisson\"\n[domain]\n{domain}\n[grid]\ncells = {:?}\n[exact]\n\
+         u = \"{u}\"\n[laplacian]\n{kind}\n",
         [n - 1; 2]
     );
     PoissonStudy::from_source(&Source::new("image.toml", text)).unwrap()
@@ -147,8 +147,8 @@ fn every_poisson_study_meets_its_figure() {
 fn neumann_sides_are_of_second_order() {
     let error = |n: usize, sides: &str| {
         let text = format!(
-            "[study]\nname = \"sides\"\nkind = \"poisson\"\n[domain]\nx = [0.0, 1.0]\nbottom = \"0\"\ntop = \"1 + x/2\"\n\
-             [grid]\ncells = [{n}, {n}]\n[exact]\nu = \"sin(x)*exp(y)\"\n{sides}"
+            "[study]\nname = \"sides\"\nkind = \"poisson\"\n[domain]\nx = [0.0, 1.0]\nbottom = \"0\"\n\
+             top = \"1 + x/2\"\n[grid]\ncells = [{n}, {n}]\n[exact]\nu = \"sin(x)*exp(y)\"\n{sides}"
         );
         PoissonStudy::from_source(&Source::new("sides", text)).unwrap().solve().unwrap().error.unwrap().linf
     };
@@ -250,7 +250,8 @@ fn bad_studies_are_refused_at_their_place() {
         assert!(words.iter().all(|word| text.contains(word)), "{set:?}: {text}");
     }
     // a mapping that goes around once and a bit lies on itself
-    let text = "[study]\nname = \"a\"\nkind = \"poisson\"\n[domain]\nmap = { x = \"(1+s)*cos(7*r)\", y = \"(1+s)*sin(7*r)\" }\n\
+    let text = "[study]\nname = \"a\"\nkind = \"poisson\"\n[domain]\n\
+                map = { x = \"(1+s)*cos(7*r)\", y = \"(1+s)*sin(7*r)\" }\n\
                 [grid]\ncells = [4, 40]\n[exact]\nu = \"x\"\n";
     let error = PoissonStudy::from_source(&Source::new("a", text)).unwrap_err().to_string();
     assert!(error.contains("touches itself") && error.contains("in cells ("), "{error}");
@@ -270,8 +271,8 @@ fn threads_do_not_change_a_bit() {
     }
 }
 
-/// Random meshes with nodes moved by up to half a cell, those that fold left out: quadratics are exact to 1e-11 in local
-/// units, or the node is named near-degenerate.
+/// Random meshes with nodes moved by up to half a cell, those that fold left out: quadratics are exact to 1e-11 in
+/// local units, or the node is named near-degenerate.
 #[test]
 fn strongly_distorted_meshes_are_exact_or_named() {
     let lattice = Lattice::bounded([6, 6]).unwrap();

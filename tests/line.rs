@@ -39,8 +39,8 @@ fn line(density: &str, cells: usize) -> Line {
     Line { face: FaceDensity::Exact, ..Line::new(m.unwrap(), cells) }
 }
 
-/// Nodes in order, and ∫M the same over all cells to 1e-9, or to the rounding of their places. ∫M is measured by another
-/// quadrature than the one that was inverted.
+/// Nodes in order, and ∫M the same over all cells to 1e-9, or to the rounding of their places. ∫M is measured by
+/// another quadrature than the one that was inverted.
 fn equidistributes(density: &str, cells: usize) -> Result<(), String> {
     let line = line(density, cells);
     let mesh = line.equidistributed(0.0).map_err(|failure| failure.to_string())?;

@@ -9,8 +9,8 @@ fn version(text: &str) -> Vec<u32> {
     parts
 }
 
-/// No dependency on any platform asks for a newer Rust than we do, and the README names the same. That our own code needs no
-/// more is for Clippy to say (`incompatible_msrv`).
+/// No dependency on any platform asks for a newer Rust than we do, and the README names the same. That our own code
+/// needs no more is for Clippy to say (`incompatible_msrv`).
 #[test]
 fn the_declared_rust_is_enough_for_all_dependencies() {
     let root = env!("CARGO_MANIFEST_DIR");

@@ -78,8 +78,8 @@ fn strips_rest() {
     }
 }
 
-/// A thin front that moves by a sixth of a cell a step, as many times its own width in a run as it is thin: the median of the
-/// interpolation error in the middle of cells is that of a mesh that rests around it.
+/// A thin front that moves by a sixth of a cell a step, as many times its own width in a run as it is thin: the median
+/// of the interpolation error in the middle of cells is that of a mesh that rests around it.
 #[test]
 fn a_moving_front_is_followed_with_nothing_set() {
     let (dt, still) = (0.004, 200);
@@ -186,7 +186,8 @@ impl Problem {
         let pde =
             self.pde.replace("FORMULA", FORMULA).replace("U0", &at_start).replace('U', &self.exact.replace('T', "t"));
         let text = format!(
-            "[study]\nname = \"problem\"\nkind = \"moving-mesh\"\n{}[time]\nstart = {start:?}\nend = {end:?}\n[pde]\n{pde}\n",
+            "[study]\nname = \"problem\"\nkind = \"moving-mesh\"\n{}[time]\nstart = {start:?}\nend = {end:?}\n[pde]\n\
+             {pde}\n",
             self.place
         );
         let mut source = Source::new(self.name, text);
@@ -384,8 +385,9 @@ fn a_jump_is_a_start() {
 #[test]
 fn formulas_see_the_image_of_a_node() {
     let strip = "[domain]\nupper = [1.0, 0.1]\nperiodic = [true, true]\n[grid]\ncells = [60, 4]\n";
-    let pde = "kind = \"formula\"\nunknowns = [\"u\", \"w\"]\nflux = { u = [\"u\", \"0\"] }\ndiffusivity = { w = \"1e-3\" }\n\
-               source = { w = \"exp(-((x - 0.5)/0.1)^2)\" }\ninitial = { u = \"exp(40*(cos(2*pi*x) - 1))\", w = \"0\" }";
+    let pde = "kind = \"formula\"\nunknowns = [\"u\", \"w\"]\nflux = { u = [\"u\", \"0\"] }\n\
+               diffusivity = { w = \"1e-3\" }\nsource = { w = \"exp(-((x - 0.5)/0.1)^2)\" }\n\
+               initial = { u = \"exp(40*(cos(2*pi*x) - 1))\", w = \"0\" }";
     let study = problem("a source", strip, [0.0, 3.0], pde, "").study(&[]);
     let mut simulation = study.simulation().unwrap();
     let mut record = Record::default();
@@ -412,8 +414,8 @@ fn a_fixed_mesh_stays() {
     assert_eq!(state.mesh, mesh);
 }
 
-/// A fixed, small step is no worse than an automatic one that is five times longer: where the front rounds the corners, it is
-/// done in parts.
+/// A fixed, small step is no worse than an automatic one that is five times longer: where the front rounds the corners,
+/// it is done in parts.
 #[test]
 fn a_small_step_is_no_worse_than_a_long_one() {
     let study = include_str!("../studies/burgers.toml").replace("end = 1.25", "end = 1.25\nstep = 2e-3");
@@ -449,9 +451,10 @@ fn the_way_back_to_equal_cells_harms_nothing() {
         let exact = format!("{w}/sqrt({0} + 0.004*t)*exp(-(x-0.5)^2/({0} + 0.004*t))", w * w);
         let study = |generator: &str| {
             let text = format!(
-                "[study]\nname = \"pulse\"\nkind = \"moving-mesh\"\n[grid]\ncells = [{cells}, 2]\n[time]\nstart = 0.0\nend = 2.0\n\
-                 report = [0.5, 1.0, 2.0]\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\ndiffusivity = {{ u = \"0.001\" }}\n\
-                 initial = {{ u = \"exp(-(x-0.5)^2/{})\" }}\nboundary = {{ u = \"no-flux\" }}\nexact = {{ u = \"{exact}\" }}\n\
+                "[study]\nname = \"pulse\"\nkind = \"moving-mesh\"\n[grid]\ncells = [{cells}, 2]\n[time]\nstart = 0.0\n\
+                 end = 2.0\nreport = [0.5, 1.0, 2.0]\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\n\
+                 diffusivity = {{ u = \"0.001\" }}\ninitial = {{ u = \"exp(-(x-0.5)^2/{})\" }}\n\
+                 boundary = {{ u = \"no-flux\" }}\nexact = {{ u = \"{exact}\" }}\n\
                  [mesh]\ngenerator = {{ kind = \"{generator}\" }}\n",
                 w * w
             );
@@ -465,14 +468,17 @@ fn the_way_back_to_equal_cells_harms_nothing() {
     }
 }
 
-/// A side that is kept at another value than the initial solution: the layer that begins there has its cells from the start.
+/// A side that is kept at another value than the initial solution: the layer that begins there has its cells from the
+/// start.
 #[test]
 fn a_layer_that_begins_at_a_side_is_seen() {
     for (cells, diffusivity) in [(20, 1e-3), (40, 3e-4), (40, 1e-3)] {
         let text = format!(
             "[study]\nname = \"wall\"\nkind = \"moving-mesh\"\n[domain]\nlower = [0.0, 0.0]\nupper = [1.0, 1.0]\n\
-             periodic = [false, true]\n[grid]\ncells = [{cells}, 2]\n[time]\nstart = 0.0\nend = 0.3\nreport = [0.1, 0.3]\n[pde]\n\
-             kind = \"formula\"\nunknowns = [\"u\"]\ndiffusivity = {{ u = \"{diffusivity}\" }}\ninitial = {{ u = \"0\" }}\n\
+             periodic = [false, true]\n[grid]\ncells = [{cells}, 2]\n[time]\nstart = 0.0\nend = 0.3\n\
+             report = [0.1, 0.3]\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\n\
+             diffusivity = {{ u = \"{diffusivity}\" }}\n\
+             initial = {{ u = \"0\" }}\n\
              boundary = {{ u = \"if(x < 0.5, 1, 0)\" }}\n\
              exact = {{ u = \"if(x <= 0, 1, 1 - erf(x/sqrt(4*{diffusivity}*max(t, 1e-14))))\" }}\n"
         );
@@ -483,7 +489,8 @@ fn a_layer_that_begins_at_a_side_is_seen() {
     }
 }
 
-/// Jumps that are given, standing, moving and in time, and noise: nothing has to be solved for, and the run ends in time.
+/// Jumps that are given, standing, moving and in time, and noise: nothing has to be solved for, and the run ends in
+/// time.
 #[test]
 fn given_jumps_complete() {
     for u in [
@@ -494,8 +501,8 @@ fn given_jumps_complete() {
         "if(t < 0.05, tanh((x-0.3)/0.01), tanh((x-0.7)/0.01))",
     ] {
         let text = format!(
-            "[study]\nname = \"jump\"\nkind = \"moving-mesh\"\n[grid]\ncells = [24, 24]\n[time]\nstart = 0.0\nend = 0.1\n[pde]\n\
-             kind = \"prescribed\"\nu = \"{u}\"\n"
+            "[study]\nname = \"jump\"\nkind = \"moving-mesh\"\n[grid]\ncells = [24, 24]\n[time]\nstart = 0.0\n\
+             end = 0.1\n[pde]\nkind = \"prescribed\"\nu = \"{u}\"\n"
         );
         let (summary, failure) = compute(&MovingMesh::from_source(&Source::new("jump", text)).unwrap()).unwrap();
         assert!(failure.is_none() && summary.work.steps <= 1000, "{u}: {failure:?}");

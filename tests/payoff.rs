@@ -43,8 +43,8 @@ fn the_front_passes_the_corners() {
     assert!((l_inf / 1.205e-2 - 1.0).abs() < 0.05, "{l_inf:e}");
 }
 
-/// With nothing set but the cells, a front of any width takes few steps, each many times as long as the front is wide, to
-/// an error of 1e-2; without prediction about Δt = ν is needed.
+/// With nothing set but the cells, a front of any width takes few steps, each many times as long as the front is wide,
+/// to an error of 1e-2; without prediction about Δt = ν is needed.
 #[test]
 fn a_front_of_any_width_is_resolved_without_a_number() {
     for (viscosity, cells, most) in [(5e-3, 22, 50), (2e-3, 27, 50), (1e-3, 34, 60), (2e-4, 66, 70)] {
@@ -64,7 +64,8 @@ fn long_steps_pass_the_corners() {
     }
 }
 
-/// A layer that moves evenly: where the mesh lags behind by a good part of a cell, a prediction leaves a twentieth of it.
+/// A layer that moves evenly: where the mesh lags behind by a good part of a cell, a prediction leaves a twentieth of
+/// it.
 #[test]
 fn a_prediction_has_no_lag() {
     let study = |start: f64, end: f64, relaxation: &str| {

@@ -37,8 +37,8 @@ fn assert_wrong_length<T>(result: Result<T, Failure>, found: usize, expected: us
     }
 }
 
-/// A thin ring, a strong density without smoothing and steps as long as the published equation does not bear: it folds within
-/// a few steps, and the step says so. The default equation, which studies have, does not fold.
+/// A thin ring, a strong density without smoothing and steps as long as the published equation does not bear: it folds
+/// within a few steps, and the step says so. The default equation, which studies have, does not fold.
 #[test]
 fn a_folded_mesh_is_no_step() {
     let monitor = Arclength { strength: Strength::Relative(300.0), smoothing: 0 };

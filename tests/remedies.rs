@@ -256,7 +256,8 @@ fn folded() -> Failure {
     Failure::Folded { cell: [1, 2], jacobian: -0.1, x: [0.5; 2], noise: None }
 }
 
-/// A folded mesh is cured by what the monitor has: `auto` has nothing to set, and a mesh in conservative form no gradient.
+/// A folded mesh is cured by what the monitor has: `auto` has nothing to set, and a mesh in conservative form no
+/// gradient.
 #[test]
 fn a_folded_mesh_is_told_the_keys_of_its_monitor() {
     let said = |assignments: &[&str]| study("burgers", assignments).remedy(&folded().into()).unwrap();
@@ -264,8 +265,8 @@ fn a_folded_mesh_is_told_the_keys_of_its_monitor() {
     assert_eq!(auto, "lower time.step (now 0.001)");
     let arclength = "monitor={ kind = \"arclength\" }";
     let set = said(&["time.step=1e-3", "mesh.relaxation=0.5", arclength]);
-    let expected = "raise monitor.smoothing (now 2), lower monitor.strength.relative (now 30.0), lower time.step (now 0.001) or \
-                    raise mesh.relaxation (now 0.5)";
+    let expected = "raise monitor.smoothing (now 2), lower monitor.strength.relative (now 30.0), \
+                    lower time.step (now 0.001) or raise mesh.relaxation (now 0.5)";
     assert_eq!(set, expected);
     let gradient = said(&["time.step=1e-3", "mesh.form=\"gradient\"", arclength]);
     assert!(

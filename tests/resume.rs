@@ -337,8 +337,8 @@ fn sealed() -> [(Study, Vec<u8>); 2] {
     })
 }
 
-/// Any bytes behind a right checksum: a checkpoint or a refusal, never a panic; a length that the bytes do not hold is no
-/// reason to allocate.
+/// Any bytes behind a right checksum: a checkpoint or a refusal, never a panic; a length that the bytes do not hold is
+/// no reason to allocate.
 #[test]
 fn any_bytes_are_a_checkpoint_or_refused() {
     for (study, bytes) in sealed() {

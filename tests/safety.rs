@@ -54,8 +54,8 @@ const OFF: &str = "safety={substeps=1, smoothing=0, halvings=0}";
 const STEEP: [&str; 5] =
     ["monitor.strength.relative=300", "time.step=5e-3", "time.end=0.5", "time.report=[0.3,0.5]", "monitor.smoothing=0"];
 
-/// The plain method folds and says so; with retries the same study ends, at the times of its schedule, and every rejected
-/// step is accounted for.
+/// The plain method folds and says so; with retries the same study ends, at the times of its schedule, and every
+/// rejected step is accounted for.
 #[test]
 fn a_steep_density_folds_without_retries_only() {
     let plain = ran(&study("burgers-b-conservative", &[&STEEP[..], &[OFF]].concat()));
@@ -136,8 +136,8 @@ fn front(time: &[&str]) -> Ran {
     ran
 }
 
-/// Against very small steps on the same mesh the error falls with every halving of the tolerance, as its power 2/3: a step
-/// of length Δt is off by Δt³, all of them by Δt².
+/// Against very small steps on the same mesh the error falls with every halving of the tolerance, as its power 2/3: a
+/// step of length Δt is off by Δt³, all of them by Δt².
 #[test]
 fn halving_the_tolerance_lowers_the_error() {
     let exact = front(&["time.step=1e-4"]).state.u;

@@ -1,5 +1,6 @@
 //! The theorems of Gander and Haynes (2012) over random densities, overlaps and grids: what is observed is what is
-//! predicted, and at most the bound. Cells have exact mean densities, so that the discrete problem is the continuous one.
+//! predicted, and at most the bound. Cells have exact mean densities, so that the discrete problem is the continuous
+//! one.
 
 use driftmesh::equidistribution::{
     Coarse, FaceDensity, History, Line, LineDensity, Measure, Method, Robin, Stop, Sweep,
@@ -86,7 +87,8 @@ proptest! {
             prop_assert!((history.observed.unwrap() - predicted).abs() < 0.02 + 0.05 * predicted,
                          "{:?} {}", history.observed, predicted);
         }
-        prop_assert!(history.observed.is_none_or(|observed| observed <= bound + 1e-3), "{:?} {}", history.observed, bound);
+        let observed = history.observed;
+        prop_assert!(observed.is_none_or(|observed| observed <= bound + 1e-3), "{observed:?} {bound}");
     }
 
     /// Two-sided lagged p converges without tuning for any number of subdomains. No theorem says so: with many peaks an
@@ -104,7 +106,8 @@ proptest! {
     fn many(m in density(4.0), width in 4_usize..10, share in 0.25..0.5_f64, count in 2_usize..6) {
         let overlap = ((share * width as f64) as usize).max(1);
         let cells = count * width - (count - 1) * overlap;
-        let ranges: Vec<[usize; 2]> = (0..count).map(|s| [s * (width - overlap), s * (width - overlap) + width]).collect();
+        let starts = (0..count).map(|s| s * (width - overlap));
+        let ranges: Vec<[usize; 2]> = starts.map(|start| [start, start + width]).collect();
         let history = run(&line(&m, cells, FaceDensity::Exact), &ranges, CLASSICAL, until(1e-11));
         prop_assert!(history.converged);
         let [predicted, bound] = [history.prediction.predicted.unwrap(), history.prediction.bound.unwrap()];
@@ -127,6 +130,7 @@ proptest! {
         let bound = history.prediction.bound.unwrap();
         let [x, y] = [alpha, beta].map(|n| n as f64 / cells as f64);
         prop_assert!(bound <= x / y * (1.0 - y) / (1.0 - x) + 1e-12);
-        prop_assert!(history.observed.is_none_or(|observed| observed <= bound + 0.02), "{:?} {}", history.observed, bound);
+        let observed = history.observed;
+        prop_assert!(observed.is_none_or(|observed| observed <= bound + 0.02), "{observed:?} {bound}");
     }
 }

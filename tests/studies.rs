@@ -1,6 +1,7 @@
 //! Every file in `studies/` is rerun against stored norms and work counters.
 //!
-//! The norms are those on which two other implementations agree, each with the tolerance that comes with it; the counters are this implementation's own and hold exactly.
+//! The norms are those on which two other implementations agree, each with the tolerance that comes with it; the
+//! counters are this implementation's own and hold exactly.
 
 use driftmesh::geometry::DualCells;
 use driftmesh::output::Summary;
@@ -104,8 +105,8 @@ fn case_b_by_residual_walks() {
     let published = |walks: usize| {
         format!("mesh.generator.estimator={{kind=\"residual-walk\", sweeps=4, smoother=\"jacobi\", walks={walks}}}")
     };
-    // the strips of the default are solved, two right-hand sides each but where the first step leaves six of them at rest;
-    // those of the published one are swept
+    // the strips of the default are solved, two right-hand sides each but where the first step leaves six of them at
+    // rest; those of the published one are swept
     for (settings, rms, solves) in [(vec![], 1e-6, 69_989), (vec![published(10)], 3e-5, 38_001)] {
         let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
         let summary = rerun_set(name, &settings, &mut Node::default());
@@ -125,8 +126,8 @@ fn case_b_by_residual_walks() {
     assert_eq!(one.reports[2].interface.unwrap().standard_error, None);
 }
 
-/// Case B by strips alone: R_max within .003 and the mesh within 3e-5, with what the program chooses and with 8 nodes to
-/// each side; no warning, for a deterministic method has no noise to tell of.
+/// Case B by strips alone: R_max within .003 and the mesh within 3e-5, with what the program chooses and with 8 nodes
+/// to each side; no warning, for a deterministic method has no noise to tell of.
 #[test]
 fn case_b_by_strips() {
     let name = "burgers-b-stochastic";
@@ -159,8 +160,8 @@ fn case_b_by_a_few_schwarz_iterations() {
     assert!(classical < 2e-4 && optimized < 0.2 * classical, "{classical:e} {optimized:e}");
 }
 
-/// Nothing set by hand: less than the errors of the recipe in two independent implementations (4.90e-3 on as many nodes,
-/// 1.205e-2 on 51²), in a ninth of their steps, and the same on 4 × 4 subdomains.
+/// Nothing set by hand: less than the errors of the recipe in two independent implementations (4.90e-3 on as many
+/// nodes, 1.205e-2 on 51²), in a ninth of their steps, and the same on 4 × 4 subdomains.
 #[test]
 fn a_thin_front_without_a_number() {
     let (whole, _) = rerun("burgers");
@@ -302,8 +303,8 @@ fn uniform_meshes() {
     }
 }
 
-/// A bump carried across the box, against its exact solution: a fifteenth of what a mesh that stays leaves. As the bump spreads
-/// equal cells resolve it, and the mesh lets go of it: a fifth at the end.
+/// A bump carried across the box, against its exact solution: a fifteenth of what a mesh that stays leaves. As the bump
+/// spreads equal cells resolve it, and the mesh lets go of it: a fifth at the end.
 #[test]
 fn advected_bump() {
     let [moving, still] = [vec![], vec!["mesh.generator={kind=\"fixed\"}"]]
@@ -344,8 +345,8 @@ impl Observer for Substances {
     }
 }
 
-/// Substances are never negative but for the wiggles of a central scheme, u never exceeds its feed, and the spot lives on.
-/// Without feed and decay, what u loses v gains to round-off.
+/// Substances are never negative but for the wiggles of a central scheme, u never exceeds its feed, and the spot lives
+/// on. Without feed and decay, what u loses v gains to round-off.
 #[test]
 fn gray_scott() {
     let mut found = Substances { lowest: [f64::INFINITY; 2], highest: [f64::NEG_INFINITY; 2] };

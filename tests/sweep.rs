@@ -49,8 +49,10 @@ fn text(n: u64, dice: &mut Dice) -> String {
             (format!("kind = \"formula\"\n{bump}\ndiffusivity = {{ u = {viscosity} }}"), 0.0, true)
         }
         _ => {
-            let both = "unknowns = [\"u\", \"v\"]\nflux = { u = [\"0.5*u^2\", \"0.5*u^2\"] }\nsource = { v = \"u*(1 - v)\" }\n\
-                        initial = { u = \"exp(-50*((x-0.3)^2+(y-0.3)^2))\", v = \"0\" }\nboundary = { u = \"0\", v = \"no-flux\" }";
+            let both = "unknowns = [\"u\", \"v\"]\nflux = { u = [\"0.5*u^2\", \"0.5*u^2\"] }\n\
+                        source = { v = \"u*(1 - v)\" }\n\
+                        initial = { u = \"exp(-50*((x-0.3)^2+(y-0.3)^2))\", v = \"0\" }\n\
+                        boundary = { u = \"0\", v = \"no-flux\" }";
             (format!("kind = \"formula\"\n{both}\ndiffusivity = {{ u = {viscosity}, v = 0.01 }}"), 0.0, false)
         }
     };
@@ -67,7 +69,8 @@ fn text(n: u64, dice: &mut Dice) -> String {
             let (strength, smoothing) = (dice.between(1.0, 1000.0), dice.whole(0, 6));
             let gradient = dice.of(["central", "log", "safe"]);
             format!(
-                "kind = \"arclength\"\nstrength = {{ relative = {strength} }}\nsmoothing = {smoothing}\ngradient = \"{gradient}\""
+                "kind = \"arclength\"\nstrength = {{ relative = {strength} }}\nsmoothing = {smoothing}\n\
+                 gradient = \"{gradient}\""
             )
         }
     };
@@ -127,7 +130,8 @@ fn assert_sound(mesh: &Mesh<2>) {
     }
 }
 
-/// How a study ended: whether `[safety]` was needed, and the name of the error and what it says, if it was not completed.
+/// How a study ended: whether `[safety]` was needed, and the name of the error and what it says, if it was not
+/// completed.
 fn ended(n: u64) -> (bool, Option<(String, String)>) {
     let (text, study) = study(n);
     let mut record = Record::default();
@@ -175,7 +179,8 @@ fn sweep(numbers: &[u64]) {
     assert!(completed >= 90.0, "only {completed:.1} % are completed");
 }
 
-/// Those of the first seventeen that take seconds; in 2, 6, 10 and 13 walks are so noisy that a hundred steps are tried again, which takes minutes.
+/// Those of the first seventeen that take seconds; in 2, 6, 10 and 13 walks are so noisy that a hundred steps are tried
+/// again, which takes minutes.
 #[test]
 fn random_studies_end_as_they_should() {
     sweep(&[0, 1, 3, 4, 5, 7, 8, 9, 11, 12, 14, 15, 16]);

@@ -1,6 +1,15 @@
-// The viewer of a line, and the start of either.
+// The viewer of a line.
+
 /** Figures of the cells of a line, over their means, and the arrays that hold them. */
 const FIGURES = { "cell length": "jacobian", "∫M of a cell": "share" };
+
+/** Strokes an upright line. */
+function strokeBetween(context, x, from, to) {
+    context.beginPath();
+    context.moveTo(x, from);
+    context.lineTo(x, to);
+    context.stroke();
+}
 
 /** Of a line: a curve over x through all nodes, which stand under it. */
 class LineViewer extends Viewer {
@@ -20,30 +29,11 @@ class LineViewer extends Viewer {
         document.querySelector(".bar").hidden = true;
     }
 
-    drawStage(stage, { low, high, log }) {
-        const { canvas, context, mesh } = stage,
-            { lower, extent, stride } = this.data,
-            field = this.controls.field.value;
+    drawStage(stage, range) {
         this.prepare(stage, 0.5);
-        const { w, h, left, top, ratio, ink, paper, scale, place } = stage,
-            n = mesh.lines[0],
-            x = (stage.x = this.values(stage, "x", place));
-        const nothing = field === "nothing",
-            nodal = this.fields.includes(field);
-        const values = nothing ? null : nodal ? this.values(stage, field, place) : this.cellValues(stage, field, place);
-        // the curve has room above and below
-        const on = log ? Math.log : (v) => v,
-            room = 0.06 * (on(high) - on(low)) || 0.5,
-            [from, to] = [on(low) - room, on(high) + room];
-        const height = (v) => top + h * (1 - (on(v) - from) / (to - from));
-        const px = Float64Array.from(x, (v) => left + w / 2 + (v - this.centre[0]) * scale[0]);
-        const stepped = !nothing && values.length < n,
-            floor = top + h;
-        const py = (i) =>
-            nothing
-                ? top
-                : height(stepped ? Math.max(values[Math.max(0, i - 1)], values[Math.min(n - 2, i)]) : values[i]);
-
+        const { canvas, context, left, top, w, h, paper } = stage;
+        stage.x = this.values(stage, "x", stage.place);
+        const curve = this.curve(stage, range);
         context.fillStyle = paper;
         context.fillRect(0, 0, canvas.width, canvas.height);
         context.save();
@@ -51,7 +41,23 @@ class LineViewer extends Viewer {
         context.rect(left, top, w, h);
         context.clip();
         context.lineJoin = "round";
-        const accent = getComputedStyle(this.controls.field).accentColor;
+        if (this.controls.lines.checked || !curve.values) this.drawNodes(stage, curve);
+        if (this.controls.cuts.checked) this.drawCuts(stage, curve);
+        if (curve.values) this.drawCurve(stage, curve);
+        if (this.node) this.mark(stage, curve);
+        context.restore();
+        this.label(stage, range, curve);
+    }
+
+    /**
+     * The curve of the field that is chosen, in pixels: `px` of the nodes, the `height` of a value, the top `py` of a
+     * node's line, and the nodes in sight. `stepped` curves have one value a cell.
+     */
+    curve(stage, { low, high, log }) {
+        const { mesh, x, w, h, left, top, ratio, scale, place } = stage,
+            field = this.controls.field.value,
+            n = mesh.lines[0];
+        const px = Float64Array.from(x, (v) => left + w / 2 + (v - this.centre[0]) * scale[0]);
         // from the first to the last cell in sight, with room for marks
         const edge = 5 * ratio,
             seen = (i) => Math.max(px[i], px[i + 1]) > left - edge && Math.min(px[i], px[i + 1]) < left + w + edge;
@@ -60,98 +66,102 @@ class LineViewer extends Viewer {
         while (first < last && !seen(first)) first++;
         while (last > first && !seen(last)) last--;
         const visible = Array.from({ length: last + 2 - first }, (_, k) => first + k);
-        if (this.controls.lines.checked || nothing) {
-            // lines of a crowd of nodes fade, and those within a pixel are drawn once
-            Object.assign(context, { strokeStyle: ink, lineWidth: ratio });
-            let drawn = -Infinity;
-            for (const i of visible) {
-                if (Math.abs(px[i] - drawn) < 0.5) continue;
-                drawn = px[i];
-                const gap =
-                    Math.min(Math.abs(px[i] - (px[i - 1] ?? Infinity)), Math.abs((px[i + 1] ?? Infinity) - px[i])) /
-                    ratio;
-                context.globalAlpha = Math.min(0.45, Math.max(0.08, 0.1 * gap));
-                context.beginPath();
-                context.moveTo(px[i], floor);
-                context.lineTo(px[i], py(i));
-                context.stroke();
-            }
-            context.globalAlpha = 1;
-        }
-        if (this.controls.cuts.checked) {
-            // thin and faint in a crowd: the curve is to be seen
-            mesh.cuts[0].forEach((i, c, all) => {
-                const near =
-                    Math.max(
-                        ...[all[c - 1], all[c + 1]].map((other) =>
-                            other === undefined ? Infinity : Math.abs(px[other] - px[i]),
-                        ),
-                    ) / ratio;
-                const strength = Math.min(1, Math.max(0.2, near / 12));
-                for (const [colour, thick] of [
-                    [paper, 4],
-                    ["#d55e00", 2],
-                ]) {
-                    if (colour === paper && strength < 1) continue;
-                    Object.assign(context, {
-                        strokeStyle: colour,
-                        lineWidth: Math.max(0.75, thick * strength) * ratio,
-                        globalAlpha: strength,
-                    });
-                    context.beginPath();
-                    context.moveTo(px[i], floor);
-                    context.lineTo(px[i], top);
-                    context.stroke();
-                }
-            });
-            context.globalAlpha = 1;
-        }
-        if (!nothing) {
-            Object.assign(context, { strokeStyle: accent, fillStyle: accent, lineWidth: 2 * ratio });
-            context.beginPath();
-            visible.forEach((i, k) => {
-                if (!stepped)
-                    return k ? context.lineTo(px[i], height(values[i])) : context.moveTo(px[i], height(values[i]));
-                if (i + 1 >= n) return;
-                if (k) context.lineTo(px[i], height(values[i]));
-                else context.moveTo(px[i], height(values[i]));
-                context.lineTo(px[i + 1], height(values[i]));
-            });
-            context.stroke();
-            if (!stepped && visible.length * 5 * ratio < w) {
-                for (const i of visible) {
-                    context.beginPath();
-                    context.arc(px[i], height(values[i]), 3 * ratio, 0, 7);
-                    context.fill();
-                }
-            }
-        }
-        if (this.node) {
-            const [i] = this.node;
-            for (const [colour, thick] of [
-                [paper, 4.5],
-                [ink, 2],
-            ]) {
-                Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
-                context.beginPath();
-                context.arc(px[i], nothing ? floor - 8 * ratio : py(i), 6 * ratio, 0, 7);
-                context.stroke();
-            }
-        }
-        context.restore();
+        // the curve has room above and below
+        const on = log ? Math.log : (v) => v,
+            room = 0.06 * (on(high) - on(low)) || 0.5,
+            [from, to] = [on(low) - room, on(high) + room];
+        const height = (v) => top + h * (1 - (on(v) - from) / (to - from));
+        const shown = { n, px, visible, height, from, to };
+        if (field === "nothing") return { ...shown, values: null, stepped: false, py: () => top };
+        const nodal = this.fields.includes(field);
+        const values = nodal ? this.values(stage, field, place) : this.cellValues(stage, field, place),
+            stepped = values.length < n;
+        const beside = (i) => Math.max(values[Math.max(0, i - 1)], values[Math.min(n - 2, i)]);
+        return { ...shown, values, stepped, py: (i) => height(stepped ? beside(i) : values[i]) };
+    }
 
-        const [ends, most] = [
-            [left, left + w].map((p) => this.physical(stage, [p, 0])[0]),
-            Math.max(2, h / ratio / 60),
-        ];
+    /** A line under every node: in a crowd they fade, and those within half a pixel are drawn once. */
+    drawNodes({ context, ink, ratio, top, h }, { px, py, visible }) {
+        Object.assign(context, { strokeStyle: ink, lineWidth: ratio });
+        let drawn = -Infinity;
+        for (const i of visible) {
+            if (Math.abs(px[i] - drawn) < 0.5) continue;
+            drawn = px[i];
+            const before = Math.abs(px[i] - (px[i - 1] ?? Infinity)),
+                after = Math.abs((px[i + 1] ?? Infinity) - px[i]);
+            context.globalAlpha = Math.min(0.45, Math.max(0.08, (0.1 * Math.min(before, after)) / ratio));
+            strokeBetween(context, px[i], top + h, py(i));
+        }
+        context.globalAlpha = 1;
+    }
+
+    /** The ends of subdomains: in a crowd thin and faint, for the curve is to be seen. */
+    drawCuts({ context, mesh, paper, ratio, top, h }, { px }) {
+        mesh.cuts[0].forEach((i, c, all) => {
+            const gap = (other) => (other === undefined ? Infinity : Math.abs(px[other] - px[i]));
+            const near = Math.max(gap(all[c - 1]), gap(all[c + 1])) / ratio;
+            const strength = Math.min(1, Math.max(0.2, near / 12));
+            for (const [colour, thick] of [
+                [paper, 4],
+                ["#d55e00", 2],
+            ]) {
+                if (colour === paper && strength < 1) continue;
+                const lineWidth = Math.max(0.75, thick * strength) * ratio;
+                Object.assign(context, { strokeStyle: colour, lineWidth, globalAlpha: strength });
+                strokeBetween(context, px[i], top + h, top);
+            }
+        });
+        context.globalAlpha = 1;
+    }
+
+    /** The curve, with dots at the nodes where they are few. */
+    drawCurve({ context, ratio, w }, { n, px, visible, height, values, stepped }) {
+        const accent = getComputedStyle(this.controls.field).accentColor;
+        Object.assign(context, { strokeStyle: accent, fillStyle: accent, lineWidth: 2 * ratio });
+        context.beginPath();
+        visible.forEach((i, k) => {
+            if (stepped && i + 1 >= n) return;
+            if (k) context.lineTo(px[i], height(values[i]));
+            else context.moveTo(px[i], height(values[i]));
+            if (stepped) context.lineTo(px[i + 1], height(values[i]));
+        });
+        context.stroke();
+        if (stepped || visible.length * 5 * ratio >= w) return;
+        for (const i of visible) {
+            context.beginPath();
+            context.arc(px[i], height(values[i]), 3 * ratio, 0, 7);
+            context.fill();
+        }
+    }
+
+    /** Rings the node that is chosen. */
+    mark({ context, paper, ink, ratio, top, h }, { px, py, values }) {
+        const [i] = this.node;
+        for (const [colour, thick] of [
+            [paper, 4.5],
+            [ink, 2],
+        ]) {
+            Object.assign(context, { strokeStyle: colour, lineWidth: thick * ratio });
+            context.beginPath();
+            context.arc(px[i], values ? py(i) : top + h - 8 * ratio, 6 * ratio, 0, 7);
+            context.stroke();
+        }
+    }
+
+    /** Draws the frame with its ticks, and says to those who cannot see it what the canvas shows. */
+    label(stage, { low, high, log }, { n, values, stepped, height, from, to }) {
+        const { canvas, w, h, left, ratio } = stage,
+            field = this.controls.field.value;
+        const ends = [left, left + w].map((p) => this.physical(stage, [p, 0])[0]);
         const along = ticks(...ends, Math.max(2, w / ratio / 90)),
-            up = nothing ? [] : log ? powers(low, high) : ticks(from, to, most);
-        const what = nothing ? "" : field + (up.less ?? "") + (stepped ? ", over the mean" : "");
+            most = Math.max(2, h / ratio / 60),
+            up = !values ? [] : log ? powers(low, high) : ticks(from, to, most);
+        const what = values ? field + (up.less ?? "") + (stepped ? ", over the mean" : "") : "";
         this.frame(stage, along, up, height, [`x${along.less}`, what]);
         const when = this.data.clock ? `at ${this.when(stage.t)}, ` : "";
         canvas.setAttribute(
             "aria-label",
-            `${nothing ? "the nodes" : `${what} over x`}, ${(n - 1) * stride} cells, ${when}` +
+            `${values ? `${what} over x` : "the nodes"}, ${(n - 1) * this.data.stride} cells, ${when}` +
                 `from x = ${moment(ends[0])} to ${moment(ends[1])}`,
         );
     }
@@ -189,14 +199,3 @@ class LineViewer extends Viewer {
         ];
     }
 }
-
-(async () => {
-    const source = document.getElementById("viewer-data");
-    if (!source) return;
-    document.getElementById("viewer").classList.add("live");
-    const data = JSON.parse(source.textContent);
-    const arrays = await Promise.all(data.meshes.map(async (mesh) => unpack(mesh, await inflate(mesh.data))));
-    window.viewer = new (data.line ? LineViewer : Viewer)(data, arrays);
-})().catch((error) => {
-    document.querySelector(".stages").textContent = `The viewer does not work in this browser: ${error.message}`;
-});

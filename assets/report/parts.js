@@ -56,87 +56,58 @@ function shape(x, y, a, row, uniform) {
 
 // ---- pixels ----
 
+/** Where a row of pixels enters and leaves a quadrilateral, and the values there; filled anew for each row. */
+const span = { from: 0, to: 0, first: 0, last: 0 };
+
+/** Takes the place where an edge crosses the middle of a row, if it does; `per` is 1 over its height. */
+function cross(y, ax, ay, av, bx, by, bv, per) {
+    if (ay <= y === by <= y) return;
+    const s = (y - ay) * per,
+        x = ax + s * (bx - ax);
+    if (x < span.from) {
+        span.from = x;
+        span.first = av + s * (bv - av);
+    }
+    if (x > span.to) {
+        span.to = x;
+        span.last = av + s * (bv - av);
+    }
+}
+
 /**
  * Fills a quadrilateral, between its leftmost and rightmost point in every row, with colours between the values
  * (0 to 255) there.
  */
 function quadrilateral(out, w, h, colours, ax, ay, av, bx, by, bv, cx, cy, cv, dx, dy, dv) {
-    const low = ay < by ? (ay < cy ? ay : cy) : by < cy ? by : cy,
-        high = ay > by ? (ay > cy ? ay : cy) : by > cy ? by : cy;
-    const top = Math.max(0, Math.ceil((low < dy ? low : dy) - 0.5)),
-        bottom = Math.min(h - 1, Math.floor((high > dy ? high : dy) - 0.5));
+    const low = Math.min(ay, by, cy, dy),
+        high = Math.max(ay, by, cy, dy),
+        top = Math.max(0, Math.ceil(low - 0.5)),
+        bottom = Math.min(h - 1, Math.floor(high - 0.5));
     if (top > bottom) return;
     const ab = 1 / (by - ay),
         bc = 1 / (cy - by),
         cd = 1 / (dy - cy),
         da = 1 / (ay - dy);
     for (let j = top; j <= bottom; j++) {
-        const y = j + 0.5,
-            a = ay <= y,
-            b = by <= y,
-            c = cy <= y,
-            d = dy <= y;
-        let from = Infinity,
-            to = -Infinity,
-            v0 = 0,
-            v1 = 0,
-            s,
-            x;
-        if (a !== b) {
-            s = (y - ay) * ab;
-            x = ax + s * (bx - ax);
-            if (x < from) {
-                from = x;
-                v0 = av + s * (bv - av);
-            }
-            if (x > to) {
-                to = x;
-                v1 = av + s * (bv - av);
-            }
-        }
-        if (b !== c) {
-            s = (y - by) * bc;
-            x = bx + s * (cx - bx);
-            if (x < from) {
-                from = x;
-                v0 = bv + s * (cv - bv);
-            }
-            if (x > to) {
-                to = x;
-                v1 = bv + s * (cv - bv);
-            }
-        }
-        if (c !== d) {
-            s = (y - cy) * cd;
-            x = cx + s * (dx - cx);
-            if (x < from) {
-                from = x;
-                v0 = cv + s * (dv - cv);
-            }
-            if (x > to) {
-                to = x;
-                v1 = cv + s * (dv - cv);
-            }
-        }
-        if (d !== a) {
-            s = (y - dy) * da;
-            x = dx + s * (ax - dx);
-            if (x < from) {
-                from = x;
-                v0 = dv + s * (av - dv);
-            }
-            if (x > to) {
-                to = x;
-                v1 = dv + s * (av - dv);
-            }
-        }
-        if (to < 0 || from > w) continue;
-        const first = Math.max(0, Math.ceil(from - 0.5)),
-            last = j * w + Math.min(w - 1, Math.ceil(to - 0.5) - 1);
-        const slope = to > from ? (v1 - v0) / (to - from) : 0;
-        let v = v0 + slope * (first + 0.5 - from);
-        for (let k = j * w + first; k <= last; k++, v += slope) out[k] = colours[v < 0 ? 0 : v > 255 ? 255 : v | 0];
+        const y = j + 0.5;
+        span.from = Infinity;
+        span.to = -Infinity;
+        cross(y, ax, ay, av, bx, by, bv, ab);
+        cross(y, bx, by, bv, cx, cy, cv, bc);
+        cross(y, cx, cy, cv, dx, dy, dv, cd);
+        cross(y, dx, dy, dv, ax, ay, av, da);
+        if (span.to >= 0 && span.from <= w) fillRow(out, w, j, colours);
     }
+}
+
+/** Fills a row of pixels in the span. */
+function fillRow(out, w, j, colours) {
+    const { from, to } = span;
+    const first = Math.max(0, Math.ceil(from - 0.5)),
+        last = j * w + Math.min(w - 1, Math.ceil(to - 0.5) - 1);
+    const slope = to > from ? (span.last - span.first) / (to - from) : 0;
+    let v = span.first + slope * (first + 0.5 - from);
+    for (let k = j * w + first; k <= last; k++, v += slope) out[k] = colours[v < 0 ? 0 : v > 255 ? 255 : v | 0];
 }
 
 /**

@@ -62,7 +62,8 @@ fn entries(directory: &Path) -> Vec<String> {
     names
 }
 
-/// A grid that needs more than `ulimit -v` allows is refused before anything is written, and named as such: 1.3 GiB of 1.
+/// A grid that needs more than `ulimit -v` allows is refused before anything is written, and named as such: 1.3 GiB
+/// of 1.
 #[cfg(target_os = "linux")]
 #[test]
 fn the_limit_of_the_shell_is_known() {

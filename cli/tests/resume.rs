@@ -155,8 +155,8 @@ fn a_full_disk_is_named_and_the_run_goes_on() {
     let study = STUDY.replace("step = 1e-5", "step = 1e-3").replace("every = 1000", "every = 10");
     let sandbox = Sandbox::new(&study.replace("[12, 10]", "[5, 4]").replace("viscosity = 0.005", "viscosity = 0.05"));
     assert!(sandbox.command(PROGRAM, &["run", "a study.toml", "--out", "whole"]).status().unwrap().success());
-    // a limit for each file stands for the full disk: it is met by the first files, a frame or a checkpoint, the history, the
-    // picture
+    // a limit for each file stands for the full disk: it is met by the first files, a frame or a checkpoint, the
+    // history, the picture
     for (blocks, expected) in [(1, "cannot write"), (8, "/"), (24, "history.csv"), (60, "/mesh.")] {
         let out = format!("limited to {blocks}");
         let run = format!(

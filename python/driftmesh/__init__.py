@@ -6,32 +6,22 @@ Three ways in:
 * run a study: :func:`run`, :func:`load`;
 * the tools by themselves: :func:`laplacian_stencils`, :func:`equidistribute`, :func:`schwarz`.
 
-Arrays over a mesh have shape ``(nx + 1, ny + 1)``, first index along ξ; periodic axes repeat their first node at the end.
-Any real dtype, strides and order will do. Wrong shapes and values raise :class:`ValueError`, numerical failures
+Arrays over a mesh have shape ``(nx + 1, ny + 1)``, first index along ξ; periodic axes repeat their first node at the
+end. Any real dtype, strides and order will do. Wrong shapes and values raise :class:`ValueError`, numerical failures
 :class:`MeshError` or the subclass of it that is named after the failure.
 """
 
 from ._driftmesh import VERSION as __version__
 from .errors import MeshError, StudyError
-from .generators import (
-    Arclength,
-    Fixed,
-    Given,
-    GridWalk,
-    Interpolation,
-    MeshGenerator,
-    MonteCarlo,
-    ResidualWalk,
-    RootGradient,
-    Schwarz,
-    Stochastic,
-    Strip,
-    Whole,
-)
+from .frames import Frame
+from .generators import MeshGenerator
 from .laplacian import laplacian_stencils
 from .line import SchwarzResult, equidistribute, schwarz
-from .mesh import Mesh, Quality, transfer
-from .study import Frame, Run, load, run
+from .mesh import Mesh, Quality
+from .methods import Fixed, GridWalk, Interpolation, MonteCarlo, ResidualWalk, Schwarz, Stochastic, Strip, Whole
+from .monitors import Arclength, Given, RootGradient
+from .remap import transfer
+from .study import Run, load, run
 
 __all__ = [
     "Arclength",

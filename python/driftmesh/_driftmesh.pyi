@@ -9,7 +9,19 @@ from numpy.typing import NDArray
 
 from .errors import MeshError
 
-__all__ = ["VERSION", "Generator", "areas", "check", "equidistribute", "quality", "run", "schwarz", "stencils", "transfer", "uniform"]
+__all__ = [
+    "VERSION",
+    "Generator",
+    "areas",
+    "check",
+    "equidistribute",
+    "quality",
+    "run",
+    "schwarz",
+    "stencils",
+    "transfer",
+    "uniform",
+]
 
 VERSION: str
 

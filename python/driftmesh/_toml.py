@@ -1,14 +1,29 @@
-"""Python values as TOML."""
+"""Python values as TOML, and settings as tables of a study."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from os import PathLike, fspath
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Settings that are a table of a study, with the key ``kind`` and one key for each field."""
+
+    kind: ClassVar[str]
+
+    def _table(self) -> dict[str, Any]:
+        """The table, as a dict."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {"kind": self.kind} | {
+            name: value._table() if isinstance(value, Kind) else value for name, value in values.items()
+        }
 
 
 def value(given: Any) -> str:

@@ -1,7 +1,7 @@
 """What is raised.
 
-:class:`StudyError` for a mistake in a study; :class:`MeshError` for a numerical failure, as the subclass that bears its name
-in ``summary.json``: ``mesh-folded`` is :class:`MeshFolded`. Those that a wrong value in the input causes are
+:class:`StudyError` for a mistake in a study; :class:`MeshError` for a numerical failure, as the subclass that bears its
+name in ``summary.json``: ``mesh-folded`` is :class:`MeshFolded`. Those that a wrong value in the input causes are
 :class:`ValueError` too.
 """
 

@@ -1,4 +1,4 @@
-"""One dimension: meshes that equidistribute a density, and every Schwarz method for them."""
+"""One dimension: meshes that equidistribute a density, on the whole line or by Schwarz's method."""
 
 from __future__ import annotations
 
@@ -32,14 +32,15 @@ def equidistribute(
     """The mesh on which every cell has the same share of ∫M.
 
     Args:
-        density: M(x) > 0: a function of an array of places; a formula such as ``"x^2 + 1"``; a table such as
-            ``{"kind": "arclength", "of": "tanh(20*x)"}``; values at equal distances over the domain, or a pair of arrays
-            (places, values), both taken as piecewise linear; where M jumps a place comes twice.
+        density: M(x) > 0, as a function of an array of places, a formula such as ``"x^2 + 1"``, or a table such as
+            ``{"kind": "arclength", "of": "tanh(20*x)"}``. Samples of M are taken as piecewise linear: an array of
+            values at equal distances over the domain, or a pair of arrays (places, values). A place that comes twice
+            is a jump.
         cells: Number of cells, at least 2.
         domain: Ends of the line, in the unit of length.
-        face_density: How M is averaged over a cell: ``"exact"`` (∫M), or from few values by ``"trapezoid"`` or
-            ``"midpoint"``, as studies do: near where M varies little over a cell.
-        points: Places where M may have spikes too thin to be found among a few thousand equal parts of the line.
+        face_density: How M is averaged over a cell: ``"exact"``, by its integral, or ``"trapezoid"`` and
+            ``"midpoint"``, from values at two nodes or one. These differ little where M varies little within a cell.
+        points: Places of spikes of M that are thinner than a few thousandths of the line and could be overlooked.
 
     Returns:
         The nodes, shape (cells + 1,), in order from end to end.
@@ -63,19 +64,22 @@ def equidistribute(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SchwarzResult:
-    """How a Schwarz iteration went; entry n of every history belongs to iterate n, entry 0 to the start.
+    """How a Schwarz iteration went.
+
+    Entry n of every array over the iterations belongs to iterate n, and entry 0 to the start.
 
     Attributes:
         mesh: The glued mesh of the last iterate, shape (cells + 1,).
         reference: The discrete mesh of the whole line.
-        error: Largest distance of a node of any subdomain from it.
-        increment: Largest change since the iterate before.
-        largest_jump: 2 max|u_i − u_{i−1}|, where M is an arc length; else NaN.
-        interpolation_error: Of the piecewise linear interpolant of u, where M is an arc length; else NaN.
-        linear_solves: So far.
-        observed: Contraction in two iterations.
-        predicted: The same by theory, where there is one.
-        bound: An upper bound by theory, where there is one.
+        error: Largest distance of a node of any subdomain from ``reference``, by iteration.
+        increment: Largest distance of a node from its place in the previous iterate, by iteration.
+        largest_jump: 2 max|u_i − u_{i−1}| over the nodes, where M is the arc length of u; else NaN.
+        interpolation_error: Largest error of the piecewise linear interpolant of u, where M is its arc length; else
+            NaN.
+        linear_solves: Number of tridiagonal systems solved up to each iteration.
+        observed: Factor by which two iterations reduced the error; None where too few were done to tell.
+        predicted: The same factor by theory; None where there is none for the case.
+        bound: An upper bound of that factor by theory; None where there is none for the case.
 
     >>> from driftmesh import schwarz
     >>> result = schwarz("x^2 + 1", 20, overlap=(0.4, 0.6), iterations=3)
@@ -101,7 +105,8 @@ class SchwarzResult:
 
     def __repr__(self) -> str:
         rate = "" if self.observed is None else f", observed={self.observed:.4g}"
-        return f"<SchwarzResult of {len(self.mesh) - 1} cells, iterations={self.iterations}, error={self.error[-1]:.1e}{rate}>"
+        cells, error = len(self.mesh) - 1, self.error[-1]
+        return f"<SchwarzResult of {cells} cells, iterations={self.iterations}, error={error:.1e}{rate}>"
 
     def plot(self, ax: Axes | None = None, **line: Any) -> Axes:
         """Draws the error over the iterations; needs matplotlib. ``line`` goes to ``Axes.semilogy``."""
@@ -134,45 +139,47 @@ def schwarz(
     face_density: Faces | None = None,
     points: Sequence[float] | NDArray[Any] | None = None,
 ) -> SchwarzResult:
-    """Equidistributes subdomain by subdomain and iterates until they agree. Words as in a study of kind
-    ``equidistribution``.
+    """Equidistributes a line subdomain by subdomain, and iterates until neighbours agree (Schwarz's method).
+
+    The subdomains are given by ``overlap``, ``intervals``, ``cut``, ``cuts`` or ``subdomains``: exactly one of these,
+    in ξ from 0 to 1, with every end at a node. Arguments are named as in a study of kind ``equidistribution``.
 
     Args:
         density: As for :func:`equidistribute`.
         cells: Number of cells of the whole line.
-        method: ``"classical"`` (overlapping subdomains), ``"optimal"`` or ``"optimized"`` (subdomains that meet).
-        overlap: (α, β): two subdomains [0, β] and [α, 1] in ξ. This, or exactly one of the next four; every end is a node.
-        intervals: Any that overlap, [first, last] each.
-        cut: Two that meet.
-        cuts: Any that meet.
-        subdomains: So many of equal width, ``overlap_cells`` shared by neighbours.
-        overlap_cells: Goes with ``subdomains``.
-        sweep: Classical: ``"parallel"`` or ``"alternating"``.
-        linearized: Classical: M of the iterate before, one linear solve a subdomain.
-        coarse: Classical: ``"integral"`` makes the count independent of the number of subdomains; ``"galerkin"`` does where
-            the density varies little within a cell.
-        robin: Optimized: p, ``"auto"`` or ``"lagged"``.
-        integral: Optimal: ``"exact"`` or ``{"trapezoid": panels}``.
-        iterations: So many; at most so many with a tolerance, 500 where nothing is said.
-        tolerance: Of ``measure``; 1e-10 where neither is given.
-        measure: ``"error"`` against the discrete mesh of the whole line, or ``"increment"``.
-        start: The first mesh, shape (cells + 1,), or a function of ξ from 0 to 1 that gives it; equal cells by default.
+        method: ``"classical"`` exchanges node positions between overlapping subdomains; ``"optimal"`` and
+            ``"optimized"`` exchange fluxes between subdomains that meet in one node.
+        overlap: (α, β): two subdomains, [0, β] and [α, 1].
+        intervals: Any number of overlapping subdomains, as [first, last] each.
+        cut: The node at which two subdomains meet.
+        cuts: The nodes at which any number of subdomains meet.
+        subdomains: Number of subdomains of equal width.
+        overlap_cells: Cells that neighbours share; with ``subdomains`` only.
+        sweep: Classical: all subdomains at once (``"parallel"``) or one after the other (``"alternating"``).
+        linearized: Classical: takes M from the previous iterate, so that a subdomain costs one linear solve.
+        coarse: Classical: a coarse correction. ``"integral"`` makes the number of iterations independent of the number
+            of subdomains; ``"galerkin"`` does so where the density varies little within a cell.
+        robin: Optimized: p in the condition F ± p x at a cut; ``"auto"`` and ``"lagged"`` choose it from M.
+        integral: Optimal: how ∫M over the rest of the line is computed, ``"exact"`` or ``{"trapezoid": panels}``.
+        iterations: Number of iterations; with a tolerance the largest number, 500 by default.
+        tolerance: Ends the iteration once ``measure`` is below it; 1e-10 where ``iterations`` is not given either.
+        measure: ``"error"``, the distance from the discrete mesh of the whole line, or ``"increment"``, the change in
+            an iteration; both as shares of the length of the line.
+        start: The first mesh, shape (cells + 1,), or a function of ξ from 0 to 1 that gives it; by default equal cells.
         domain: Ends of the line.
-        face_density: As for :func:`equidistribute`; where nothing is said, the exact integral for arrays, which may be rough
-            from cell to cell, and the trapezoid of the published method else.
+        face_density: As for :func:`equidistribute`. The default is ``"exact"`` for arrays, which may vary much from
+            cell to cell, and ``"trapezoid"``, as published, for formulas and functions.
         points: As for :func:`equidistribute`.
 
     Raises:
-        ValueError: Wrong shapes or values, subdomains that do not fit.
-        driftmesh.errors.NotConverged: A tolerance was asked for and missed; its ``result`` is how far it came.
+        ValueError: Wrong shapes or values, or subdomains that do not fit the line.
+        driftmesh.errors.NotConverged: The tolerance was missed; ``result`` of the exception holds the iterates so far.
 
     >>> from driftmesh import schwarz
     >>> result = schwarz("x^2 + 1", 100, overlap=(0.4, 0.6))
     >>> result.iterations, round(result.predicted, 4)
     (53, 0.4444)
     """
-    ends = _ends(domain)
-    n = _cells(cells)
     table = {
         "method": word("method", method, ("classical", "optimal", "optimised")).replace("optimised", "optimized"),
         "overlap": overlap,
@@ -188,10 +195,9 @@ def schwarz(
         "integral": integral,
     }
     stop = {"iterations": iterations, "tolerance": tolerance, "measure": measure}
+    ends, n = _ends(domain), _cells(cells)
     given = _density(density, ends)
-    rough = not callable(density) and not isinstance(density, (str, Mapping))
-    faces = word("face_density", face_density or ("exact" if rough else "trapezoid"), get_args(Faces))
-    averages = {"face_density": faces, "points": _points(points)}
+    averages = {"face_density": _faces(face_density, density), "points": _points(points)}
     settings = _toml.document({"equidistribution": averages, "schwarz": table, "stop": stop})
     columns, meshes, rates, missed = _driftmesh.schwarz(given, n, ends, settings, _start(start, n, ends))
     result = SchwarzResult(*meshes, *columns, *rates)
@@ -199,6 +205,12 @@ def schwarz(
         missed.result = result
         raise missed
     return result
+
+
+def _faces(wanted: Faces | None, density: Density) -> str:
+    """How M is averaged over a cell: samples may be rough within it, so that few values of them say little."""
+    sampled = not callable(density) and not isinstance(density, (str, Mapping))
+    return word("face_density", wanted or ("exact" if sampled else "trapezoid"), get_args(Faces))
 
 
 def _points(points: Any) -> list[float] | None:
@@ -244,7 +256,9 @@ def _density(density: Any, ends: tuple[float, float]) -> Any:
         kind = density.get("kind", "formula")
         known = keys.get(kind) if isinstance(kind, str) else None
         if set(density) - {"kind"} != {known} or not isinstance(density[known], str):
-            raise ValueError(f"`density` is {dict(density)}, but must be a table such as {{'kind': 'arclength', 'of': 'x^2'}}")
+            raise ValueError(
+                f"`density` is {dict(density)}, but must be a table such as {{'kind': 'arclength', 'of': 'x^2'}}"
+            )
         return kind, density[known]
     if not callable(density):
         return _sampled(density, ends)
@@ -264,9 +278,13 @@ def _sampled(density: Any, ends: tuple[float, float]) -> tuple[list[float], list
         places = finite("places of the density", given)
         values = finite("density", samples, places.shape, "its array of places")
         if places.ndim != 1 or len(places) < 2:
-            raise ValueError(f"the places of the density have shape {places.shape}, but must be one array of two or more")
+            raise ValueError(
+                f"the places of the density have shape {places.shape}, but must be one array of two or more"
+            )
         if places[0] > ends[0] or places[-1] < ends[1]:
-            raise ValueError(f"the density is known from {places[0]} to {places[-1]}, but the line goes from {ends[0]} to {ends[1]}")
+            raise ValueError(
+                f"the density is known from {places[0]} to {places[-1]}, but the line goes from {ends[0]} to {ends[1]}"
+            )
     else:
         values = finite("density", density)
         if values.ndim != 1 or len(values) < 2:

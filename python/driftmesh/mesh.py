@@ -1,10 +1,10 @@
-"""Meshes, their quality, and fields carried from one to another."""
+"""Meshes and their quality."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +15,8 @@ from ._arrays import Floats, count, finite, pair, scalar
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Distance from the box that is round-off, as a share of its size.
-_ROUNDING = 1e-9
+#: A distance below this share of the size of the box is taken for round-off of positions.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class Quality:
     Attributes:
         q_max: Largest Q over the cells; Q = ½ tr(JᵀJ)/√det(JᵀJ) is 1 for a square and grows with stretching and shear.
         q_mean: Mean Q over the cells.
-        min_scaled_jacobian: Smallest corner Jacobian over that of the uniform mesh; positive as long as no cell is folded.
+        min_scaled_jacobian: Smallest corner Jacobian over that of the uniform mesh; positive as long as no cell is
+            folded.
         equidistribution: max/mean of density × area over the cells; 1 is perfect.
 
     >>> from driftmesh import Mesh
@@ -46,18 +47,18 @@ class Mesh:
     Args:
         x: Positions of the nodes, shape (nx + 1, ny + 1), nx and ny at least 2, first index along ξ.
         y: The same.
-        lower: Lower corner of the box; of the smallest box around the nodes where nothing is said. Where the first nodes of a
-            periodic axis have moved, the nodes do not tell: give it.
-        upper: Upper corner; where nothing is said, of a periodic axis as far from the lower one as its last nodes are from
-            the first.
-        periodic: Which axes wrap around. The last node of such an axis is the first one, a box further.
+        lower: Lower corner of the box; by default that of the smallest box around the nodes. Give it where the first
+            nodes of a periodic axis have moved away from the corner.
+        upper: Upper corner of the box; by default that of the smallest box around the nodes, and along a periodic axis
+            as far from ``lower`` as the last nodes are from the first.
+        periodic: Which axes wrap around. The last node of such an axis is its first one, shifted by the box.
 
     Raises:
-        ValueError: Shapes that differ, values that are not finite, a box without extent, closing nodes that are none, a mesh
-            whose second index goes along x.
+        ValueError: Shapes that differ, values that are not finite, a box without extent, last nodes of a periodic axis
+            that are not its first ones shifted by the box, or a mesh whose second index goes along x.
 
-    A mesh does not change; :meth:`moved` gives another one. It may be folded: :meth:`quality` tells, and whatever needs a
-    valid mesh raises :class:`driftmesh.errors.MeshFolded`.
+    A mesh does not change; :meth:`moved` gives another one. It may have folded cells: :meth:`quality` tells, and
+    functions that need a mesh without them raise :class:`driftmesh.errors.MeshFolded`.
 
     >>> from driftmesh import Mesh
     >>> mesh = Mesh.uniform(cells=(4, 2), upper=(1, 3))
@@ -83,7 +84,9 @@ class Mesh:
     ) -> None:
         first = finite("x", x)
         if first.ndim != 2 or min(first.shape) < 3:
-            raise ValueError(f"`x` has shape {first.shape}, but must have two axes of 3 nodes or more: (nx + 1, ny + 1)")
+            raise ValueError(
+                f"`x` has shape {first.shape}, but must have two axes of 3 nodes or more: (nx + 1, ny + 1)"
+            )
         second = finite("y", y, first.shape, "`x`")
         wraps = _flags(periodic)
         nodes = np.stack([first, second], axis=-1)
@@ -189,8 +192,8 @@ class Mesh:
     def areas(self) -> Floats:
         """Area of the dual cell of each node, in the square of the unit of length, shape (nx + 1, ny + 1).
 
-        ``(u * mesh.areas).sum()`` is the integral of u that a conservative :func:`transfer` keeps; closing nodes of
-        periodic axes count at the other end and have none.
+        ``(u * mesh.areas).sum()`` is the integral of u that a conservative :func:`transfer` keeps. The last nodes of a
+        periodic axis are its first ones: their area is 0.
 
         >>> from driftmesh import Mesh
         >>> float(Mesh.uniform(cells=(8, 8), upper=(2, 3)).areas.sum())
@@ -206,7 +209,8 @@ class Mesh:
             y: The same.
 
         Raises:
-            ValueError: Another shape, values that are not finite, closing nodes that are none.
+            ValueError: Another shape, values that are not finite, or last nodes of a periodic axis that are not its
+                first ones shifted by the box.
 
         >>> from driftmesh import Mesh
         >>> mesh = Mesh.uniform(cells=(4, 4))
@@ -218,7 +222,10 @@ class Mesh:
         return self._of(nodes, self)
 
     def quality(self, density: ArrayLike | None = None) -> Quality:
-        """How good the mesh is, under a density of shape (nx + 1, ny + 1) where one is given, else under an even one.
+        """How good the mesh is.
+
+        Args:
+            density: ρ at the nodes, shape (nx + 1, ny + 1), for ``equidistribution``; by default ρ = 1.
 
         Raises:
             ValueError: Another shape, or a density that is not positive everywhere.
@@ -267,7 +274,7 @@ class Mesh:
         return grid
 
     def plot(self, u: ArrayLike | None = None, ax: Axes | None = None) -> Axes:
-        """Draws the mesh, over colours for u of shape (nx + 1, ny + 1) where it is given; needs matplotlib.
+        """Draws the mesh, over colours for u of shape (nx + 1, ny + 1) if it is given. Needs matplotlib.
 
         Raises:
             ImportError: matplotlib is not there.
@@ -296,7 +303,7 @@ class Mesh:
     def _check_box(self) -> None:
         """Refuses a mesh whose bounded sides do not lie on its box: a generator moves nodes along straight sides."""
         for axis, name in enumerate("xy"):
-            slack = _ROUNDING * (self._upper[axis] - self._lower[axis])
+            slack = ROUNDING * (self._upper[axis] - self._lower[axis])
             for end, wall in ((0, self._lower[axis]), (-1, self._upper[axis])):
                 side = np.take(self._nodes, end, axis)[:, axis]
                 off = np.abs(side - wall)
@@ -326,76 +333,6 @@ class Mesh:
         self._set(*state)
 
 
-def transfer(
-    u: ArrayLike,
-    old: Mesh,
-    new: Mesh,
-    method: Literal["conservative", "interpolate"] = "conservative",
-) -> Floats:
-    """Carries nodal values from one mesh to another over the same lattice and box.
-
-    Args:
-        u: Shape (nx + 1, ny + 1), or (nx + 1, ny + 1, k) for k unknowns.
-        old: The mesh that u is on.
-        new: The mesh that it is wanted on.
-        method: ``"conservative"`` keeps ``(u * mesh.areas).sum()`` to round-off and leaves the range of u nowhere, by fluxes
-            through faces that move. Where u is smooth it is of second order in the mean, of first at sides and extrema, and
-            therefore in the maximum; linear u is not kept. It goes in steps of at most half a cell: as fast as a step of a
-            mesh between neighbouring times, slow where the meshes are far apart. ``"interpolate"`` takes u linear on two
-            triangles a cell: fast over any distance, of second order everywhere, exact for linear u, but it keeps no
-            integral.
-
-    Returns:
-        The values on the new mesh, shape as u.
-
-    Raises:
-        ValueError: Shapes or boxes that differ, values that are not finite; for ``"conservative"``, sides that differ other
-            than by nodes that slide along straight ones.
-        driftmesh.errors.MeshFolded: A mesh is folded, or one on the straight way between both.
-
-    >>> from driftmesh import Mesh, transfer
-    >>> old = Mesh.uniform(cells=(8, 8))
-    >>> new = old.moved(old.x**2, old.y)
-    >>> u = transfer(old.x, old, new)
-    >>> abs((u * new.areas).sum() - (old.x * old.areas).sum()) < 1e-14
-    np.True_
-    """
-    for name, mesh in (("old", old), ("new", new)):
-        if not isinstance(mesh, Mesh):
-            raise TypeError(f"`{name}` is of type {type(mesh).__name__}, but must be a driftmesh.Mesh")
-    if old.shape != new.shape:
-        raise ValueError(f"`old` has shape {old.shape}, but `new` has shape {new.shape}; both need the same lattice")
-    if old._given()[1:] != new._given()[1:]:
-        raise ValueError(f"`old` and `new` lie in different boxes: {old!r} and {new!r}")
-    if method not in ("conservative", "interpolate"):
-        raise ValueError(f'`method` is {method!r}, but must be "conservative" or "interpolate"')
-    if method == "conservative":
-        _refuse_moved_sides(old, new)
-    values = finite("u", u)
-    if values.shape[:2] != old.shape or values.ndim not in (2, 3):
-        raise ValueError(f"`u` has shape {values.shape}, but the mesh has shape {old.shape}")
-    out = np.empty_like(values)
-    for c in np.ndindex(values.shape[2:]):
-        unknown = periodic_values("u", np.ascontiguousarray(values[(..., *c)]), old)
-        out[(..., *c)] = _driftmesh.transfer(unknown, old._given(), new._given(), method == "conservative")
-    return out
-
-
-def periodic_values(name: str, values: Floats, mesh: Mesh) -> Floats:
-    """Refuses values whose closing nodes on periodic axes are not those of the first."""
-    for axis in range(2):
-        if mesh.periodic[axis]:
-            start, end = np.take(values, 0, axis), np.take(values, -1, axis)
-            off = np.abs(end - start)
-            if off.max() > 1e-6 * np.abs(values).max():
-                k = int(off.argmax())
-                raise ValueError(
-                    f"axis {axis} is periodic, but `{name}` is {start[k]} at its first node and {end[k]} at its last, "
-                    f"which is the same one (index {k} along the other axis)"
-                )
-    return values
-
-
 def _close(nodes: Floats, lower: tuple[float, ...], upper: tuple[float, ...], periodic: tuple[bool, ...]) -> None:
     """Checks the closing nodes of periodic axes, and puts them a box further than the first ones to the last bit."""
     for axis in range(2):
@@ -405,8 +342,10 @@ def _close(nodes: Floats, lower: tuple[float, ...], upper: tuple[float, ...], pe
             image[:, axis] += size
             last: tuple[Any, ...] = (-1,) if axis == 0 else (slice(None), -1)
             off = np.abs(nodes[last] - image).max()
-            if off > _ROUNDING * size:
-                raise ValueError(f"axis {axis} is periodic, but its last nodes are not the first ones a box of {size} further")
+            if off > ROUNDING * size:
+                raise ValueError(
+                    f"axis {axis} is periodic, but its last nodes are not the first ones a box of {size} further"
+                )
             nodes[last] = image
 
 
@@ -415,25 +354,9 @@ def _refuse_mirrored(nodes: Floats) -> None:
     along, across = nodes[1:, 1:] - nodes[:-1, :-1], nodes[:-1, 1:] - nodes[1:, :-1]
     if (along[..., 0] * across[..., 1] < along[..., 1] * across[..., 0]).all():
         raise ValueError(
-            "the mesh is mirrored: its first index must go along x, its second one along y, shape (nx + 1, ny + 1), as of "
-            'np.meshgrid(x, y, indexing="ij")'
+            "the mesh is mirrored: its first index must go along x, its second one along y, shape (nx + 1, ny + 1), "
+            'as of np.meshgrid(x, y, indexing="ij")'
         )
-
-
-def _refuse_moved_sides(old: Mesh, new: Mesh) -> None:
-    """Refuses meshes whose sides enclose something else: there is no value for what a side sweeps."""
-    size = (old.upper[0] - old.lower[0]) * (old.upper[1] - old.lower[1])
-    for axis in range(2):
-        for end in (0, -1):
-            before, after = np.take(old._nodes, end, axis), np.take(new._nodes, end, axis)
-            # of the quadrilateral between a segment before and after, twice the area by its diagonals
-            one, other = after[1:] - before[:-1], after[:-1] - before[1:]
-            swept = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
-            if not old.periodic[axis] and swept.max() > _ROUNDING * size:
-                raise ValueError(
-                    f"the {'last' if end else 'first'} side of axis {axis} differs between `old` and `new`, so that no integral can "
-                    'be kept; use method="interpolate"'
-                )
 
 
 def _with(corner: tuple[Any, ...], axis: int, value: float) -> tuple[Any, ...]:

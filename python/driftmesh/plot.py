@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .mesh import Mesh
-    from .study import Frame, Run
+    from .frames import Frame
+    from .study import Run
 
 
 def mesh(of: Mesh, u: Floats | None, ax: Axes | None) -> Axes:
@@ -96,7 +97,9 @@ def animation(of: Run, path: str | PathLike[str] | None, field: str | None) -> F
     return _moving(ax, draw, len(of.frames), path)
 
 
-def _moving_line(of: Run, values: list[Floats], name: str, ax: Axes, limits: tuple[float, float], path: str | PathLike[str] | None) -> FuncAnimation:
+def _moving_line(
+    of: Run, values: list[Floats], name: str, ax: Axes, limits: tuple[float, float], path: str | PathLike[str] | None
+) -> FuncAnimation:
     """A field over x, through the nodes of a line."""
     [curve] = ax.plot(of.frames[0].x, values[0], marker=".")
     room = 0.05 * (limits[1] - limits[0]) or 0.5
@@ -158,5 +161,9 @@ def _fill(x: Floats, y: Floats, u: Floats | None, ax: Axes, limits: tuple[float,
         colours = ax.pcolormesh(x, y, means, vmin=low, vmax=high)
     along = [np.stack([x, y], axis=-1), np.stack([x.T, y.T], axis=-1)]
     lines = [line for lines in along for line in lines]
-    ax.add_collection(LineCollection(lines, colors="black" if u is None else "white", linewidths=0.3, alpha=0.7 if u is None else 0.35))
+    ax.add_collection(
+        LineCollection(
+            lines, colors="black" if u is None else "white", linewidths=0.3, alpha=0.7 if u is None else 0.35
+        )
+    )
     return colours

@@ -54,7 +54,8 @@ pub struct Generator {
 struct Parts {
     monitor: Box<dyn Monitor>,
     mover: Mover,
-    /// The mesh that the last step led to, and how it was going: forgotten where the next step starts from another mesh.
+    /// The mesh that the last step led to, and how it was going: forgotten where the next step starts from another
+    /// mesh.
     last: Option<(Mesh<2>, Gait)>,
 }
 
@@ -94,8 +95,8 @@ impl Generator {
         let share = noise(mesh.lattice(), &u);
         if share > NOISE_WORTH_A_WARNING && !self.warned[0].swap(true, Ordering::Relaxed) {
             let text = format!(
-                "noisy-density: {:.0} % of u goes up and down from node to node, so that the mesh follows noise of the size \
-                 of its cells; smooth u, or use more cells",
+                "noisy-density: {:.0} % of u goes up and down from node to node, so that the mesh follows noise of the \
+                 size of its cells; smooth u, or use more cells",
                 100.0 * share
             );
             PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &CString::new(text)?, 2)?;

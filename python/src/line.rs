@@ -103,7 +103,8 @@ pub fn equidistribute<'py>(
     Ok(mesh.into_pyarray(py))
 }
 
-/// Five columns of a history, mesh, reference; observed, predicted and bound of the contraction; why it did not converge.
+/// Five columns of a history, mesh, reference; observed, predicted and bound of the contraction; why it did not
+/// converge.
 type Iterated<'py> = ([Bound<'py, PyArray1<f64>>; 5], [Bound<'py, PyArray1<f64>>; 2], [Option<f64>; 3], Option<PyErr>);
 
 /// A Schwarz iteration on a line.

@@ -6,8 +6,8 @@ use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Rows of a matrix: row, column, weight on u, weight on Δu of each entry; then node and condition number where the mesh
-/// hardly determines a Laplacian.
+/// Rows of a matrix: row, column, weight on u, weight on Δu of each entry; then node and condition number where the
+/// mesh hardly determines a Laplacian.
 type Entries<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<i64>>,

@@ -1,8 +1,8 @@
 //! Where things are computed: in threads of their own, with the interpreter free meanwhile.
 //!
 //! Every computation has a pool to itself, so that none waits for another, whoever started it: a thread beside it, or a
-//! Python function that it calls. Python is called in the thread that waits and nowhere else: Ctrl-C is heard there, and a
-//! computation that is left alone never meets an interpreter that ends.
+//! Python function that it calls. Python is called in the thread that waits and nowhere else: Ctrl-C is heard there,
+//! and a computation that is left alone never meets an interpreter that ends.
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -19,8 +19,8 @@ pub const PATIENCE: Duration = Duration::from_secs(3);
 /// The same for one that may not look.
 pub const BRIEFLY: Duration = Duration::from_millis(200);
 
-/// Pools at rest, kept for the next computations, and the process that they belong to: its threads are not there after a
-/// fork.
+/// Pools at rest, kept for the next computations, and the process that they belong to: its threads are not there after
+/// a fork.
 static RESTING: Mutex<(u32, Vec<Arc<ThreadPool>>)> = Mutex::new((0, Vec::new()));
 /// Most pools at rest; what is more ends its threads.
 const KEPT: usize = 4;
@@ -96,8 +96,8 @@ pub fn compute<T: Send + 'static>(py: Python<'_>, f: impl FnOnce() -> T + Send +
     }
 }
 
-/// Computes with all threads at hand. Ctrl-C, or an exception of a call, calls `stop`, which says how long the end may take.
-/// `look` is called every now and then meanwhile.
+/// Computes with all threads at hand. Ctrl-C, or an exception of a call, calls `stop`, which says how long the end may
+/// take. `look` is called every now and then meanwhile.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     (Caller(ended), calls): (Caller, Calls),

@@ -86,7 +86,8 @@ def test_monitors_by_name_by_array_and_by_function_are_the_same():
     ],
 )
 def test_subdomains_give_the_mesh_of_the_whole_domain(method):
-    """Within six standard errors; paths are continuous in time and have a bias, strips leave up to a hundredth of an edge."""
+    """Within six standard errors; paths are continuous in time and have a bias, strips leave up to a hundredth of an
+    edge."""
     whole, divided, again = (MeshGenerator(Arclength(), m, 1.0, "gradient") for m in (Whole(), method, method))
     mesh = follow(divided, steps=1, dt=1e-3)
     interface = divided.last["interface"]
@@ -179,14 +180,18 @@ def test_a_folded_mesh_is_an_error_with_a_remedy():
 def test_a_generator_copies_its_settings():
     generator = MeshGenerator(Arclength(absolute=3), Stochastic(subdomains=(2, 2), seed=5), relaxation={"steps": 30})
     follow(generator, steps=2)
-    fresh = follow(MeshGenerator(Arclength(absolute=3), Stochastic(subdomains=(2, 2), seed=5), relaxation={"steps": 30}))
+    fresh = follow(
+        MeshGenerator(Arclength(absolute=3), Stochastic(subdomains=(2, 2), seed=5), relaxation={"steps": 30})
+    )
     assert follow(pickle.loads(pickle.dumps(generator))) == follow(copy.deepcopy(generator)) == fresh
 
 
 def test_other_threads_go_on_meanwhile():
     """The interpreter is free during a step, and two generators work side by side."""
     found = {}
-    threads = [threading.Thread(target=lambda k=k: found.update({k: follow(MeshGenerator(relaxation=0.1))})) for k in range(3)]
+    threads = [
+        threading.Thread(target=lambda k=k: found.update({k: follow(MeshGenerator(relaxation=0.1))})) for k in range(3)
+    ]
     [thread.start() for thread in threads]
     [thread.join() for thread in threads]
     assert found[0] == found[1] == found[2] == follow(MeshGenerator(relaxation=0.1))

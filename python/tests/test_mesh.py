@@ -98,8 +98,14 @@ def test_a_folded_mesh_says_so():
         (lambda: Mesh(*np.meshgrid(np.arange(5), np.arange(4))), 'mirrored.*indexing="ij"'),
         (lambda: Mesh.uniform(cells=(4, 4), periodic="no"), "`periodic` is 'no'"),
         (lambda: Mesh.uniform(cells=(4, 4), periodic=(0, 2)), "`periodic` is"),
-        (lambda: transfer(np.ones(SHAPE), bent(), bent().moved(1.1 * bent().x, bent().y)), "last side of axis 0 differs.*interpolate"),
-        (lambda: transfer(np.ones(SHAPE), bent(), bent().moved(bent().x, bent().y + 0.1)), "first side of axis 1 differs"),
+        (
+            lambda: transfer(np.ones(SHAPE), bent(), bent().moved(1.1 * bent().x, bent().y)),
+            "last side of axis 0 differs.*interpolate",
+        ),
+        (
+            lambda: transfer(np.ones(SHAPE), bent(), bent().moved(bent().x, bent().y + 0.1)),
+            "first side of axis 1 differs",
+        ),
         (lambda: Mesh(bent().x, bent().y + 0.1 * bent().x, periodic=(True, False)), "axis 0 is periodic"),
     ],
 )
@@ -186,7 +192,11 @@ def test_the_largest_values_are_carried():
 @settings(max_examples=30, deadline=None)
 @given(st.sampled_from(DTYPES), st.integers(0, 3), st.sampled_from(["conservative", "interpolate"]), st.data())
 def test_dtype_order_and_strides_do_not_matter(dtype, layout, method, data):
-    u = data.draw(arrays.arrays(np.dtype(dtype), SHAPE, elements={"allow_nan": False, "allow_infinity": False} if "f" in dtype else None))
+    u = data.draw(
+        arrays.arrays(
+            np.dtype(dtype), SHAPE, elements={"allow_nan": False, "allow_infinity": False} if "f" in dtype else None
+        )
+    )
     old, new = bent(amount=-0.05), bent(amount=0.05)
     np.testing.assert_array_equal(
         transfer(layouts(u)[layout], old, new, method), transfer(u.astype(float).tolist(), old, new, method)

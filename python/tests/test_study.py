@@ -37,10 +37,22 @@ def result(tmp_path_factory):
 
 
 def test_results_are_those_of_the_program(tmp_path):
-    settings = {"time.end": 0.3, "time.report": [0.3], "grid.cells": np.array([16, 16]), "mesh.generator.kind": "whole", "output.report": False}
+    settings = {
+        "time.end": 0.3,
+        "time.report": [0.3],
+        "grid.cells": np.array([16, 16]),
+        "mesh.generator.kind": "whole",
+        "output.report": False,
+    }
     ours = driftmesh.run(ROOT / "studies/burgers.toml", out=tmp_path / "ours", set=settings)
     command = [PROGRAM, "run", ROOT / "studies/burgers.toml", "--out", tmp_path / "theirs", "--quiet"]
-    assignments = ["time.end=0.3", "time.report=[0.3]", "grid.cells=[16, 16]", "mesh.generator.kind=whole", "output.report=false"]
+    assignments = [
+        "time.end=0.3",
+        "time.report=[0.3]",
+        "grid.cells=[16, 16]",
+        "mesh.generator.kind=whole",
+        "output.report=false",
+    ]
     subprocess.run(command + [part for a in assignments for part in ("--set", a)], check=True)
     theirs = driftmesh.load(tmp_path / "theirs")
     assert ours.summary["reports"] == theirs.summary["reports"] and ours.summary["work"] == theirs.summary["work"]
@@ -85,7 +97,13 @@ def test_frames_of_a_run_that_was_replaced_are_refused(tmp_path):
 
 
 def test_meshes_of_periodic_runs_wrap_around(tmp_path):
-    settings = {"grid.cells": [16, 16], "time.end": 0.05, "time.report": [0.05], "output.report": False, "compare.generator.kind": "fixed"}
+    settings = {
+        "grid.cells": [16, 16],
+        "time.end": 0.05,
+        "time.report": [0.05],
+        "output.report": False,
+        "compare.generator.kind": "fixed",
+    }
     result = driftmesh.run(ROOT / "studies/burgers-periodic.toml", out=tmp_path / "out", set=settings)
     for mesh in (result.mesh, result.frames[-1].mesh):
         assert mesh.periodic == (True, True) and mesh.lower == (0, 0) and mesh.upper == (2 * np.pi, 2 * np.pi)
@@ -102,13 +120,19 @@ def test_results_are_told_apart_and_shown_shortly(result):
     ("study", "settings", "arrays"),
     [
         ("laplacian-model-problem", {}, {"x": (22, 18), "u": (22, 18)}),
-        ("stefan-slides", {"time.end": 0.05, "time.report": [0.05], "grid.cells": [10, 6, 6]}, {"x": (11, 13), "u": (11, 13)}),
+        (
+            "stefan-slides",
+            {"time.end": 0.05, "time.report": [0.05], "grid.cells": [10, 6, 6]},
+            {"x": (11, 13), "u": (11, 13)},
+        ),
         ("table-8-1-nonlinear", {}, {"x": (101,)}),
         ("moving-front-1d", {"time.end": 0.02}, {"x": (101,), "path": (None, 101)}),
     ],
 )
 def test_every_kind_runs_and_draws(study, settings, arrays, tmp_path):
-    result = driftmesh.run(ROOT / f"studies/{study}.toml", out=tmp_path / "out", set=settings | {"output.report": False})
+    result = driftmesh.run(
+        ROOT / f"studies/{study}.toml", out=tmp_path / "out", set=settings | {"output.report": False}
+    )
     assert result.status == "completed"
     for name, shape in arrays.items():
         assert result.final[name].shape[-len(shape) :][-1] == shape[-1] and np.isfinite(result.final[name]).all()
@@ -133,7 +157,9 @@ def test_pictures_and_animations(result, tmp_path):
 def test_the_iterates_of_a_line_are_frames(tmp_path):
     from PIL import Image
 
-    result = driftmesh.run(ROOT / "studies/table-8-1-nonlinear.toml", out=tmp_path / "out", set={"output.report": False})
+    result = driftmesh.run(
+        ROOT / "studies/table-8-1-nonlinear.toml", out=tmp_path / "out", set={"output.report": False}
+    )
     iterations = result.summary["iterations"]
     assert [frame.t for frame in result.frames] == [iterate["n"] for iterate in iterations]
     assert np.array_equal(result.frames[-1].x, result.final["x"])
@@ -145,11 +171,11 @@ def test_the_iterates_of_a_line_are_frames(tmp_path):
 
 MISTAKES = [
     ("[grid]\ncels = [3, 3]", {}),
-    ("[pde]\nkind = \"burger\"", {}),
-    ("[pde]\nkind = \"burgers\"\nviscosity = -1", {}),
+    ('[pde]\nkind = "burger"', {}),
+    ('[pde]\nkind = "burgers"\nviscosity = -1', {}),
     ("", {"pde.viscosty": 0.1}),
     ("[grid\ncells = [3, 3]", {}),
-    ("[monitor]\nkind = \"arclength\"\nof = \"u +* 2\"", {}),
+    ('[monitor]\nkind = "arclength"\nof = "u +* 2"', {}),
 ]
 
 
@@ -268,13 +294,24 @@ def test_ctrl_c_leaves_the_last_good_state(tmp_path):
 
 
 def test_ctrl_c_leaves_what_to_go_on_from(tmp_path):
-    settings = {"grid.cells": [40, 40], "time.end": 0.26, "time.report": [0.26], "output.frames.every": 1, "output.report": False}
+    settings = {
+        "grid.cells": [40, 40],
+        "time.end": 0.26,
+        "time.report": [0.26],
+        "output.frames.every": 1,
+        "output.report": False,
+    }
     study = str(ROOT / "studies/burgers.toml")
     said, _ = interrupted(study, settings | {"time.step": 5e-5}, tmp_path / "cut")
     assert "run(…, resume=True) goes on" in said and driftmesh.load(tmp_path / "cut").status == "interrupted"
     with pytest.raises(OSError, match=r"`grid.cells` is \[40, 40\]; here it is \[41, 40\](.|\n)*leave `resume` out"):
-        driftmesh.run(study, out=tmp_path / "cut", set=settings | {"time.step": 5e-5, "grid.cells": [41, 40]}, resume=True)
-    cut, whole = (driftmesh.run(study, out=tmp_path / name, set=settings | {"time.step": 5e-5}, resume=True) for name in ("cut", "whole"))
+        driftmesh.run(
+            study, out=tmp_path / "cut", set=settings | {"time.step": 5e-5, "grid.cells": [41, 40]}, resume=True
+        )
+    cut, whole = (
+        driftmesh.run(study, out=tmp_path / name, set=settings | {"time.step": 5e-5}, resume=True)
+        for name in ("cut", "whole")
+    )
     assert not list((tmp_path / "cut").glob("checkpoint*")) and cut.status == "completed"
     assert cut.summary["reports"] == whole.summary["reports"] and cut.summary["work"] == whole.summary["work"]
     for name, column in whole.history.items():
@@ -284,7 +321,10 @@ def test_ctrl_c_leaves_what_to_go_on_from(tmp_path):
         assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     # one that is complete is opened as it is
     before = (tmp_path / "cut/summary.json").stat().st_mtime_ns
-    assert driftmesh.run(study, out=tmp_path / "cut", set=settings | {"time.step": 5e-5}, resume=True).status == "completed"
+    assert (
+        driftmesh.run(study, out=tmp_path / "cut", set=settings | {"time.step": 5e-5}, resume=True).status
+        == "completed"
+    )
     assert (tmp_path / "cut/summary.json").stat().st_mtime_ns == before
 
 

@@ -68,8 +68,16 @@ def test_compact25_solves_with_fourth_order():
         (lambda x, y: laplacian_stencils(x, y * 0), ValueError, "scale the mesh"),
         (lambda x, y: laplacian_stencils(1e300 * x, y), ValueError, "scale the mesh"),
         (lambda x, y: laplacian_stencils(x[::-1], y[::-1]), ValueError, "mirrored.*indexing"),
-        (lambda x, y: laplacian_stencils(*np.meshgrid(np.arange(5.0), np.arange(4.0))), ValueError, "mirrored.*indexing"),
-        (lambda x, y: laplacian_stencils(*np.mgrid[:9, :9], "compact25", source=True, periodic=(True, False)), ValueError, "bounded axes"),
+        (
+            lambda x, y: laplacian_stencils(*np.meshgrid(np.arange(5.0), np.arange(4.0))),
+            ValueError,
+            "mirrored.*indexing",
+        ),
+        (
+            lambda x, y: laplacian_stencils(*np.mgrid[:9, :9], "compact25", source=True, periodic=(True, False)),
+            ValueError,
+            "bounded axes",
+        ),
         (lambda x, y: laplacian_stencils(x, y, kind=None), ValueError, "`kind` is None"),
         (lambda x, y: laplacian_stencils(x, y, periodic=(True, False)), ValueError, "axis 0 is periodic"),
         (lambda x, y: laplacian_stencils(1e-155 * x, 1e-155 * y), ValueError, "scale the mesh"),
@@ -125,7 +133,13 @@ EXACT = {0.1: 0.13255693, 0.25: 0.32218535, 0.5: 0.59607164, 0.75: 0.81773167, 0
 def test_every_way_to_say_a_density_gives_the_mesh():
     """x(ξ) of M = x² + 1; the discrete mesh is within 2.6e-5·(40/N)² of it."""
     s = np.linspace(0, 1, 2001)
-    ways = ["x^2 + 1", {"kind": "formula", "value": "x^2 + 1"}, lambda x: x**2 + 1, (s, s**2 + 1), (s**2 + 1).astype("f4")]
+    ways = [
+        "x^2 + 1",
+        {"kind": "formula", "value": "x^2 + 1"},
+        lambda x: x**2 + 1,
+        (s, s**2 + 1),
+        (s**2 + 1).astype("f4"),
+    ]
     for density in ways:
         x = equidistribute(density, 100)
         assert x.shape == (101,) and x[0] == 0 and x[-1] == 1
@@ -175,7 +189,11 @@ def test_every_cell_has_the_same_share_of_a_steep_density(steep):
         (lambda: equidistribute({"kind": "arclength", "value": "x"}, 10), ValueError, "arclength"),
         (lambda: equidistribute("1", 10**9), ValueError, "GiB"),
         (lambda: equidistribute(lambda x: 1e6 + x, 10, points=[2.0]), ValueError, "points.*must lie on the line"),
-        (lambda: equidistribute(([0, 0.5, 0.5, 0.5, 1], [1, 2, 3, 4, 5]), 10), ValueError, "twice the same where M jumps"),
+        (
+            lambda: equidistribute(([0, 0.5, 0.5, 0.5, 1], [1, 2, 3, 4, 5]), 10),
+            ValueError,
+            "twice the same where M jumps",
+        ),
         (lambda: equidistribute("1/sqrt(1 - x)", 10), LineDensity, "M is inf at x = 1"),
         (lambda: equidistribute({"kind": ["a"]}, 4), ValueError, "must be a table"),
         (lambda: equidistribute({"value": 3}, 4), ValueError, "must be a table"),
@@ -216,7 +234,7 @@ def test_arrays_may_jump_and_spikes_may_be_named():
     assert x[2] == pytest.approx(0.4, abs=1e-14) and x[1502] == pytest.approx(0.7, abs=1e-12)
     spike = "1 + 1e9*exp(-((x - 0.3)/1e-9)^2)"
     assert np.count_nonzero(abs(equidistribute(spike, 40, points=[0.3]) - 0.3) < 1e-8) > 20
-    with pytest.warns(RuntimeWarning, match="`face_density`.*nodes are those of \"exact\""):
+    with pytest.warns(RuntimeWarning, match='`face_density`.*nodes are those of "exact"'):
         x = equidistribute(lambda x: np.where(x < 0.3, 1.0, 100.0), 100, face_density="trapezoid")
     assert (np.diff(x) > 0).all()
 
@@ -250,7 +268,9 @@ def test_what_does_not_converge_is_an_error_with_its_history():
 def test_results_are_told_apart_and_shown_shortly():
     result = schwarz("x^2 + 1", 100, overlap=np.array([0.4, 0.6]))
     assert result == result and result != schwarz("x^2 + 1", 100, overlap=(0.4, 0.6))
-    assert repr(result).startswith("<SchwarzResult of 100 cells, iterations=53, error=") and "observed=0.4444" in repr(result)
+    assert repr(result).startswith("<SchwarzResult of 100 cells, iterations=53, error=") and "observed=0.4444" in repr(
+        result
+    )
 
 
 NESTED = """
@@ -258,7 +278,8 @@ NESTED = """
     from driftmesh import equidistribute, schwarz
 
     def density(x):
-        return 1 + x * equidistribute(lambda y: 1 + y, 10)[5] + schwarz("x + 1", 20, overlap=(0.4, 0.6), iterations=2).mesh[10]
+        inner = schwarz("x + 1", 20, overlap=(0.4, 0.6), iterations=2)
+        return 1 + x * equidistribute(lambda y: 1 + y, 10)[5] + inner.mesh[10]
 
     with ThreadPoolExecutor(4) as threads:
         meshes = list(threads.map(lambda _: schwarz(density, 20, overlap=(0.4, 0.6), iterations=3).mesh, range(4)))

@@ -2,20 +2,20 @@ use super::chain::{Chain, End, Step};
 use crate::error::Failure;
 use crate::numerics::linear::tridiagonal;
 
-/// What lies beyond a cut, over a step in time: the optimal condition there
+/// The flux of a time step into the part of the line beyond a cut: the optimal transmission condition
 ///
 /// ```text
 /// φ(x) = M y_ξ at the cut,   (τ/Δt)(y − y_old) = (M y_ξ)_ξ beyond it,   y = x at the cut, y given at the other end
 /// ```
 ///
-/// Without time φ is ∫M over the rest by its length, (4.3) of the source. With time no integral is left: φ costs a solve of the
-/// rest, and its derivative a linear one more.
+/// Without time, φ(x) is ∫M over the part beyond the cut, divided by its length in ξ: (4.3) of the source. In time
+/// there is no such integral: φ takes a nonlinear solve of the part beyond the cut, and φ′ one linear solve more.
 ///
 /// # Source
 /// M. J. Gander and R. D. Haynes (2012), who leave the extension of section 4 to section 7 to the future.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Beyond<'a> {
-    /// Its nodes before the step.
+    /// Nodes of the part beyond the cut, before the step.
     pub old: &'a [f64],
     /// τ/Δt.
     pub ratio: f64,
@@ -31,12 +31,12 @@ impl Beyond<'_> {
         let step = Step { old, ratio };
         let ends = if cut_at_left { [x, old[n]] } else { [old[0], x] }.map(End::Value);
         let (y, _) = chain.newton(old, ends, Some(step))?;
-        // how its nodes follow the one at the cut
+        // the derivative of each node y_i by the node at the cut
         let (_, rows) = chain.linearised(&y, ends, Some(step))?;
         let mut right = vec![0.0; n + 1];
         right[if cut_at_left { 0 } else { n }] = 1.0;
         let follows = tridiagonal(&rows, &right);
-        // the cell beside the cut, and the half cell up to it
+        // the flux in the middle of the cell beside the cut, and what half a cell adds up to the cut
         let (first, cut, sign) = if cut_at_left { (0, 0, -1.0) } else { (n - 1, n, 1.0) };
         let [flux, by_left, by_right] = chain.flux_of_cell(y[first], y[first + 1])?;
         let [more, by_node] = step.half(chain.h, cut, x);

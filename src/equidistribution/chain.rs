@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FaceDensity {
-    /// The mean of both ends.
+    /// The trapezoidal rule: the mean of M at both ends of the cell.
     #[default]
     Trapezoid,
-    /// M in the middle.
+    /// The midpoint rule: M in the middle of the cell.
     Midpoint,
-    /// ∫M over the cell: the discrete problem then has the nodes of the continuous one.
+    /// ∫M over the cell, divided by its length. The nodes of the discrete problem are then those of the continuous one.
     Exact,
 }
 
@@ -26,38 +26,38 @@ struct Face {
     by: [f64; 2],
 }
 
-/// A law at an end: g + φ(x) is the flux there.
+/// A transmission condition at an end of a piece: the flux there is g + φ(x), with φ as follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Law<'a> {
     /// φ = slope · x.
     Robin { slope: f64 },
-    /// φ = ∫ M from x to `to`, over `length`: the flux of the rest of the domain, which begins at x. With panels the
-    /// integral is that of the trapezoidal rule.
+    /// φ = (∫ M from x to `to`) / `length`: the flux of the rest of the line, which begins at x and is `length` long in
+    /// ξ. The integral is exact, or by the trapezoidal rule with `panels`.
     Rest { to: f64, length: f64, panels: Option<usize> },
-    /// φ = the flux into what lies beyond, over a step in time.
+    /// φ = the flux of a time step into the rest of the line.
     Beyond(Beyond<'a>),
 }
 
-/// What is known at an end of a piece of the line.
+/// The boundary condition at an end of a piece of the line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum End<'a> {
-    /// The node.
+    /// The position of the node.
     Value(f64),
-    /// The flux, F = g + φ(x).
+    /// The flux F = g + φ(x).
     Flux { g: f64, law: Law<'a> },
 }
 
 /// The backward Euler step of x_t = (1/τ) (M x_ξ)_ξ.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step<'a> {
-    /// Nodes of this piece before.
+    /// Nodes of this piece before the step.
     pub old: &'a [f64],
     /// τ/Δt.
     pub ratio: f64,
 }
 
 impl Step<'_> {
-    /// By how much the flux grows over half a cell beside node i, which is at x; and by how much for each x.
+    /// The change of the flux over half a cell beside node i, which is at x, and its derivative by x.
     pub fn half(&self, h: f64, i: usize, x: f64) -> [f64; 2] {
         let slope = 0.5 * self.ratio * h;
         [slope * (x - self.old[i]), slope]
@@ -71,28 +71,34 @@ pub(super) struct Chain<'a> {
     pub face: FaceDensity,
     pub t: f64,
     pub h: f64,
-    /// Where the line begins and ends in x.
+    /// The ends of the line in x.
     pub ends: [f64; 2],
-    /// ∫M over the line, where it is known.
+    /// ∫M from the beginning of the line to any place, where it has been computed.
     pub cumulative: Option<&'a Cumulative>,
 }
 
-/// Steps of Newton's method on a piece between given nodes. With conditions on the flux, where many pieces have no discrete
-/// solution near their iterates, a quarter of them: of 2000 random lines as many converge with it.
+/// Largest number of Newton steps for a piece whose end nodes are given. With conditions on the flux a quarter of it is
+/// taken: then many pieces have no discrete solution near an iterate and never converge. Of 2000 random lines as many
+/// converged with the quarter as with all.
 const MAX_NEWTON: usize = 200;
+/// Largest number of steps in the search for a flux: Newton's, or doublings and halvings of a bracket. From a bracket
+/// on, some 60 halvings reach rounding.
 const MAX_BISECTIONS: usize = 400;
+/// Halvings of a Newton step along straight lines before it is given up: 2⁻⁴⁰ of a step changes next to nothing.
 const HALVINGS: i32 = 40;
+/// Halvings that are tried before nodes may pass through each other, which iterates with conditions on the flux do.
 const FEW_HALVINGS: i32 = 8;
 
-/// How a share of a Newton step is taken.
+/// Along which path a share of a Newton step is taken: by x, or by ∫M up to the node, in which the steady problem is
+/// linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Way {
     Straight,
     Curved,
 }
 
-/// The whole step; shorter and shorter ones along the path of even ∫M; then straight ones. With nodes in order or, where
-/// they are free, after few tries in any.
+/// The steps to try in turn: the whole Newton step, halved ones along ∫M, and halved ones along x, all with nodes in
+/// order. Where conditions on the flux allow it (`free`), the same follow with nodes in any order.
 fn ways(free: bool) -> impl Iterator<Item = (bool, Way, f64)> {
     let halved = |ordered: bool, way: Way, halvings: std::ops::Range<i32>| {
         halvings.map(move |n| (ordered, way, 0.5_f64.powi(n)))
@@ -131,7 +137,7 @@ impl Law<'_> {
 }
 
 impl Chain<'_> {
-    /// Where nodes come to that go on until ∫M on their way is that of a share of a change, with M at where they begin.
+    /// The nodes after a share of a Newton step along ∫M: each moves to where ∫M has changed by share × change × M(x).
     fn along(&self, cumulative: &Cumulative, x: &[f64], change: &[f64], share: f64) -> Vec<f64> {
         let moved = |(x, change): (&f64, &f64)| {
             let [g, m] = cumulative.at(*x);
@@ -148,15 +154,16 @@ impl Chain<'_> {
         }
     }
 
-    /// The nodes of a piece where M is averaged exactly: all cells then have the same ∫M, and the ends are where the laws there
-    /// let the flux F be what it is. With G = ∫M from the beginning of the line, and n cells,
+    /// The nodes of a piece where M is averaged exactly. All its cells have the same ∫M, so that one unknown is left,
+    /// the flux F. With G = ∫M from the beginning of the line, n cells and the conditions at its ends,
     ///
     /// ```text
     /// G_right(F) − G_left(F) = n h F,   G_end(F) = G(x) at a given node,   G(to) − length (F − g),   G((F − g)/slope)
     /// ```
     ///
-    /// by what the law is. The left side falls with F, so that there is one solution. None where ∫M is not known, or a law is
-    /// none of these.
+    /// where G_end(F) is, in this order, that of a given node, of the flux of the rest of the line, and of a Robin
+    /// condition. The left side falls with F, so that there is one solution. None where G is not known or a condition
+    /// is of another kind.
     fn even(&self, guess: &[f64], ends: [End<'_>; 2]) -> Option<Vec<f64>> {
         let (cumulative, n) = (self.cumulative?, guess.len() - 1);
         let length = n as f64 * self.h;
@@ -180,7 +187,7 @@ impl Chain<'_> {
         let flux = falling_root(first, cumulative.whole(), left_over)?;
         let [from, to] = [place(ends[0], flux)?[0], place(ends[1], flux)?[0]];
         let share = |i: usize| from + (to - from) * (i as f64 / n as f64);
-        // conditions on the flux may ask for a piece that runs backwards
+        // with conditions on the flux the right end may lie left of the left one
         let mut x = match from <= to {
             true => cumulative.inverted((0..=n).map(share)),
             false => cumulative.inverted((0..=n).rev().map(share)).into_iter().rev().collect(),
@@ -243,7 +250,7 @@ impl Chain<'_> {
         Ok([face.mean * width, face.by[0] * width - face.mean, face.by[1] * width + face.mean].map(|v| v / self.h))
     }
 
-    /// φ of a law, at a place.
+    /// φ of a condition, for the end node at x.
     pub fn law(&self, law: Law<'_>, x: f64) -> Result<f64, Failure> {
         Ok(law.at(self, x)?[0])
     }
@@ -259,7 +266,7 @@ impl Chain<'_> {
         let n = faces.len();
         let mut residual = vec![0.0; n + 1];
         let mut rows = vec![[0.0, 1.0, 0.0]; n + 1];
-        // flux of a cell and its derivatives by the nodes at its ends
+        // flux of a cell, and its derivatives by the nodes at its ends
         let flux = |i: usize| {
             let (face, width) = (faces[i], x[i + 1] - x[i]);
             [face.mean * width, face.by[0] * width - face.mean, face.by[1] * width + face.mean].map(|v| v / self.h)
@@ -278,7 +285,7 @@ impl Chain<'_> {
         for (end, i) in ends.into_iter().zip([0, n]) {
             if let End::Flux { g, law } = end {
                 let ([f, by_left, by_right], [phi, slope]) = (flux(i.min(n - 1)), law.at(self, x[i])?);
-                // the flux at the node itself, half a cell further
+                // from the middle of the outermost cell to the end node the flux changes by half a cell's share
                 let [more, by_node] = step.map_or([0.0; 2], |step| step.half(self.h, i, x[i]));
                 let sign = if i == 0 { -1.0 } else { 1.0 };
                 residual[i] = f + sign * more - g - phi;
@@ -289,8 +296,9 @@ impl Chain<'_> {
         Ok((residual, rows))
     }
 
-    /// The nodes of a piece, and the number of linear solves: by inversion of ∫M where M is averaged exactly; else by Newton's
-    /// method from a guess and, where that stalls, from the nodes that exact averages have.
+    /// The nodes of a piece, and the number of linear solves that they took. Where M is averaged exactly the nodes
+    /// follow from inverting ∫M, without any. Else Newton's method starts from a guess and, if that stalls, from the
+    /// nodes that exact averages have.
     ///
     /// # Errors
     /// [`Failure::LineDensity`], [`Failure::LineStalled`].
@@ -315,7 +323,7 @@ impl Chain<'_> {
         }
     }
 
-    /// What helps where Newton's method stalls, in a step of time or without one.
+    /// The remedies to offer where Newton's method stalls.
     fn unstalling(&self, in_time: bool) -> Remedy {
         let exact = Act::Set(Setting::FaceDensity, &["\"exact\""]);
         let finer = [Act::Lower(Setting::TimeStep), Act::Refine(Setting::Cells)];
@@ -341,7 +349,7 @@ impl Chain<'_> {
         let size = x.iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
         let (mut residual, mut rows) = self.linearised(&x, ends, step)?;
         let mut last = f64::INFINITY;
-        // an iterate of conditions on the flux may run backwards, and pass through no order on its way
+        // with conditions on the flux an iterate may run backwards, and pass through nodes in no order on the way there
         let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
         let stalled = |residual: f64, iterations: usize| Failure::LineStalled {
             residual,
@@ -353,7 +361,7 @@ impl Chain<'_> {
             let change = tridiagonal(&rows, &residual);
             let largest = change.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
             let before = norm(&residual);
-            // residuals of nodes that are right to the last bit
+            // residuals below this are of rounding: moving each node by its last bit changes as much
             let rounding = 4.0 * f64::EPSILON * size * rows.iter().fold(0.0, |m: f64, row| m.max(row[1].abs()));
             let mut found = None;
             for (ordered, way, share) in ways(free) {
@@ -364,7 +372,7 @@ impl Chain<'_> {
                         None => continue,
                     },
                 };
-                // given ends stay to the last bit
+                // nodes that are given keep their exact value
                 for (end, node) in ends.into_iter().zip([0, x.len() - 1]) {
                     if let End::Value(given) = end {
                         tried[node] = given;
@@ -372,7 +380,7 @@ impl Chain<'_> {
                 }
                 if !ordered || tried.windows(2).all(|x| x[1] > x[0]) || free && tried.windows(2).all(|x| x[1] < x[0]) {
                     let (r, m) = match self.linearised(&tried, ends, step) {
-                        // no rest of the line lies beyond its own end
+                        // a step beyond the end of the line, where the rest of it is empty
                         Err(Failure::LineStalled { .. }) => continue,
                         other => other?,
                     };
@@ -386,7 +394,7 @@ impl Chain<'_> {
                 return Err(stalled(before, solves));
             };
             (x, residual, rows) = (tried, r, m);
-            // quadratic until rounding: then steps no longer shrink
+            // Newton's method converges quadratically until rounding, and from there on steps no longer shrink
             if share == 1.0
                 && largest <= 1e-9 * size
                 && (largest >= 0.25 * last || largest <= 4.0 * f64::EPSILON * size)
@@ -420,8 +428,8 @@ impl Chain<'_> {
     }
 }
 
-/// Where a function that falls is zero, given with its derivative: Newton's method between two bounds. None where it has no
-/// value, or no bounds are found.
+/// The root of a decreasing function, given with its derivative, by Newton's method within a bracket that is found
+/// first. None where the function has no value or no bracket exists.
 fn falling_root(first: f64, size: f64, f: impl Fn(f64) -> Option<[f64; 2]>) -> Option<f64> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut at = first;
@@ -454,7 +462,7 @@ fn falling_root(first: f64, size: f64, f: impl Fn(f64) -> Option<[f64; 2]>) -> O
     (low.is_finite() && high.is_finite()).then_some(at)
 }
 
-/// A guess with new end values: the whole piece stretched, so that nodes keep their order.
+/// The guess with the end nodes that are given: the whole piece is stretched linearly, which keeps the order of nodes.
 fn stretched(guess: &[f64], ends: [End<'_>; 2]) -> Vec<f64> {
     let (first, last) = (guess[0], guess[guess.len() - 1]);
     let [left, right] = [(ends[0], first), (ends[1], last)].map(|(end, own)| match end {

@@ -1,4 +1,5 @@
-//! A correction between sweeps that reaches all pieces at once: their number no longer matters.
+//! A coarse correction between sweeps. It reaches all subdomains at once, so that the number of iterations does not
+//! grow with theirs.
 
 use super::chain::{End, Step};
 use super::cumulative::Cumulative;
@@ -6,21 +7,23 @@ use super::schwarz::{Coarse, Iteration, owner};
 use crate::error::Failure;
 use crate::numerics::linear::tridiagonal;
 
-/// A correction shorter than this share of the whole one is left out.
+/// The coarse step is halved while it disorders nodes; below this share of it the correction is left out.
 const SHORTEST: f64 = 1e-3;
 
-/// The glued mesh after one step of Newton's method in the space of hats over M
+/// The glued mesh after one Newton step in the space spanned by the hat functions over M
 ///
 /// ```text
 /// (Hᵀ J V) c = −Hᵀ r,   V = hat_j(ξ)/M(x),   H = hat_j(ξ),   r_i = F_{i+½} − F_{i−½}
 /// ```
 ///
-/// with a coarse node on each side of every cut, where the glued mesh jumps. J is tridiagonal and a node lies under two
-/// hats, so that the coarse system is tridiagonal too. The step is halved until nodes keep their order.
+/// with a coarse node on either side of every cut, where the glued mesh has a kink. J is tridiagonal and every node
+/// lies under at most two hats, so that the coarse system is tridiagonal too. The step is halved until nodes keep their
+/// order.
 ///
-/// Σ c_j hat_j is the change of ∫M up to a node. [`Coarse::Galerkin`] divides it by M at the old node, which is right for small
-/// changes only: where M varies over the way of a node, nodes pass each other, and halved steps are taken over and over.
-/// [`Coarse::Integral`] moves each node to where ∫M has changed by so much, which is right for changes of any size.
+/// Σ c_j hat_j is the change of ∫M up to a node. [`Coarse::Galerkin`] divides it by M at the old node, which is its
+/// linearisation: where M varies much between the old node and the new one, nodes pass each other and the step is
+/// halved over and over. [`Coarse::Integral`] moves each node to where ∫M has changed by that amount, which holds for
+/// changes of any size.
 pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coarse) -> Result<Vec<f64>, Failure> {
     let (chain, n) = (&iteration.chain, iteration.cells);
     let mut nodes = vec![0];
@@ -37,7 +40,7 @@ pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coars
     let step = iteration.old.map(|(old, ratio)| Step { old, ratio });
     let (residual, rows) = chain.linearised(&mesh, [End::Value(mesh[0]), End::Value(mesh[n])], step)?;
     let m = chain.density.at_each(chain.t, &mesh)?;
-    // the interval of coarse nodes that each node lies in, and how far along
+    // for each node the interval between coarse nodes that it lies in, and its place there from 0 to 1
     let mut places = Vec::with_capacity(n + 1);
     let mut k = 0;
     for i in 0..=n {
@@ -46,7 +49,7 @@ pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coars
         }
         places.push((k, (i - nodes[k]) as f64 / (nodes[k + 1] - nodes[k]) as f64));
     }
-    // hats of a node by number, the ones at both ends of the line left out
+    // the hats that a node lies under, with their values; those at both ends of the line are no unknowns
     let hats = |i: usize| {
         let (k, along) = places[i];
         [(k, 1.0 - along), (k + 1, along)].into_iter().filter(move |&(j, hat)| hat > 0.0 && j > 0 && j <= inner)
@@ -64,7 +67,7 @@ pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coars
         }
     }
     let c = tridiagonal(&system, &right);
-    // of ∫M up to each node
+    // the change of ∫M up to each node
     let change: Vec<f64> = (0..=n).map(|i| hats(i).map(|(j, hat)| hat * c[j - 1]).sum()).collect();
     let integral = chain.cumulative.filter(|_| coarse == Coarse::Integral);
     let mut share = 1.0;
@@ -81,7 +84,7 @@ pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coars
     Ok(mesh)
 }
 
-/// The nodes where ∫M has changed by a share of so much; none where that is no order of nodes on the line.
+/// The nodes at which ∫M up to the old nodes has changed by a share of `change`; none where these are out of order.
 fn along(integral: &Cumulative, mesh: &[f64], change: &[f64], share: f64) -> Option<Vec<f64>> {
     let n = mesh.len() - 1;
     let wanted: Vec<f64> = mesh.iter().zip(change).map(|(x, change)| integral.up_to(*x) + share * change).collect();

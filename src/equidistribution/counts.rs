@@ -1,4 +1,5 @@
-//! What Newton's method takes on the first of several pieces, as table 8.1 of Gander and Haynes (2012) counts it.
+//! Linear solves of Newton's method on the first of several pieces, counted as in table 8.1 of Gander and Haynes
+//! (2012).
 
 use super::chain::{Chain, End};
 use super::schwarz::Iteration;
@@ -6,19 +7,20 @@ use super::{Line, Method, pieces};
 use crate::error::{Act, Failure, Remedy, Result};
 use crate::numerics::linear::tridiagonal;
 
-/// A step that is at most this ends Newton's method.
+/// Newton's method has converged once no node moves by more than this, in the unit of x.
 const STEP: f64 = 1e-12;
+/// Steps after which Newton's method without damping is given up.
 const MOST: usize = 100;
 
 impl Line {
-    /// Linear solves of the first piece alone, added up over the iterations from a start.
+    /// Linear solves of the first piece alone, summed from the start up to each iteration.
     ///
-    /// Newton's method begins each time at its own last iterate, of which only the node at the end is replaced by the
-    /// neighbour's, takes whole steps, and ends with one of 1e-12 or less. The iterates between the pieces are those of
-    /// [`iterate`](Self::iterate); only what they cost is counted in another way.
+    /// In each iteration Newton's method begins at the last iterate of the piece, of which only the end node is
+    /// replaced by the neighbour's value. It takes whole steps and ends with one of 1e-12 or less. The iterates
+    /// themselves are those of [`iterate`](Self::iterate); only their cost is counted in another way.
     ///
     /// # Errors
-    /// As [`iterate`](Self::iterate); [`Failure::LineStalled`] where whole steps do not end.
+    /// As [`iterate`](Self::iterate); [`Failure::LineStalled`] where whole Newton steps do not converge.
     pub fn solves_of_first(
         &self,
         t: f64,
@@ -44,7 +46,7 @@ impl Line {
     }
 }
 
-/// Newton's method by whole steps: the linear solves.
+/// Newton's method without damping, on `x`; returns the number of linear solves.
 fn whole_steps(chain: &Chain<'_>, x: &mut [f64], ends: [End; 2]) -> Result<usize, Failure> {
     let last = x.len() - 1;
     if let End::Value(value) = ends[1] {

@@ -4,15 +4,15 @@ use std::f64::consts::PI;
 
 /// G(x) = ∫M from the beginning of a line to x, and its inverse
 ///
-/// M is interpolated by polynomials in Chebyshev points on pieces that are halved until their last coefficients are below
-/// 1e-12 of the mean of M on the piece, or do not count beside ∫M over the line, or are of rounding: what M changes by where x
-/// is rounded, or what halving does not lower on either half. Integrated, they give G in every place; as
-/// M > 0, G grows, and Newton's method held between two bounds inverts it. M is asked for inside the line only, many places at
-/// once.
+/// M is interpolated by polynomials of degree 16 in the Chebyshev points of pieces. A piece is halved until the last
+/// coefficients of its polynomial are below 1e-12 of the mean of M on it, do not matter to ∫M over the line, or are of
+/// rounding. They are of rounding where M changes by as much when x is rounded, or where halving no longer lowers them
+/// on either half. Integrated, the polynomials give G everywhere. As M > 0, G grows, and Newton's method held within a
+/// bracket inverts it. M is evaluated inside the line only, at many places in one call.
 ///
-/// Where M is the arc length of u, no piece may be shorter than its chord: layers thinner than the distance of the places
-/// are found so. Elsewhere the user names the places of spikes. Where M jumps, pieces are halved down to neighbouring
-/// numbers.
+/// Where M is the arc length of u, a piece is halved as long as its chord is longer than its arc: so layers are found
+/// that are thinner than the distance of the points. For other M the user names the places of spikes. Where M jumps,
+/// pieces are halved down to neighbouring floating-point numbers.
 ///
 /// # Source
 /// Trefethen, *Approximation Theory and Approximation Practice* (2013), chapters 3, 4 and 19.
@@ -22,45 +22,51 @@ pub(super) struct Cumulative {
     whole: f64,
 }
 
-/// A piece of the line: G(lower + half (1 + s)) = below + half Σ c_k T_k(s), −1 ≤ s ≤ 1.
+/// A piece of the line, with `half` its half length: G(lower + half (1 + s)) = below + half Σ c_k T_k(s), −1 ≤ s ≤ 1.
 #[derive(Debug, Clone)]
 struct Piece {
     lower: f64,
     upper: f64,
-    /// G at its beginning.
+    /// G at the beginning of the piece.
     below: f64,
-    /// Over it.
+    /// ∫M over the piece.
     integral: f64,
-    /// Of ∫M ds, zero at s = −1.
+    /// Chebyshev coefficients c_k of ∫M ds, which is 0 at s = −1.
     coefficients: Vec<f64>,
 }
 
-/// The last coefficients of a polynomial.
+/// The last coefficients of the polynomial of a piece.
 struct Tail {
+    /// Sum of their absolute values.
     size: f64,
-    /// How large they are where places are rounded.
+    /// The size that rounding of the places alone gives them.
     rounding: f64,
 }
 
-/// Distance of the places in the middle of a piece, as a share of it.
+/// Distance of the Chebyshev points in the middle of a piece, about sin(π/16)/2, as a share of its width: changes of M
+/// from point to point over it estimate the largest slope of M.
 const PLACES_APART: f64 = 0.1;
-/// Degree of the polynomials.
+/// Degree of the polynomials: smooth M is resolved to round-off on few pieces.
 const DEGREE: usize = 16;
 const POINTS: usize = DEGREE + 1;
-/// Pieces to begin with, and pieces beyond which M is taken as it is.
+/// Pieces at the start: with 17 points each, some 2000 places, between which a spike can be overlooked.
 const FIRST: usize = 128;
+/// Pieces beyond which none is halved any more: M is then taken as its polynomials have it.
 const MOST: usize = 1 << 16;
-/// The last coefficients over the mean of M on the piece, and their share in ∫M over the line, that are good enough.
+/// A piece is resolved where its last coefficients are below this share of the mean of M on it.
 const RESOLVED: f64 = 1e-12;
+/// A piece also counts as resolved where its last coefficients change ∫M over the line by less than this share, which
+/// is below rounding.
 const ROUNDING: f64 = 1e-16;
-/// The same share where they may be noise.
+/// Last coefficients that halving does not lower are taken for rounding only below this share of the mean of M.
 const NOISY: f64 = 1e-6;
-/// Share by which a chord may be longer than the arc: rounding of u.
+/// Share by which the chord of a piece may exceed its arc: rounding of u.
 const CHORD: f64 = 1e-9;
+/// Steps of Newton's method or of bisection for one place. Bisection alone takes 53.
 const MOST_NEWTON: usize = 100;
 
 impl Cumulative {
-    /// Of a density over a line.
+    /// ∫M of a density over a line.
     ///
     /// # Errors
     /// [`Failure::LineDensity`] at the first place found where M is not finite and positive, or where u jumps.
@@ -76,13 +82,13 @@ impl Cumulative {
         let mut unsure: Vec<[f64; 2]> = ends.windows(2).map(|ends| [ends[0], ends[1]]).collect();
         let transform = transform();
         let mut pieces: Vec<Piece> = Vec::new();
-        // of the piece that each is a half of
+        // for each piece the last coefficients of the one that it is a half of
         let mut tails_before = vec![f64::INFINITY; unsure.len()];
         while !unsure.is_empty() {
             let last = pieces.len() + unsure.len() > MOST;
             let places: Vec<f64> = unsure.iter().flat_map(points).collect();
             let values = density.values(t, &places).or_else(|failure| {
-                // the first place along the line is the one to name
+                // the failure names the first such place along the line
                 let mut sorted = places.clone();
                 sorted.sort_by(f64::total_cmp);
                 density.values(t, &sorted).and(Err(failure))
@@ -122,10 +128,10 @@ impl Cumulative {
         Ok(Self::of(pieces))
     }
 
-    /// Where M is linear between known places.
+    /// ∫M of a density that is linear between known places.
     fn linear(density: &LineDensity, t: f64, ends: Vec<f64>) -> Result<Self, Failure> {
         let pieces = ends.windows(2).map(|ends| {
-            // at an end where M jumps, the values beside it on this side
+            // at a jump of M the limits from inside the piece
             let [left, right] = density.between(t, [ends[0], ends[1]])?;
             let (mean, slope) = (0.5 * (left + right), 0.5 * (right - left));
             let integral = mean * (ends[1] - ends[0]);
@@ -137,7 +143,7 @@ impl Cumulative {
 
     fn of(mut pieces: Vec<Piece>) -> Self {
         pieces.sort_by(|a, b| a.lower.total_cmp(&b.lower));
-        // compensated: of many pieces each counts
+        // compensated summation, since there may be tens of thousands of pieces
         let (mut sum, mut lost) = (0.0_f64, 0.0);
         for piece in &mut pieces {
             piece.below = sum + lost;
@@ -156,7 +162,7 @@ impl Cumulative {
         let piece = &self.pieces[k];
         let half = 0.5 * (piece.upper - piece.lower);
         let [g, m] = clenshaw(&piece.coefficients, ((inside - piece.lower) / half - 1.0).clamp(-1.0, 1.0));
-        // to the last bit
+        // exactly the whole at the end of the line
         let g = if inside == b { self.whole } else { piece.below + half * g };
         [g + (x - inside) * m, m]
     }
@@ -166,7 +172,7 @@ impl Cumulative {
         self.at(x)[0]
     }
 
-    /// Where G is so large.
+    /// The place where G has a value.
     pub fn place(&self, g: f64) -> f64 {
         let [a, b] = self.ends();
         if g < 0.0 {
@@ -179,7 +185,7 @@ impl Cumulative {
         piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + piece.inverted(g, -1.0, None)[0])
     }
 
-    /// Where G is as large as each of some values that grow.
+    /// The places where G has some values, which must grow.
     pub fn inverted(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut k = 0;
         let (mut s, mut near) = (-1.0, None);
@@ -195,7 +201,7 @@ impl Cumulative {
                 (k, s, near) = (k + 1, -1.0, None);
             }
             let piece = &self.pieces[k];
-            // from where the last value was, as far as M there leads
+            // the guess is a Newton step from the last place found
             let guess = near.map(|(before, slope)| s + (g - before) / slope);
             let [found, slope] = piece.inverted(g, s, guess);
             (s, near) = (found, Some((g, slope)));
@@ -204,7 +210,7 @@ impl Cumulative {
         values.map(place).collect()
     }
 
-    /// `count` + 1 nodes from a to b, places on the line with the same ∫M between neighbours.
+    /// `count` + 1 nodes from a to b, within the line, with the same ∫M in each cell.
     pub fn divided(&self, [a, b]: [f64; 2], count: usize) -> Vec<f64> {
         let [from, to] = [a, b].map(|x| self.up_to(x));
         let share = |i: usize| from + (to - from) * (i as f64 / count as f64);
@@ -212,7 +218,7 @@ impl Cumulative {
         [a].into_iter().chain(inner.into_iter().map(|x| x.clamp(a, b))).chain([b]).collect()
     }
 
-    /// Over the line.
+    /// ∫M over the line.
     pub fn whole(&self) -> f64 {
         self.whole
     }
@@ -223,12 +229,14 @@ impl Cumulative {
     }
 }
 
-/// Over neighbouring numbers u jumps where its chord is so many times the arc, and so large a share of the whole one.
+/// u jumps between two neighbouring floating-point numbers where its chord is longer than this multiple of the arc.
 const JUMP: f64 = 2.0;
+/// A chord shorter than this share of the arc length of the whole line is no jump: it may be rounding of u.
 const NOTICEABLE: f64 = 1e-12;
 
 impl Piece {
-    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and its last coefficients.
+    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and its last
+    /// coefficients.
     fn through([lower, upper]: [f64; 2], values: &[f64], transform: &[[f64; POINTS]; POINTS]) -> (Self, Tail) {
         let c: [f64; POINTS] =
             std::array::from_fn(|k| transform[k].iter().zip(values).map(|(weight, value)| weight * value).sum());
@@ -251,7 +259,7 @@ impl Piece {
         (Self { lower, upper, below: 0.0, integral, coefficients }, Tail { size, rounding })
     }
 
-    /// s where G is `g`, at or beyond `from`, and dG/ds there; the search begins at a guess.
+    /// s where G is `g`, in from ≤ s ≤ 1, and dG/ds there. The search begins at a guess.
     fn inverted(&self, g: f64, from: f64, guess: Option<f64>) -> [f64; 2] {
         let half = 0.5 * (self.upper - self.lower);
         let wanted = (g - self.below) / half;
@@ -265,7 +273,7 @@ impl Piece {
             let off = value - wanted;
             *(if off > 0.0 { &mut high } else { &mut low }) = s;
             let newton = s - off / slope;
-            // where the step is lost in rounding, so is what is off
+            // once the Newton step is within rounding of s, so is the error
             if (newton - s).abs() <= f64::EPSILON || high - low <= f64::EPSILON {
                 return [newton.clamp(low, high), half * slope];
             }
@@ -275,7 +283,7 @@ impl Piece {
     }
 }
 
-/// Σ c_k T_k and its derivative.
+/// Σ c_k T_k(s) and its derivative, by Clenshaw's recurrence.
 fn clenshaw(c: &[f64], s: f64) -> [f64; 2] {
     let (mut b, mut b_next) = (0.0, 0.0);
     let (mut d, mut d_next) = (0.0, 0.0);
@@ -286,20 +294,21 @@ fn clenshaw(c: &[f64], s: f64) -> [f64; 2] {
     [c[0] + s * b - b_next, b + s * d - d_next]
 }
 
-/// The Chebyshev points between two places, both ends among them.
+/// The Chebyshev points between two places, which include both ends.
 fn points([lower, upper]: &[f64; 2]) -> impl Iterator<Item = f64> + use<> {
     let [lower, upper] = [*lower, *upper];
     let half = 0.5 * (upper - lower);
     (0..POINTS).map(move |j| match j {
         0 => upper,
         DEGREE => lower,
-        // from the nearer end, so that no place leaves the piece
+        // measured from the nearer end, so that rounding puts no point outside the piece
         j if 2 * j < DEGREE => upper - half * 2.0 * (0.5 * PI * j as f64 / DEGREE as f64).sin().powi(2),
         j => lower + half * 2.0 * (0.5 * PI * j as f64 / DEGREE as f64).cos().powi(2),
     })
 }
 
-/// From values in the Chebyshev points, s_j = cos(jπ/n), to coefficients: c_k = (2/n) Σ″ f_j cos(jkπ/n), halved for k = 0 and n.
+/// From values in the Chebyshev points, s_j = cos(jπ/n), to coefficients: c_k = (2/n) Σ″ f_j cos(jkπ/n), halved for k =
+/// 0 and n.
 fn transform() -> [[f64; POINTS]; POINTS] {
     let half = |k: usize| if k == 0 || k == DEGREE { 0.5 } else { 1.0 };
     std::array::from_fn(|k| {
@@ -355,7 +364,8 @@ mod tests {
         }
     }
 
-    /// A layer of an arc length, however thin and wherever it is, is not missed; where M is a formula, its place is named.
+    /// A layer of an arc length, however thin and wherever it is, is not missed; where M is a formula, its place is
+    /// named.
     #[test]
     fn thin_layers_are_found() {
         for width in [1e-2, 1e-5, 1e-9, 1e-12_f64] {

@@ -6,16 +6,17 @@ use std::sync::Arc;
 
 /// M(x, t) > 0 on a line, with its exact derivative by x
 ///
-/// A formula itself, or the arc length √(1 + u_x²) of one. Only its ratios count. Iterates of Robin conditions may go beyond
-/// the ends of the line: see [`within`](Self::within).
+/// M is given by a formula or by the arc length √(1 + u_x²) of one, by a function, or by samples. Only ratios of M
+/// count. Iterates with Robin conditions may leave the line, where a formula need not have values: see
+/// [`within`](Self::within).
 #[derive(Debug, Clone)]
 pub struct LineDensity {
     kind: Kind,
-    /// u of an arc length.
+    /// u, where M is its arc length.
     followed: Option<Program<1, 1>>,
-    /// Where it may have spikes.
+    /// Places of spikes that the user named.
     spikes: Vec<f64>,
-    /// The line beyond whose ends it is constant.
+    /// Ends of the line beyond which M is constant.
     line: Option<[f64; 2]>,
 }
 
@@ -25,23 +26,24 @@ enum Kind {
     Formula(Program<1, 2>),
     /// u_x and u_xx.
     Arclength(Program<1, 2>),
-    /// [M, M_x] of a time and places.
+    /// [M, M_x] as a function of time and places.
     Function(Arc<Function>),
-    /// Linear between places.
+    /// Linear between given places.
     Samples(Samples),
-    /// M of a time and places on the line.
+    /// M as a function of time and places on the line with these ends.
     Values(Values, [f64; 2]),
 }
 
-/// M by its values, defined on a line only.
+/// M by its values alone, defined on a line only.
 #[derive(Clone)]
 struct Values(Arc<ValuesFunction>);
 
-/// Distance over which values are differenced, as a share of the line: Newton's method needs no better.
+/// Step of the difference quotient that stands for M_x, as a share of the length of the line. Newton's method only
+/// converges a little slower with it.
 const APART: f64 = 1e-6;
 
 impl Values {
-    /// M with its difference over a short distance, all on the line.
+    /// [M, M_x] at places, M_x by a difference quotient whose places stay on the line.
     fn pairs(&self, t: f64, x: &[f64], [a, b]: [f64; 2]) -> Result<Vec<[f64; 2]>, Failure> {
         let n = x.len();
         let apart = APART * (b - a);
@@ -62,12 +64,12 @@ impl Values {
 struct Samples {
     x: Vec<f64>,
     m: Vec<f64>,
-    /// ∫M from the first place.
+    /// ∫M from the first place to each.
     integral: Vec<f64>,
 }
 
 impl Samples {
-    /// The piece that x lies in, and how far from its beginning.
+    /// The interval that x lies in, and the distance of x from its beginning.
     fn place(&self, x: f64) -> (usize, f64) {
         let k = self.x.partition_point(|at| *at <= x).clamp(1, self.x.len() - 1) - 1;
         (k, x - self.x[k])
@@ -108,8 +110,8 @@ impl fmt::Debug for Kind {
     }
 }
 
-/// Nodes and weights of the Gauss–Kronrod rule of 15 points on [−1, 1], of the half with x ≥ 0, and of the 7-point Gauss
-/// rule inside it.
+/// Nodes and weights of the Gauss–Kronrod rule of 15 points on [−1, 1], of the half with x ≥ 0, and of the 7-point
+/// Gauss rule inside it.
 ///
 /// # Source
 /// Piessens et al., *QUADPACK* (1983).
@@ -123,22 +125,27 @@ const KRONROD: [[f64; 3]; 8] = [
     [0.207_784_955_007_898_47, 0.204_432_940_075_298_89, 0.0],
     [0.0, 0.209_482_141_084_727_82, 0.417_959_183_673_469_4],
 ];
-/// Share of the change of M over a piece that may lie between an end and the place beside it.
+/// A jump near an end of a piece is not seen by the quadrature, whose outermost places lie .4 % of the piece inside. It
+/// is suspected where M changes by more than this share of its range between the end and the place beside it.
 const ENDS: f64 = 0.05;
-/// Halvings beyond which what is left is taken as rounding, and pieces beyond which it is not followed.
+/// Halvings after which the rest of an integral is taken as it is: a piece of 2⁻⁴⁸ of the line is near rounding.
 const DEEPEST: usize = 48;
+/// Pieces beyond which none is halved any more: M then oscillates faster than can be followed.
 const MOST_PIECES: usize = 4096;
-/// Places at which extremes are looked for first, and then around the best of them, so many times.
+/// Places of the first search for an extremum of M, evenly over the line.
 const PLACES: usize = 2000;
+/// Places of each later search, between the neighbours of the best place so far: each narrows the interval ten times.
 const PLACES_AROUND: usize = 20;
+/// Searches. Nine leave an interval of 1e-11 of the line.
 const LOOKS: usize = 9;
-/// What is left of a change between places, however near, where u jumps.
+/// Closing in on the largest change of u, the change is a jump where at least this share of it remains between
+/// neighbouring floating-point numbers. That of a continuous u tends to 0.
 const STILL_A_JUMP: f64 = 0.5;
-/// A smallest M below this share of the largest is rounding.
+/// A smallest M below this share of the largest one counts as 0: it is rounding.
 const VANISHING: f64 = 1e-14;
 
 impl LineDensity {
-    /// M by a formula of x and t.
+    /// M as a formula of x and t.
     ///
     /// # Errors
     /// [`Error::Formula`].
@@ -148,7 +155,7 @@ impl LineDensity {
         Ok(Self { kind: Kind::Formula(Program::new([&m, &slope])), followed: None, spikes: Vec::new(), line: None })
     }
 
-    /// √(1 + u_x²) for u by a formula of x and t.
+    /// M = √(1 + u_x²), with u as a formula of x and t.
     ///
     /// # Errors
     /// [`Error::Formula`].
@@ -164,7 +171,7 @@ impl LineDensity {
         })
     }
 
-    /// [M, M_x] by a function of t and some places, which gives one pair a place.
+    /// [M, M_x] as a function of t and places, which returns one pair for each place.
     ///
     /// # Example
     /// ```
@@ -181,7 +188,8 @@ impl LineDensity {
         Self { kind: Kind::Function(Arc::new(f)), followed: None, spikes: Vec::new(), line: None }
     }
 
-    /// M by a function of t and some places on a line, which gives one value a place; beyond the ends M is constant.
+    /// M as a function of t and places, which returns one value for each place. It is called for places on the line
+    /// only; beyond its ends M is constant.
     ///
     /// # Example
     /// ```
@@ -197,17 +205,19 @@ impl LineDensity {
         Self { kind, followed: None, spikes: Vec::new(), line: Some(ends) }
     }
 
-    /// M at some places, linear between them and constant beyond; best with [`FaceDensity::Exact`](super::FaceDensity).
+    /// M as samples, linear between them and constant beyond. [`FaceDensity::Exact`](super::FaceDensity) suits them
+    /// best.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless there are two places or more that grow from left to right, with a finite M above 0 each. Where
-    /// M jumps, a place comes twice.
+    /// [`Error::Invalid`] unless there are at least two places in ascending order, each with a finite M > 0. A place
+    /// that comes twice is a jump of M.
     ///
     /// # Example
     /// ```
     /// use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
     /// // ∫M = x + x²/2: half of it lies left of √2.5 − 1
-    /// let line = Line { face: FaceDensity::Exact, ..Line::new(LineDensity::sampled(vec![0.0, 1.0], vec![1.0, 2.0])?, 20) };
+    /// let density = LineDensity::sampled(vec![0.0, 1.0], vec![1.0, 2.0])?;
+    /// let line = Line { face: FaceDensity::Exact, ..Line::new(density, 20) };
     /// let x = line.solve(0.0, &line.uniform(), None)?.0;
     /// assert!((x[10] - (2.5_f64.sqrt() - 1.0)).abs() < 1e-12);
     /// # Ok::<(), driftmesh::Error>(())
@@ -240,7 +250,7 @@ impl LineDensity {
         Ok(Self { kind: Kind::Samples(Samples { x, m, integral }), followed: None, spikes: Vec::new(), line: None })
     }
 
-    /// u at each place, where M is an arc length.
+    /// u at each place, where M is its arc length.
     pub fn followed(&self, t: f64, x: &[f64]) -> Option<Vec<f64>> {
         let mut out = vec![[0.0]; x.len()];
         let points: Vec<[f64; 1]> = x.iter().map(|x| [*x]).collect();
@@ -248,7 +258,7 @@ impl LineDensity {
         Some(out.into_iter().map(|[u]| u).collect())
     }
 
-    /// M and M_x at each place, 0 where M_x is not finite.
+    /// M and M_x at each place; M_x counts as 0 where it is not finite.
     ///
     /// # Errors
     /// [`Failure::LineDensity`] at the first place where M is not finite and positive.
@@ -258,7 +268,7 @@ impl LineDensity {
             if !is_sound(*m) {
                 return Err(Failure::LineDensity { what: "M", value: *m, x: *x, t });
             }
-            // where M has a kink or a vertical tangent
+            // M has a kink or a vertical tangent here
             if !slope.is_finite() {
                 *slope = 0.0;
             }
@@ -266,7 +276,8 @@ impl LineDensity {
         Ok(out)
     }
 
-    /// The same with places where M may have spikes that are too thin to be found among a few thousand equal parts of the line.
+    /// The same density with places of spikes that are thinner than a few thousandths of the line and could be
+    /// overlooked.
     ///
     /// # Example
     /// ```
@@ -282,7 +293,7 @@ impl LineDensity {
         Self { spikes, ..self }
     }
 
-    /// The same, asked for on a line only: beyond its ends M is what it is there.
+    /// The same density, evaluated on a line only: beyond its ends M is constant.
     #[must_use]
     pub fn within(self, ends: [f64; 2]) -> Self {
         Self { line: Some(ends), ..self }
@@ -292,7 +303,7 @@ impl LineDensity {
         &self.spikes
     }
 
-    /// M and M_x at each place, whatever they are.
+    /// M and M_x at each place, without any check.
     fn pairs(&self, t: f64, x: &[f64]) -> Result<Vec<[f64; 2]>, Failure> {
         let inside = self.inside(x);
         let mut out = vec![[0.0; 2]; x.len()];
@@ -326,7 +337,7 @@ impl LineDensity {
         Ok(out)
     }
 
-    /// Each place, or the end of the line that it lies beyond.
+    /// The places, with those beyond an end of the line moved to that end.
     fn inside<'a>(&self, x: &'a [f64]) -> Cow<'a, [f64]> {
         match self.line {
             Some([a, b]) if x.iter().any(|x| !(a..=b).contains(x)) => x.iter().map(|x| x.clamp(a, b)).collect(),
@@ -355,7 +366,7 @@ impl LineDensity {
         }
     }
 
-    /// Places between which M is linear, both ends of the line among them, where such are known.
+    /// Places between which M is known to be linear, with both ends of the line; none for other densities.
     pub(super) fn breaks(&self, a: f64, b: f64) -> Option<Vec<f64>> {
         let Kind::Samples(samples) = &self.kind else { return None };
         let mut breaks = vec![a];
@@ -365,7 +376,7 @@ impl LineDensity {
         Some(breaks)
     }
 
-    /// M at the ends of a piece on which it is linear, from inside.
+    /// M at the ends of a piece on which it is linear, as limits from inside the piece.
     pub(super) fn between(&self, t: f64, [a, b]: [f64; 2]) -> Result<[f64; 2], Failure> {
         match &self.kind {
             Kind::Samples(samples) => {
@@ -385,10 +396,10 @@ impl LineDensity {
         self.at_each(t, &[x]).map(|m| m[0])
     }
 
-    /// The smallest and the largest M from a to b, found by looking ever closer.
+    /// The smallest and the largest M from a to b, by searches in ever smaller intervals.
     ///
     /// # Errors
-    /// As [`at_each`](Self::at_each), also where M only comes near to 0 between the places looked at, or u jumps.
+    /// As [`at_each`](Self::at_each); also where the smallest M counts as 0, or u jumps.
     pub fn extremes(&self, t: f64, [a, b]: [f64; 2]) -> Result<[f64; 2], Failure> {
         let last = |looks: &[[f64; 2]]| looks[looks.len() - 1];
         let high = last(&self.looked(t, [a, b], |[m, _]| m)?)[1];
@@ -403,7 +414,8 @@ impl LineDensity {
         Ok([low, high])
     }
 
-    /// Where u jumps: between two places, however near.
+    /// The place where u jumps, if it does: the interval with the largest change is divided until its ends are
+    /// neighbouring floating-point numbers.
     fn jump(&self, t: f64, [mut a, mut b]: [f64; 2]) -> Option<f64> {
         let mut first = None;
         loop {
@@ -423,7 +435,7 @@ impl LineDensity {
         }
     }
 
-    /// Where something is largest, and how large, look by look.
+    /// The place of the largest value of a function of M, and that value, after each search.
     fn looked(&self, t: f64, ends: [f64; 2], of: impl Fn([f64; 2]) -> f64) -> Result<Vec<[f64; 2]>, Failure> {
         let ([mut a, mut b], mut looks) = (ends, Vec::with_capacity(LOOKS));
         for look in 0..LOOKS {
@@ -437,8 +449,9 @@ impl LineDensity {
         Ok(looks)
     }
 
-    /// ∫ M from a to b, to round-off: the rule of Gauss and Kronrod, halved where its error estimate asks for it. Where M
-    /// jumps, that is down to the last bit; what swings more often than can be followed is taken as it is.
+    /// ∫ M from a to b to round-off, by the rule of Gauss and Kronrod on pieces that are halved where its error
+    /// estimate is too large. Around a jump of M they are halved down to rounding. Where M oscillates too fast to be
+    /// followed, the integral is what the rule gives.
     ///
     /// # Errors
     /// As [`at_each`](Self::at_each).
@@ -462,7 +475,7 @@ impl LineDensity {
                 let (mut fine, mut coarse) = (0.0, 0.0);
                 let (values, ends) = values.split_at(2 * KRONROD.len());
                 let [low, high] = values.iter().fold([f64::INFINITY, 0.0_f64], |[l, h], m| [l.min(m[0]), h.max(m[0])]);
-                // a jump beyond the outermost places, a hundredth of the way, is none to the rule
+                // the rule does not see a jump between an end of the piece and its outermost place
                 let change = ENDS * (high - low) + 1e-10 * high;
                 let jumps = ends.iter().zip(values).any(|(end, next)| (end[0] - next[0]).abs() > change);
                 for ([x, kronrod, gauss], pair) in KRONROD.iter().zip(values.chunks_exact(2)) {
@@ -471,7 +484,7 @@ impl LineDensity {
                     coarse += gauss * sum;
                 }
                 let (middle, half) = around(piece);
-                // the difference bounds the error of the coarse rule, which is far larger
+                // the difference estimates the error of the rule of 7 points; that of 15 points is far more accurate
                 if last || !jumps && (fine - coarse).abs() <= 1e-10 * fine.abs() {
                     sum += half * fine;
                 } else {
@@ -487,7 +500,7 @@ impl LineDensity {
     }
 }
 
-/// Values of M, and lengths of a line, with which sums and products neither overflow nor vanish.
+/// Bounds for values of M and for lengths of a line: their sums and products neither overflow nor underflow.
 const SMALLEST: f64 = 1e-150;
 const LARGEST: f64 = 1e150;
 

@@ -1,12 +1,13 @@
-//! Equidistribution in one dimension, and every Schwarz method for it.
+//! Equidistribution in one dimension, on the whole line and by Schwarz's method.
 //!
-//! The mesh x(ξ) on \[0, 1\] solves (M(x) x_ξ)_ξ = 0 with its ends fixed, or in time x_t = (1/τ) (M x_ξ)_ξ. Pieces of it
-//! are solved by themselves and told of each other's ends until they agree.
+//! The mesh x(ξ) on \[0, 1\] solves (M(x) x_ξ)_ξ = 0 with its ends fixed, or x_t = (1/τ) (M x_ξ)_ξ in time. In
+//! Schwarz's method the line is divided into pieces, which are solved separately and exchange what they have at their
+//! ends until they agree.
 //!
 //! # Source
-//! M. J. Gander and R. D. Haynes, *Domain decomposition approaches for mesh generation via the equidistribution principle*
-//! (2012). Its theorem 3.4, that linearised Schwarz always converges, does not hold: for M = 300 (x − ½)² + 1 and pieces
-//! that overlap in (.48, .52) the iteration oscillates for ever.
+//! M. J. Gander and R. D. Haynes, *Domain decomposition approaches for mesh generation via the equidistribution
+//! principle* (2012). Its theorem 3.4, that the linearised iteration always converges, does not hold: for the density M
+//! = 300 (x − ½)² + 1 and two pieces that overlap in (.48, .52) the iteration oscillates for ever.
 
 mod beyond;
 mod chain;
@@ -34,7 +35,7 @@ use schemars::JsonSchema;
 use schwarz::{Iteration, Pieces};
 use serde::{Deserialize, Serialize};
 
-/// The equidistribution of a density over a line of equal ξ-cells.
+/// A line with a density, to be divided into cells of equal ∫M.
 ///
 /// # Example
 /// ```
@@ -47,93 +48,95 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone)]
 pub struct Line {
-    /// M.
+    /// The density M.
     pub density: LineDensity,
-    /// Its mean over a cell.
+    /// How M is averaged over a cell.
     pub face: FaceDensity,
-    /// Cells in ξ.
+    /// Number of cells, of equal width in ξ.
     pub cells: usize,
     /// The ends of the line in x.
     pub ends: [f64; 2],
 }
 
-/// A mesh before, and τ/Δt of the step from it.
+/// The mesh before a time step, and τ/Δt of the step; none without time.
 pub type Before<'a> = Option<(&'a [f64], f64)>;
 
-/// The mesh of a whole line without time.
+/// The mesh of a whole line without time, and how it was found.
 #[derive(Debug, Clone)]
 pub struct Settled {
-    /// Its nodes.
+    /// Nodes.
     pub mesh: Vec<f64>,
-    /// What they took.
+    /// Linear solves that it took.
     pub linear_solves: usize,
-    /// Why they are those of [`FaceDensity::Exact`] where another average was asked for.
+    /// The failure of Newton's method for the average that was asked for, where these nodes are those of
+    /// [`FaceDensity::Exact`] instead.
     pub stalled: Option<Failure>,
 }
 
 /// When an iteration ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stop {
-    /// After so many iterations at the latest.
+    /// Largest number of iterations.
     pub iterations: usize,
-    /// As soon as the measure is at most this share of the line's length.
+    /// The iteration ends once `measure` is at most this share of the length of the line.
     pub tolerance: Option<f64>,
-    /// What is measured.
+    /// The quantity that is compared with the tolerance.
     pub measure: Measure,
 }
 
-/// What tells that an iteration has converged.
+/// The quantity that tells whether an iteration has converged.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Measure {
-    /// The distance to the discrete single-domain mesh.
+    /// The largest distance of a node from its place in the discrete mesh of the whole line, which is computed for it.
     #[default]
     Error,
-    /// The change in an iteration.
+    /// The largest change of a node in an iteration.
     Increment,
 }
 
-/// One iterate; the first is the start.
+/// Figures of one iterate; the first one is the start.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iterate {
     /// The largest distance of a node of any piece from the discrete single-domain mesh.
     pub error: f64,
-    /// The largest change since the iterate before; 0 at the start.
+    /// The largest change of a node since the previous iterate; 0 at the start.
     pub increment: f64,
     /// 2 max |u_i − u_{i−1}| over the pieces, where M is the arc length of u.
     pub largest_jump: Option<f64>,
     /// The largest error of the piecewise linear interpolant of u on the glued mesh.
     pub interpolation_error: Option<f64>,
-    /// Linear solves so far.
+    /// Linear solves from the start up to this iterate.
     pub linear_solves: usize,
 }
 
-/// How an iteration went.
+/// The figures, meshes and predictions of a Schwarz iteration.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct History {
-    /// The start and every iterate.
+    /// Figures of the start and of every iterate.
     pub iterates: Vec<Iterate>,
-    /// The glued mesh of the last.
+    /// The glued mesh of the last iterate.
     pub mesh: Vec<f64>,
-    /// Glued meshes of the start and of iterates, with their numbers: of all, or of every second, fourth … as far as
-    /// there is room.
+    /// Glued meshes of the start and of iterates, with their numbers. Of long iterations only every second, fourth … is
+    /// stored.
     #[serde(skip)]
     pub path: Vec<(usize, Vec<f64>)>,
-    /// Errors of the first piece alone.
+    /// Errors of the first piece alone, by iterate.
     #[serde(skip)]
     pub first: Vec<f64>,
-    /// The discrete single-domain mesh.
+    /// The discrete mesh of the whole line.
     pub reference: Vec<f64>,
-    /// Contraction in two iterations: the geometric mean of the last ten above rounding, or of the last half of fewer.
+    /// The observed contraction in two iterations: the geometric mean over the last ten iterates above rounding, or
+    /// over the last half of fewer.
     pub observed: Option<f64>,
-    /// What theory says of it.
+    /// The contraction by theory.
     pub prediction: Prediction,
-    /// Whether the tolerance was met, if there was one.
+    /// Whether the tolerance was met; true without one.
     pub converged: bool,
 }
 
 impl Measure {
-    /// Of an iterate.
+    /// The value of the measure for an iterate.
     pub fn of(self, iterate: &Iterate) -> f64 {
         match self {
             Self::Error => iterate.error,
@@ -150,12 +153,12 @@ impl Measure {
 }
 
 impl History {
-    /// Iterations done.
+    /// Number of iterations done.
     pub fn count(&self) -> usize {
         self.iterates.len() - 1
     }
 
-    /// What to say where the glued mesh is no mesh, or the tolerance was missed.
+    /// The failure of an iteration that missed its tolerance, or whose glued mesh has nodes out of order.
     pub fn missed(&self, method: Method, stop: Stop) -> Option<Failure> {
         self.far(method, stop).or_else(|| {
             let disordered = |i: &usize| self.mesh[*i].is_nan() || self.mesh[*i] <= self.mesh[i - 1];
@@ -165,7 +168,7 @@ impl History {
         })
     }
 
-    /// What to say where the tolerance was missed.
+    /// The failure of an iteration that missed its tolerance, with what its figures tell.
     fn far(&self, method: Method, stop: Stop) -> Option<Failure> {
         let length = self.mesh[self.mesh.len() - 1] - self.mesh[0];
         let tolerance = stop.tolerance.filter(|_| !self.converged)? * length;
@@ -173,7 +176,7 @@ impl History {
         let (count, last) = (self.count(), measured[self.count()]);
         let size = self.mesh.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
         let still = count > 0 && self.iterates[count].increment <= f64::EPSILON * size;
-        // an iteration that stands still near the solution has come as far as rounding lets it
+        // an iteration whose mesh no longer changes, close to the solution, has reached rounding
         let rounding = if still && last <= NEAR * length { STILL * last } else { IS_ROUNDING * size };
         let rate = contraction(&measured);
         let more = rate.map(|rate| 2.0 * (tolerance.max(rounding) / last).ln() / rate.ln());
@@ -204,7 +207,7 @@ impl History {
     }
 }
 
-/// What cures an iteration that missed its tolerance: more iterations where it converges, another method where not.
+/// Remedies for an iteration that missed its tolerance: more iterations if it converges, another method if not.
 fn curing(method: Method, converges: bool) -> Vec<Remedy> {
     let robin = Act::Set(Setting::Robin, &["\"auto\"", "\"lagged\""]);
     let exact = Act::Set(Setting::FaceDensity, &["\"exact\""]);
@@ -231,8 +234,8 @@ fn curing(method: Method, converges: bool) -> Vec<Remedy> {
     }]
 }
 
-/// The factor of two iterations over the last half of them, where all of the last quarter are below all of the second: an
-/// iteration that only swings may fall for a while.
+/// The contraction in two iterations over the last half of them, if the iteration converges: every value of the last
+/// quarter must be below every one of the second quarter, since the values of an oscillation also fall for a while.
 fn contraction(measured: &[f64]) -> Option<f64> {
     let count = measured.len() - 1;
     let (first, middle) = (1.max(count / 4), 1.max(count / 2));
@@ -241,31 +244,37 @@ fn contraction(measured: &[f64]) -> Option<f64> {
     (count > 1 && highest < lowest).then(|| (measured[count] / measured[middle]).powf(2.0 / (count - middle) as f64))
 }
 
-/// Errors below this share of the largest coordinate are of rounding.
+/// Errors below this share of the largest coordinate are rounding.
 const IS_ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// An iteration that stands still nearer than this share of the line has converged, as far as rounding lets it.
+/// An iteration whose mesh no longer changes counts as converged up to rounding if its error is below this share of the
+/// length of the line; farther away it is stuck.
 const NEAR: f64 = 1e-6;
-/// Iterations that may be asked for.
+/// Largest number of iterations that may be asked for. A message calls an iteration that needs more too slow to wait
+/// for.
 pub(crate) const MOST_ITERATIONS: usize = 1_000_000;
-/// The tolerance that a message recommends where an iteration no longer improves, as a multiple of the error that it reached.
+/// Where rounding stops an iteration, the message recommends this multiple of the error reached as the tolerance.
 const STILL: f64 = 1.5;
-/// Iterations before which a message does not call an error that has not fallen yet a stalled iteration.
+/// With fewer iterations than this, a message does not say that an iteration fails to converge: too few to tell.
 const FEW: usize = 4;
-/// Iterates with errors below this share of the line's length are rounding.
+/// Errors below this share of the length of the line are left out of the observed contraction: rounding falsifies it.
 const ROUNDING: f64 = 1e-11;
-/// Contractions that count for the observed rate.
+/// Largest number of iterates over which the observed contraction is averaged.
 const LAST: usize = 10;
-/// Parts of a cell between which an interpolant is compared: of all cells, and of the worst.
+/// Equal parts into which each cell is divided to estimate its interpolation error.
 const FEW_PARTS: usize = 4;
+/// Parts of the cells whose estimate is within a tenth of the largest, to find the error itself.
 const PARTS: usize = 64;
+/// Cells whose places are evaluated in one call.
 const CELLS_AT_ONCE: usize = 4096;
+/// Largest number of cells that are divided into the finer parts.
 const MOST: usize = 1000;
-/// Meshes of iterates that are kept, and values in them, at most.
+/// Largest number of glued meshes that are stored.
 const MOST_MESHES: usize = 100;
+/// Largest number of nodes in all glued meshes that are stored: 8 MB.
 const MOST_KEPT: usize = 1 << 20;
 
 impl Line {
-    /// M on \[0, 1\], averaged by trapezoids.
+    /// The density M on \[0, 1\], averaged by trapezoids.
     pub fn new(density: LineDensity, cells: usize) -> Self {
         Self { density, face: FaceDensity::default(), cells, ends: [0.0, 1.0] }
     }
@@ -278,12 +287,12 @@ impl Line {
         Cumulative::new(&self.density, t, self.ends)
     }
 
-    /// Equal cells.
+    /// The nodes of equal cells.
     pub fn uniform(&self) -> Vec<f64> {
         self.mapped(|xi| xi)
     }
 
-    /// The nodes that a function of ξ from 0 to 1 puts between the ends.
+    /// The nodes at which a function of ξ, from 0 to 1, divides the line.
     pub fn mapped(&self, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let [a, b] = self.ends;
         let mut x: Vec<f64> = (0..=self.cells).map(|i| a + (b - a) * f(i as f64 / self.cells as f64)).collect();
@@ -291,12 +300,12 @@ impl Line {
         x
     }
 
-    /// The mesh on which all cells have the same ∫M: its nodes are those of the continuous problem, found by inversion of
-    /// ∫M, which no density hinders that is finite and positive.
+    /// The mesh on which all cells have the same ∫M. Its nodes are those of the continuous problem, found by inverting
+    /// ∫M; it exists for every finite and positive density.
     ///
     /// # Errors
-    /// [`Failure::LineDensity`]; [`Failure::LineUnresolved`] where a layer is so thin, and so many cells lie in it, that neighbours
-    /// would be the same number.
+    /// [`Failure::LineDensity`]; [`Failure::LineUnresolved`] where so many cells lie in so thin a layer that
+    /// neighbouring nodes are the same floating-point number.
     pub fn equidistributed(&self, t: f64) -> Result<Vec<f64>, Failure> {
         self.in_order(self.cumulative(t)?.divided(self.ends, self.cells))
     }
@@ -308,8 +317,9 @@ impl Line {
         }
     }
 
-    /// The discrete mesh of the whole line, and the linear solves that it took: none for [`FaceDensity::Exact`] without time,
-    /// which is [`equidistributed`](Self::equidistributed). The others start there, or at the guess where there is time.
+    /// The discrete mesh of the whole line, and the number of linear solves. For [`FaceDensity::Exact`] without time it
+    /// is [`equidistributed`](Self::equidistributed) and takes none. Otherwise Newton's method starts there, or in time
+    /// at the guess.
     ///
     /// # Errors
     /// As [`iterate`](Self::iterate), and those of [`equidistributed`](Self::equidistributed).
@@ -341,8 +351,8 @@ impl Line {
         }
     }
 
-    /// The discrete mesh of the whole line, or where Newton's method finds none the one that has the same ∫M in all cells: M
-    /// that jumps or peaks within a cell may have no mesh by trapezoids or midpoints.
+    /// The discrete mesh of the whole line. Where Newton's method does not converge, it is the one whose cells have the
+    /// same ∫M: with trapezoids or midpoints there may be no discrete mesh for an M that jumps or peaks within a cell.
     ///
     /// # Errors
     /// As [`equidistributed`](Self::equidistributed).
@@ -358,7 +368,7 @@ impl Line {
         }
     }
 
-    /// The continuous mesh at some ξ that grow: ∫ M up to x(ξ) is ξ times that over the line.
+    /// The continuous mesh at some ξ in ascending order: ∫M up to x(ξ) is ξ times that over the line.
     ///
     /// # Errors
     /// [`Failure::LineDensity`].
@@ -367,7 +377,7 @@ impl Line {
         Ok(cumulative.inverted(xi.iter().map(|xi| xi * cumulative.whole())))
     }
 
-    /// ∫M over each cell of a mesh, in its own way of averaging M over a cell.
+    /// ∫M over each cell of a mesh, with M averaged as `face` says.
     ///
     /// # Errors
     /// [`Failure::LineDensity`].
@@ -376,14 +386,15 @@ impl Line {
         Ok(chain.fluxes(mesh)?.into_iter().map(|flux| flux * chain.h).collect())
     }
 
-    /// Iterates between pieces, from a start, at time t.
+    /// Schwarz's iteration between pieces of the line, from a start, at time t.
     ///
-    /// `ranges` holds the first and last node of each piece, from left to right: neighbours overlap for the classical
-    /// method, and meet in a node for the others. No convergence is no error: see [`History::converged`].
+    /// `ranges` holds the first and last node of each piece, from left to right. Neighbours overlap for the classical
+    /// method, and share one node for the others. An iteration that does not converge is no error: see
+    /// [`History::converged`].
     ///
     /// # Errors
-    /// [`Error::Invalid`] for ranges that do not fit ([`pieces::check`]) or a start that is no mesh; [`Error::Failed`] with
-    /// [`Failure::LineDensity`] or [`Failure::LineStalled`].
+    /// [`Error::Invalid`] for ranges that do not fit the method ([`pieces::check`]) or a start that is no mesh;
+    /// [`Error::Failed`] with [`Failure::LineDensity`] or [`Failure::LineStalled`].
     pub fn iterate(
         &self,
         t: f64,
@@ -434,7 +445,7 @@ impl Line {
         Ok(History { iterates, mesh, path, first, reference, observed, prediction, converged })
     }
 
-    /// Refuses what is no mesh of the line: as many nodes as it has, from end to end, in order.
+    /// Refuses nodes that are no mesh of the line: their number, their ends and their order must be right.
     ///
     /// # Errors
     /// [`Error::Invalid`] with the key.
@@ -475,9 +486,10 @@ impl Line {
         Iterate { error, increment, largest_jump, interpolation_error, linear_solves }
     }
 
-    /// The largest error of the piecewise linear interpolant of u on a mesh, where M is the arc length of u.
+    /// The largest error of the piecewise linear interpolant of u on a mesh, where M is the arc length of u. Every cell
+    /// is estimated at a few places, and the worst ones are then searched closely.
     pub fn interpolation_error(&self, t: f64, mesh: &[f64]) -> Option<f64> {
-        // of each cell, at so many places inside
+        // largest error in each cell, at the ends of so many equal parts
         let errors = |cells: &[[f64; 2]], parts: usize| -> Option<Vec<f64>> {
             let place = |x: &[f64; 2], k: usize| x[0] + k as f64 / parts as f64 * (x[1] - x[0]);
             let places: Vec<f64> = cells.iter().flat_map(|x| (0..=parts).map(move |k| place(x, k))).collect();
@@ -493,24 +505,24 @@ impl Line {
         let rough = parallel::map_large(cells.len(), &batches, |cells| errors(cells, FEW_PARTS));
         let rough: Vec<f64> = rough.into_iter().collect::<Option<Vec<_>>>()?.concat();
         let largest = rough.iter().copied().fold(0.0, f64::max);
-        // then closely where the largest may be
+        // closely in the cells where the largest error may be
         let worst: Vec<[f64; 2]> =
             cells.into_iter().zip(rough).filter(|(_, off)| *off >= 0.9 * largest).map(|(x, _)| x).take(MOST).collect();
         errors(&worst, PARTS)?.into_iter().reduce(f64::max)
     }
 }
 
-/// Meshes of an iteration, which may go on for ever.
+/// Glued meshes of an iteration, which may be too many to store all.
 #[derive(Default)]
 struct Path {
     meshes: Vec<(usize, Vec<f64>)>,
-    /// Meshes seen, and how many a kept one stands for.
+    /// Number of meshes seen, and at which multiples one is stored.
     seen: usize,
     every: usize,
 }
 
 impl Path {
-    /// Keeps a mesh where it is due; half of those before go where there is no room.
+    /// Stores a mesh if its number is due. Where there is no room, every second stored mesh is dropped first.
     fn take(&mut self, mesh: Vec<f64>) {
         let most = (MOST_KEPT / mesh.len()).min(MOST_MESHES);
         self.every = self.every.max(1);
@@ -532,10 +544,10 @@ fn distance(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     nodes.fold(0.0, |m, (a, b)| if (a - b).is_nan() { f64::INFINITY } else { m.max((a - b).abs()) })
 }
 
-/// The geometric mean of E_{n+2}/E_n over the last n with E_{n+2} above rounding.
+/// The geometric mean of E_{n+2}/E_n over the last iterates with E_{n+2} above rounding.
 fn observed(iterates: &[Iterate], rounding: f64) -> Option<f64> {
     let above: Vec<f64> = iterates.iter().map(|i| i.error).take_while(|error| *error > rounding).collect();
-    // the first half of a fast iteration is not yet asymptotic
+    // at most the last half: the beginning of a fast iteration is not yet asymptotic
     let pairs = above.len().saturating_sub(2);
     let pairs = LAST.min(pairs.div_ceil(2));
     if pairs == 0 {

@@ -1,15 +1,15 @@
-//! Subdomains of a line, as the first and the last node of each, from left to right.
+//! Pieces of a line, given by the first and the last node of each, from left to right.
 
 use super::Method;
 use crate::error::{Error, Result};
 
-/// A node may be off by so much of a cell, which is rounding of what was written.
+/// A place in ξ may be off its node by this share of a cell: rounding of the number that was written.
 const ROUNDING: f64 = 1e-9;
 
-/// The node at ξ.
+/// The number of the node at ξ.
 ///
 /// # Errors
-/// [`Error::Invalid`] with the key where there is no node: nothing is rounded to the next one.
+/// [`Error::Invalid`] with the key where there is no node: ξ is not rounded to the nearest one.
 pub fn node(key: &str, xi: f64, cells: usize) -> Result<usize> {
     let place = xi * cells as f64;
     let near = place.round();
@@ -24,10 +24,10 @@ pub fn node(key: &str, xi: f64, cells: usize) -> Result<usize> {
     Err(Error::invalid(key, xi, rule))
 }
 
-/// Subdomains of equal width that overlap by so many cells.
+/// Pieces of equal width, neighbours of which overlap by a number of cells.
 ///
 /// # Errors
-/// [`Error::Invalid`] for `subdomains` where they do not fit.
+/// [`Error::Invalid`] for `subdomains` where no equal pieces fit.
 pub fn equal(cells: usize, subdomains: usize, overlap: usize) -> Result<Vec<[usize; 2]>> {
     let invalid = |rule: String| Err(Error::invalid("subdomains", subdomains, rule));
     if subdomains == 0 || subdomains > cells {
@@ -37,12 +37,13 @@ pub fn equal(cells: usize, subdomains: usize, overlap: usize) -> Result<Vec<[usi
     let all = cells.saturating_add(shared);
     let (width, left) = (all / subdomains, all % subdomains);
     if left != 0 {
-        // more cells as long as they cover the overlaps
+        // more cells fit as long as every piece is longer than its overlaps
         let fits = |width: usize| (width * subdomains).checked_sub(shared).filter(|cells| *cells > 0);
         let near: Vec<String> =
             [width, width + 1].into_iter().filter_map(fits).map(|cells| cells.to_string()).collect();
         return invalid(format!(
-            "(cells + {} × {overlap})/{subdomains} must be whole; with {overlap} cells of overlap the nearest grid.cells are {}",
+            "(cells + {} × {overlap})/{subdomains} must be whole; with {overlap} cells of overlap the nearest \
+             grid.cells are {}",
             subdomains - 1,
             near.join(" and ")
         ));
@@ -53,7 +54,7 @@ pub fn equal(cells: usize, subdomains: usize, overlap: usize) -> Result<Vec<[usi
     Ok((0..subdomains).map(|s| [s * (width - overlap), s * (width - overlap) + width]).collect())
 }
 
-/// Refuses subdomains that a method cannot be used with.
+/// Refuses pieces that a method cannot work with.
 ///
 /// # Errors
 /// [`Error::Invalid`] with the key.
@@ -93,8 +94,8 @@ pub fn check(key: &str, ranges: &[[usize; 2]], cells: usize, method: Method) -> 
         }
         if overlapping && next == end {
             return invalid(format!(
-                "{between} do not overlap: with each other's values at their ends they would never learn of each other; \
-                 give an overlap, or use the method \"optimized\""
+                "{between} do not overlap: with each other's values at their ends they would never learn of each \
+                 other; give an overlap, or use the method \"optimized\""
             ));
         }
         if !overlapping && next < end {

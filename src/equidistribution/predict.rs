@@ -2,22 +2,25 @@ use super::{Coarse, Line, Method, Robin, Sweep};
 use crate::error::Failure;
 use serde::{Deserialize, Serialize};
 
-/// What theory says of the contraction in two iterations
+/// The contraction of the error in two iterations, by theory
 ///
-/// | method | predicted | bound |
-/// |---|---|---|
-/// | classical, I pieces | ρ(A)², A the matrix that maps errors of ∫M at the ends of pieces to the next (6.4); (α/β)(1−β)/(1−α) for two (theorem 3.2) | theorem 6.5, for equal pieces |
-/// | alternating, two pieces | its square: it contracts so much in each iteration | |
-/// | optimal | 0 after I iterations with exact integrals over cells (theorem 4.1) | 0 for two |
-/// | optimised, two pieces | \|p − m/α\|\|p − m/(1−α)\| / ((p + m/α)(p + m/(1−α))), m = M(x(α)) | (5.7) |
-/// | in time, two pieces | | theorem 7.2; alternating, its square |
+/// With α and β the ends of the overlap of two pieces, m = M(x(α)), and numbers of equations and theorems from Gander
+/// and Haynes (2012):
 ///
-/// Nothing is known of the linearised method: theorem 3.4 does not hold.
+/// - classical, two pieces: (α/β)(1−β)/(1−α) (theorem 3.2)
+/// - classical, any number of pieces: ρ(A)², where A maps the errors of ∫M at the ends of pieces to those of the next
+///   iteration (6.4); bound of theorem 6.5 for equal pieces
+/// - alternating, two pieces: the square of the classical one, since each iteration contracts by as much as two
+/// - optimal, I pieces: 0 after I iterations with exact integrals over cells (theorem 4.1)
+/// - optimised, two pieces: |p − m/α| |p − m/(1−α)| / ((p + m/α)(p + m/(1−α))); bound (5.7)
+/// - in time, two pieces: bound of theorem 7.2; alternating, its square
+///
+/// There is none for the linearised method: theorem 3.4 does not hold.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
-    /// The asymptotic contraction.
+    /// The asymptotic contraction; none where theory gives none for the case.
     pub predicted: Option<f64>,
-    /// An upper bound.
+    /// An upper bound of it; none where theory gives none.
     pub bound: Option<f64>,
 }
 
@@ -39,14 +42,14 @@ impl Prediction {
             (Method::Classical { sweep, .. }, Some(ratio)) if count == 2 => {
                 let (alpha, beta) = (xi(ranges[1][0]), xi(ranges[0][1]));
                 let root = (ratio / extremes()?[1]).sqrt();
-                // as logarithms: a small step makes them too large for numbers
+                // as logarithms: for a small time step the sinh themselves overflow
                 let sinh = |s: f64| root * s + (0.5 * -(-2.0 * root * s).exp_m1()).ln();
                 let bound = sinh(alpha) + sinh(1.0 - beta) - sinh(beta) - sinh(1.0 - alpha);
-                // the theorem is of the parallel sweep; alternating, the same holds of each iteration
+                // the theorem is for two parallel sweeps; one alternating sweep contracts as much
                 let iterations = if sweep == Sweep::Alternating { 2.0 } else { 1.0 };
                 Self { predicted: None, bound: Some((iterations * bound).exp()) }
             }
-            // of averages that are not exact, too: beyond a cut the discrete problem is solved
+            // this holds for averages that are not exact, too, since the discrete problem beyond a cut is solved
             (Method::Optimal { .. }, Some(_)) => Self { predicted: Some(0.0), bound: None },
             (_, Some(_)) => Self::default(),
             (Method::Classical { sweep, .. }, None) => {
@@ -77,7 +80,7 @@ impl Prediction {
                 };
                 match robin {
                     Robin::Value(p) => {
-                        // each piece answers the law of its own end: M/α on the left, M/(1 − α) on the right
+                        // p is optimal for both pieces at once only where M/α = M/(1 − α)
                         let predicted = (p - m / alpha).abs() * (p - m / (1.0 - alpha)).abs()
                             / ((p + m / alpha) * (p + m / (1.0 - alpha)));
                         let [low, high] = extremes()?;
@@ -93,19 +96,20 @@ impl Prediction {
             }
             (Method::Optimized { .. }, None) => Self::default(),
         };
-        // conditions out of all proportion have a rate of 0/0
+        // Robin parameters out of all proportion give 0/0
         let [predicted, bound] = [predicted, bound].map(|rate| rate.filter(|rate| rate.is_finite()));
         Ok(Self { predicted, bound })
     }
 }
 
-/// ρ(A): errors of ∫M are linear between the ends of a piece, so that the one at a node inside it is their mean by distance.
+/// The spectral radius of A: errors of ∫M are linear in ξ within a piece, so that the error at an inner node is a mean
+/// of those at both ends.
 fn interface_radius(pieces: &[[f64; 2]]) -> f64 {
     let count = pieces.len();
     if count < 2 {
         return 0.0;
     }
-    // errors at the left and right end of each piece; those of the whole line are 0
+    // the errors at both ends of each piece in the next iteration; at the ends of the line they are 0
     let next = |errors: &[[f64; 2]]| -> Vec<[f64; 2]> {
         let at = |s: usize, xi: f64| {
             let [a, b] = pieces[s];
@@ -124,7 +128,7 @@ fn interface_radius(pieces: &[[f64; 2]]) -> f64 {
     (errors[0][0], errors[count - 1][1]) = (0.0, 0.0);
     let norm = |e: &[[f64; 2]]| e.iter().flatten().map(|e| e * e).sum::<f64>().sqrt();
     let mut rate = 0.0;
-    // A² keeps the two classes of ends apart that exchange places under A
+    // by powers of A²: A itself exchanges two classes of ends, and its iterates would alternate
     for _ in 0..20_000 {
         let after = next(&next(&errors));
         let size = norm(&after);

@@ -8,62 +8,66 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::borrow::Cow;
 use std::fmt;
 
-/// How subdomains of a line exchange what they know.
+/// What neighbouring subdomains of a line exchange in each iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// Overlapping pieces with each other's values at their ends.
+    /// Overlapping subdomains exchange the positions of their end nodes.
     Classical {
-        /// In which order.
+        /// The order in which subdomains are solved.
         sweep: Sweep,
-        /// M frozen at the last iterate: a linear solve a piece.
+        /// M is taken from the previous iterate, so that a subdomain costs one linear solve.
         linearized: bool,
-        /// What is done between sweeps.
+        /// The coarse correction between iterations.
         coarse: Coarse,
     },
-    /// Pieces that meet, with the flux of the rest of the domain as the law at their ends: I iterations.
+    /// Subdomains meet in a node and take the flux of the rest of the line as boundary condition: as many iterations as
+    /// subdomains.
     Optimal {
-        /// Panels of the trapezoidal rule for the integrals; exact where there are none. In time there are no integrals.
+        /// Panels of the trapezoidal rule for ∫M over the rest of the line; none means the exact integral. In time
+        /// there is no such integral.
         panels: Option<usize>,
     },
-    /// Pieces that meet, with F ± p x as the law at their ends.
+    /// Subdomains meet in a node and exchange Robin conditions F ± p x.
     Optimized {
-        /// p.
+        /// The parameter p.
         robin: Robin,
     },
 }
 
-/// The order in which pieces are solved.
+/// The order in which subdomains are solved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Sweep {
-    /// All from the last iterate.
+    /// All at once, from the previous iterate.
     #[default]
     Parallel,
-    /// From left to right, with the newest values.
+    /// From left to right, each with the newest values of its left neighbour.
     Alternating,
 }
 
-/// What is done between sweeps.
+/// A coarse correction of all subdomains at once between iterations.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Coarse {
-    /// Nothing.
+    /// No correction.
     #[default]
     None,
-    /// A correction of the glued mesh on two coarse nodes an interface.
+    /// A Galerkin correction of the glued mesh on two coarse nodes at each cut.
     Galerkin,
-    /// The same, as a change of ∫M instead of x: nothing overshoots, however M varies.
+    /// The same correction, applied to ∫M instead of x: it does not overshoot, however M varies.
     Integral,
 }
 
-/// p of Robin conditions.
+/// The parameter p of Robin conditions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Robin {
-    /// The same everywhere.
+    /// The same value at every cut.
     Value(f64),
-    /// M̃/α for two pieces, M̃ = M at the mean of both sides' last values; `Lagged` for more.
+    /// M̃/α for two subdomains that meet at ξ = α, with M̃ = M at the mean of both sides' last values; `lagged` for
+    /// more of them.
     Auto,
-    /// M̃/(1 − ξ) at the right end of a piece, M̃/ξ at the left end. In time M̃ √θ coth(√θ L), θ = τ/(Δt M̃), for M̃/L.
+    /// From the previous iterate: M̃/(1 − ξ) at the right end of a subdomain, M̃/ξ at the left end. In time M̃ √θ
+    /// coth(√θ L) with θ = τ/(Δt M̃), in place of M̃/L.
     Lagged,
 }
 
@@ -121,28 +125,28 @@ impl<'de> Deserialize<'de> for Robin {
     }
 }
 
-/// Nodes of each piece.
+/// The nodes of each piece.
 pub(super) type Pieces = Vec<Vec<f64>>;
 
-/// One iteration between the pieces of a line.
+/// What one Schwarz iteration between the pieces of a line needs.
 pub(super) struct Iteration<'a> {
     pub chain: Chain<'a>,
-    /// First and last node of each piece.
+    /// The first and the last node of each piece.
     pub ranges: &'a [[usize; 2]],
     pub method: Method,
-    /// The mesh before, and τ/Δt, where there is time.
+    /// The mesh before the time step, and τ/Δt; none without time.
     pub old: Option<(&'a [f64], f64)>,
-    /// Cells of the whole line.
+    /// Number of cells of the whole line.
     pub cells: usize,
 }
 
 impl Iteration<'_> {
-    /// The pieces of a mesh.
+    /// The nodes of a mesh, piece by piece.
     pub fn cut(&self, mesh: &[f64]) -> Pieces {
         self.ranges.iter().map(|&[first, last]| mesh[first..=last].to_vec()).collect()
     }
 
-    /// One mesh from the pieces: each node from the piece whose half of the overlap it lies in.
+    /// One mesh from the pieces: a node in an overlap is taken from the piece in whose half of the overlap it lies.
     pub fn glue(&self, pieces: &[Vec<f64>]) -> Vec<f64> {
         let mut mesh = Vec::with_capacity(self.cells + 1);
         for (s, (piece, [first, last])) in pieces.iter().zip(self.ranges).enumerate() {
@@ -157,7 +161,7 @@ impl Iteration<'_> {
         self.old.map(|(old, ratio)| Step { old: &old[first..=last], ratio })
     }
 
-    /// The next iterate, and the linear solves that it took.
+    /// The next iterate, and the number of linear solves.
     pub fn next(&self, pieces: &[Vec<f64>]) -> Result<(Pieces, usize), Failure> {
         match self.method {
             Method::Classical { sweep: Sweep::Alternating, .. } => {
@@ -191,7 +195,7 @@ impl Iteration<'_> {
         Ok((next, solves))
     }
 
-    /// What a piece is told at its left end.
+    /// The boundary condition at the left end of piece s.
     fn left_end(&self, pieces: &[Vec<f64>], s: usize) -> Result<End<'_>, Failure> {
         let first = self.ranges[s][0];
         match self.method {
@@ -201,7 +205,7 @@ impl Iteration<'_> {
         }
     }
 
-    /// What a piece is told at its right end.
+    /// The boundary condition at the right end of piece s.
     pub fn right_end(&self, pieces: &[Vec<f64>], s: usize) -> Result<End<'_>, Failure> {
         let [first, last] = self.ranges[s];
         match (self.method, self.ranges.get(s + 1)) {
@@ -211,7 +215,7 @@ impl Iteration<'_> {
         }
     }
 
-    /// One piece from all.
+    /// The next iterate of piece s, from the last iterates of all pieces.
     fn solve(&self, pieces: &[Vec<f64>], s: usize) -> Result<(Vec<f64>, usize), Failure> {
         let ends = [self.left_end(pieces, s)?, self.right_end(pieces, s)?];
         match (self.method, ends) {
@@ -222,8 +226,8 @@ impl Iteration<'_> {
         }
     }
 
-    /// The law where pieces j and j + 1 meet, for the `Right` end of the left one or the `Left` end of the right one, with
-    /// what the other knows.
+    /// The condition at the node where pieces j and j + 1 meet, from the last iterate of the other piece: for the
+    /// `Right` end of piece j or the `Left` end of piece j + 1.
     fn end(&self, pieces: &[Vec<f64>], j: usize, side: Side) -> Result<End<'_>, Failure> {
         let cut = self.ranges[j][1];
         let xi = cut as f64 / self.cells as f64;
@@ -247,13 +251,13 @@ impl Iteration<'_> {
             Side::Right => (self.chain.flux(right[0], right[1])?, right[0], -1.0),
             Side::Left => (self.chain.flux(left[n - 1], left[n])?, left[n], 1.0),
         };
-        // in time the flux at the cut is that of the cell beside it, and what half a cell adds
+        // in time the flux at the cut is that in the middle of the cell beside it, and what half a cell adds
         let more = self.old.map_or(0.0, |(old, ratio)| Step { old, ratio }.half(self.chain.h, cut, x)[0]);
         Ok(End::Flux { g: flux + sign * more - self.chain.law(law, x)?, law })
     }
 
-    /// p: for a flux that answers a node like that of the rest, M̃/L without time and M̃ √θ coth(√θ L), θ = τ/(Δt M̃), with it,
-    /// L the length of the rest.
+    /// p that makes the flux answer a displacement of the node as the rest of the line, of length L in ξ, would: M̃/L
+    /// without time, and M̃ √θ coth(√θ L) with θ = τ/(Δt M̃) in time.
     fn robin(&self, xi: f64, x: f64, side: Side) -> Result<f64, Failure> {
         let Method::Optimized { robin } = self.method else { return Ok(0.0) };
         let like_rest = |length: f64| -> Result<f64, Failure> {
@@ -281,7 +285,8 @@ enum Side {
     Right,
 }
 
-/// The last node that the left one of two pieces owns, which end and begin there.
+/// The last node that the left one of two neighbouring pieces owns, given the last node of the left and the first of
+/// the right one.
 pub(super) fn owner(last: usize, first: usize) -> usize {
     (first + last) / 2
 }

@@ -302,8 +302,8 @@ fn coarse_correction() {
     }
 }
 
-/// The correction of ∫M: no density makes it take many more iterations for many pieces than for two, not even one for which
-/// the correction of x takes more than a hundred.
+/// The correction of ∫M: no density makes it take many more iterations for many pieces than for two, not even one for
+/// which the correction of x takes more than a hundred.
 #[test]
 fn coarse_correction_of_the_integral() {
     let method = |coarse| Method::Classical { sweep: Sweep::Parallel, linearized: false, coarse };
@@ -323,8 +323,8 @@ fn coarse_correction_of_the_integral() {
     }
 }
 
-/// Optimal conditions in time end after as many iterations as pieces, optimised ones find the same mesh without a number
-/// set, and both find that of one domain: half cells at the cuts count.
+/// Optimal conditions in time end after as many iterations as pieces, optimised ones find the same mesh without a
+/// number set, and both find that of one domain: half cells at the cuts count.
 #[test]
 fn conditions_in_time() {
     let line = line(square(), 96, FaceDensity::Trapezoid);

@@ -10,7 +10,10 @@ use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 pub enum Failure {
     /// A mesh cell has a corner whose Jacobian is not positive.
     #[strum(serialize = "mesh-folded")]
-    #[error("the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {}, y = {}{}", cell[0], cell[1], short(x[0]), short(x[1]), noisy(*noise))]
+    #[error(
+        "the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {}, y = {}{}",
+        cell[0], cell[1], short(x[0]), short(x[1]), noisy(*noise)
+    )]
     Folded {
         /// Indices of the cell along ξ and η.
         cell: [usize; 2],
@@ -34,7 +37,10 @@ pub enum Failure {
         x: [f64; 2],
     },
     /// A formula of the study has no finite value, or what it makes of an unknown has none.
-    #[error("{what} is {value} at node ({}, {}), x = {}, y = {}{}", node[0], node[1], short(x[0]), short(x[1]), given_as(.given))]
+    #[error(
+        "{what} is {value} at node ({}, {}), x = {}, y = {}{}",
+        node[0], node[1], short(x[0]), short(x[1]), given_as(.given)
+    )]
     Formula {
         /// The formula's dotted key, in the reader's words.
         what: String,
@@ -48,7 +54,10 @@ pub enum Failure {
         given: Vec<(String, f64)>,
     },
     /// A quantity that must be positive is not.
-    #[error("{what} is {value:.3e}, not positive, at node ({}, {}), x = {}, y = {}", node[0], node[1], short(x[0]), short(x[1]))]
+    #[error(
+        "{what} is {value:.3e}, not positive, at node ({}, {}), x = {}, y = {}",
+        node[0], node[1], short(x[0]), short(x[1])
+    )]
     NotPositive {
         /// The quantity, in the reader's words.
         what: &'static str,
@@ -69,7 +78,9 @@ pub enum Failure {
     },
     /// An equation that is made for the uniform mesh met another, or one that moves.
     #[error(
-        "the stepper rk4 needs the uniform mesh, but along axis {axis} node ({}, {}), x = {}, y = {}, is off by {off:.1e}", node[0], node[1], short(x[0]), short(x[1])
+        "the stepper rk4 needs the uniform mesh, but along axis {axis} node ({}, {}), x = {}, y = {}, is off by \
+         {off:.1e}",
+        node[0], node[1], short(x[0]), short(x[1])
     )]
     NotUniform {
         /// Distance from the place in the uniform mesh.
@@ -109,7 +120,8 @@ pub enum Failure {
     },
     /// A linear system was not solved to its tolerance by any solver at hand.
     #[error(
-        "a linear system of {unknowns} unknowns was not solved: residual {residual:.1e} after {iterations} iterations, {tolerance:.0e} needed"
+        "a linear system of {unknowns} unknowns was not solved: residual {residual:.1e} after {iterations} \
+         iterations, {tolerance:.0e} needed"
     )]
     LinearStalled {
         /// Size of the system.
@@ -122,7 +134,10 @@ pub enum Failure {
         iterations: usize,
     },
     /// The density is so steep that the weights of the mesh equation are no probabilities.
-    #[error("the density is too steep for random walks: |b|h = {skew:.3} at node {}, x = {}, and must be at most 2", tuple(node.iter()), tuple(x.iter().map(|&x| short(x))))]
+    #[error(
+        "the density is too steep for random walks: |b|h = {skew:.3} at node {}, x = {}, and must be at most 2",
+        tuple(node.iter()), tuple(x.iter().map(|&x| short(x)))
+    )]
     SteepDensity {
         /// Largest |b|h of the node.
         skew: f64,
@@ -133,7 +148,8 @@ pub enum Failure {
     },
     /// Random walks that would not end in any time worth waiting for.
     #[error(
-        "{walks} random walks from each of {points} points would take too long: Δt/(τh²) = {stiffness:.1e}, about {jumps:.1e} jumps a walk"
+        "{walks} random walks from each of {points} points would take too long: Δt/(τh²) = {stiffness:.1e}, about \
+         {jumps:.1e} jumps a walk"
     )]
     LongWalks {
         /// Δt/(τh²), the larger of both axes.
@@ -147,7 +163,8 @@ pub enum Failure {
     },
     /// Interface values are so noisy that cells can fold.
     #[error(
-        "interface values are too noisy: standard error {noise:.1e}, shortest edge of the mesh {edge:.1e}, Δt/(τh²) = {stiffness:.3}"
+        "interface values are too noisy: standard error {noise:.1e}, shortest edge of the mesh {edge:.1e}, Δt/(τh²) = \
+         {stiffness:.3}"
     )]
     NoisyInterface {
         /// Root mean square of the standard errors.
@@ -199,7 +216,8 @@ pub enum Failure {
     },
     /// A layer is so thin, and so many cells lie in it, that neighbouring nodes are the same number.
     #[error(
-        "node {node} of {cells} cells and the one before it are the same number, x = {x}: the layer there is too thin for so many"
+        "node {node} of {cells} cells and the one before it are the same number, x = {x}: the layer there is too thin \
+         for so many"
     )]
     LineUnresolved {
         /// The second of them.
@@ -211,7 +229,8 @@ pub enum Failure {
     },
     /// The mesh glued from the subdomains of a line is out of order.
     #[error(
-        "the subdomains do not agree on an order: after {iterations} iteration{} node {node} is at x = {x}, and the one before it at {left}",
+        "the subdomains do not agree on an order: after {iterations} iteration{} node {node} is at x = {x}, and the \
+         one before it at {left}",
         if *.iterations == 1 { "" } else { "s" }
     )]
     LineFolded {
@@ -244,7 +263,10 @@ pub enum Failure {
         remedies: Vec<Remedy>,
     },
     /// The sides of a mesh touch or cross each other, although no cell is folded.
-    #[error("the mesh touches itself: its sides meet at x = {}, y = {}, in cells ({}, {}) and ({}, {})", short(x[0]), short(x[1]), cells[0][0], cells[0][1], cells[1][0], cells[1][1])]
+    #[error(
+        "the mesh touches itself: its sides meet at x = {}, y = {}, in cells ({}, {}) and ({}, {})",
+        short(x[0]), short(x[1]), cells[0][0], cells[0][1], cells[1][0], cells[1][1]
+    )]
     SelfTouching {
         /// The cells at both sides.
         cells: [[usize; 2]; 2],
@@ -252,7 +274,10 @@ pub enum Failure {
         x: [f64; 2],
     },
     /// The nodes around a node determine no Laplacian.
-    #[error("the nodes around node ({}, {}), x = {}, y = {}, give no Laplacian: condition number {condition:.1e}", node[0], node[1], short(x[0]), short(x[1]))]
+    #[error(
+        "the nodes around node ({}, {}), x = {}, y = {}, give no Laplacian: condition number {condition:.1e}",
+        node[0], node[1], short(x[0]), short(x[1])
+    )]
     DegenerateStencil {
         /// Indices of the node along ξ and η.
         node: [usize; 2],
@@ -262,7 +287,10 @@ pub enum Failure {
         condition: f64,
     },
     /// The front reached a wall.
-    #[error("the front left the box: at x = {} it is at y = {}, and the {wall} at y = {}", short(x[0]), short(x[1]), short(*y))]
+    #[error(
+        "the front left the box: at x = {} it is at y = {}, and the {wall} at y = {}",
+        short(x[0]), short(x[1]), short(*y)
+    )]
     FrontOutside {
         /// Where the front is.
         x: [f64; 2],
@@ -284,7 +312,10 @@ pub enum Failure {
         of: f64,
     },
     /// The front turns over, or is too steep for the distance of the columns.
-    #[error("the front stops being a graph over x at x = {}, y = {}: its slope is {slope:.1e}", short(x[0]), short(x[1]))]
+    #[error(
+        "the front stops being a graph over x at x = {}, y = {}: its slope is {slope:.1e}",
+        short(x[0]), short(x[1])
+    )]
     NotAGraph {
         /// Where.
         x: [f64; 2],
@@ -300,7 +331,11 @@ pub enum Failure {
         limit: f64,
     },
     /// The warm phase lies on the wrong side of the front: the problem is ill-posed.
-    #[error("the warm phase is on the wrong side of the front at x = {}, y = {}: D₀ ∂u₀/∂y + D₁ ∂u₁/∂y = {slope:.3e} is above 0, and the problem ill-posed", short(x[0]), short(x[1]))]
+    #[error(
+        "the warm phase is on the wrong side of the front at x = {}, y = {}: D₀ ∂u₀/∂y + D₁ ∂u₁/∂y = {slope:.3e} is \
+         above 0, and the problem ill-posed",
+        short(x[0]), short(x[1])
+    )]
     WrongSide {
         /// Where.
         x: [f64; 2],
@@ -309,7 +344,9 @@ pub enum Failure {
     },
     /// A mesh generator met a mesh whose sides are not those of the box around it: it would pull them straight.
     #[error(
-        "the mesh does not fill its box: node ({}, {}) of a side across axis {axis}, x = {}, y = {}, is off that side of the box by {off:.1e}", node[0], node[1], short(x[0]), short(x[1])
+        "the mesh does not fill its box: node ({}, {}) of a side across axis {axis}, x = {}, y = {}, is off that side \
+         of the box by {off:.1e}",
+        node[0], node[1], short(x[0]), short(x[1])
     )]
     NotABox {
         /// Distance from the side of the box.
@@ -344,7 +381,8 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// False for what no step is short enough, and for formulas without a value, which a shorter step might only step over.
+    /// False for what no step is short enough, and for formulas without a value, which a shorter step might only step
+    /// over.
     pub(crate) fn is_curable(&self) -> bool {
         !matches!(
             self,

@@ -1,20 +1,20 @@
-//! What may cure a failure, as data: each door says it with its own names.
+//! Remedies of a failure as data; each interface puts them into words with its own names.
 
 use strum::{EnumIter, IntoStaticStr};
 
-/// Something that may be changed, by its meaning. A study has a key for it, or none; Python has an argument.
+/// A setting or argument that may be changed, by its meaning. A study may have a key for it, and Python an argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, EnumIter, IntoStaticStr)]
 pub enum Setting {
     /// Passes of the filter over the density.
     #[strum(serialize = "the smoothing of the density")]
     Smoothing,
-    /// How strongly the density answers to what the mesh follows.
+    /// How strongly the density depends on the slope of what the mesh follows.
     #[strum(serialize = "the strength of the density")]
     Strength,
-    /// How the mesh equation differences the density.
+    /// Difference scheme for the gradient of the density.
     #[strum(serialize = "the gradient of the density")]
     Gradient,
-    /// What the mesh follows.
+    /// The quantity that the mesh follows.
     #[strum(serialize = "what the mesh follows")]
     Followed,
     /// τ of the mesh equation.
@@ -113,20 +113,20 @@ impl Setting {
     }
 }
 
-/// One thing to do.
+/// One action of a remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
-    /// Take more of it.
+    /// Raise the setting.
     Raise(Setting),
-    /// Take less of it.
+    /// Lower the setting.
     Lower(Setting),
-    /// Make it finer.
+    /// Make the setting finer.
     Refine(Setting),
-    /// Give it one of these values, written as in a study.
+    /// Set it to one of these values, written as in a study.
     Set(Setting, &'static [&'static str]),
-    /// Give it as a number, where the program chooses.
+    /// Set it to a number, where the program chooses by default.
     Number(Setting),
-    /// Do without it.
+    /// Leave the setting out.
     LeaveOut(Setting),
     /// Change it as these words say, which stand before its name.
     Change(&'static str, Setting),
@@ -150,46 +150,47 @@ impl Act {
     }
 }
 
-/// Acts of which one may do, with the case in which they do.
+/// Actions of which any one may help, with the case in which they do.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Remedy {
-    /// Words before them; `else`, `or` and `and` are left out where nothing is said before.
+    /// Words before the actions; `else`, `or` and `and` are left out at the beginning of a sentence.
     pub before: &'static str,
-    /// What may be done.
+    /// The alternatives.
     pub acts: Vec<Act>,
-    /// Words behind them, with what separates them.
+    /// Words after the actions, with what separates them.
     pub behind: &'static str,
 }
 
 impl Remedy {
-    /// Any of these.
+    /// A remedy of these alternatives.
     pub fn any<const N: usize>(acts: [Act; N]) -> Self {
         Self { acts: acts.into(), ..Self::default() }
     }
 
-    /// The same in the case that these words tell, which stand before.
+    /// The same remedy in a case that these words tell, which stand before it.
     pub fn when(self, before: &'static str) -> Self {
         Self { before, ..self }
     }
 
-    /// The same with these words behind.
+    /// The same remedy, followed by these words.
     pub fn with(self, behind: &'static str) -> Self {
         Self { behind, ..self }
     }
 }
 
-/// How a door names what may be changed.
+/// How an interface names what may be changed.
 pub trait Door {
-    /// The name of the setting that an act changes; none where there is no such setting here, or where it is so already.
+    /// The name of the setting that an action changes; none where the interface has no such setting, or it already has
+    /// that value.
     fn name(&self, act: Act) -> Option<String>;
 
-    /// A value of a setting.
+    /// The words for a value of a setting.
     fn value(&self, _setting: Setting, value: &'static str) -> String {
         value.into()
     }
 }
 
-/// A door without names of its own: settings in plain words.
+/// An interface without names of its own: settings in plain words.
 pub struct Plain;
 
 impl Door for Plain {
@@ -198,7 +199,7 @@ impl Door for Plain {
     }
 }
 
-/// Remedies in one sentence, with what this door has; none where it has nothing of them.
+/// Remedies in one sentence, with the actions that an interface has; none where it has none of them.
 ///
 /// # Example
 /// ```

@@ -30,8 +30,8 @@ pub(crate) fn line_rule(what: &str, value: f64) -> &'static str {
         "M" if value <= 0.0 => "it must be above 0 on the whole line: add a floor, as in max(M, 1e-6)",
         "M" if value > 1e140 => "it is too large for sums: divide it by its largest value, since only its ratios count",
         "M" => {
-            "it must be above 0 by more than 1e-14 of its largest on the line, which is rounding: add a floor, as in max(M, 1e-6) \
-             where M is about 1"
+            "it must be above 0 by more than 1e-14 of its largest on the line, which is rounding: add a floor, as in \
+             max(M, 1e-6) where M is about 1"
         }
         _ => "it must be bounded on the whole line",
     }

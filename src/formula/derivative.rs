@@ -1,4 +1,4 @@
-//! The rules of calculus, on the graph.
+//! The rules of differentiation, applied to the graph of a formula.
 
 use super::MAX_OPERATIONS;
 use super::graph::{Binary, Comparison, Graph, Id, Node, Unary};
@@ -21,7 +21,7 @@ impl Graph {
         self.binary(Binary::Divide, a, b)
     }
 
-    /// a + b, where `None` is the derivative of what does not depend on the variable.
+    /// a + b, where `None` stands for the derivative of an operand that does not depend on the variable.
     fn plus(&mut self, a: Option<Id>, b: Option<Id>) -> Option<Id> {
         match (a, b) {
             (Some(a), Some(b)) => Some(self.binary(Binary::Add, a, b)),
@@ -37,7 +37,7 @@ impl Graph {
         }
     }
 
-    /// The derivative of the branch taken.
+    /// The derivative of the branch that a comparison selects.
     fn choice(&mut self, comparison: Comparison, left: Id, right: Id, [a, b]: [Option<Id>; 2]) -> Option<Id> {
         a.or(b)?;
         let zero = self.constant(0.0);
@@ -46,8 +46,8 @@ impl Graph {
 
     /// Derivative of the last node; `None` if it takes too many operations.
     ///
-    /// Forward through the graph: every node gets its derivative from those of its operands, once, however often it is
-    /// used. The size thus grows by a constant factor with each order at most.
+    /// Every node gets its derivative once, from those of its operands, however often it is used. The number of nodes
+    /// thus grows by at most a constant factor with each order.
     pub fn derivative(&mut self, variable: u32) -> Option<Id> {
         let mut d: Vec<Option<Id>> = Vec::with_capacity(self.nodes().len());
         for id in 0..self.nodes().len() {
@@ -99,7 +99,7 @@ impl Graph {
                     let log = self.unary(Unary::Log, a);
                     let outer = self.times(id, log);
                     let term = self.times(outer, db);
-                    // 0^g = 0 for every g > 0, where log 0 would make NaN of it
+                    // 0^g = 0 for every g > 0, but its rule contains log 0, which would give NaN
                     let zero = self.constant(0.0);
                     self.choice(Comparison::Equal, id, zero, [None, Some(term)])
                 });

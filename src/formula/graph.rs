@@ -1,9 +1,9 @@
-//! Formulas as a graph without two equal nodes: repeated parts cost once, in memory and in time.
+//! Formulas as a graph in which no two nodes are equal: repeated parts take memory and time once.
 
 use super::program;
 use std::collections::HashMap;
 
-/// Place of a node. Operands stand before the operation, so that every walk over a graph is a loop.
+/// Index of a node. Operands stand before the operation, so that every traversal of a graph is a loop.
 pub(super) type Id = u32;
 
 /// Operations of one operand.
@@ -21,7 +21,7 @@ pub(super) enum Unary {
     Sqrt,
     Abs,
     Erf,
-    /// −1, 0, 1 or NaN; only derivatives of `abs` hold it.
+    /// −1, 0, 1 or NaN. It is not in the language, and only derivatives of `abs` contain it.
     Sign,
 }
 
@@ -37,7 +37,7 @@ pub(super) enum Binary {
     Max,
 }
 
-/// What `if` asks.
+/// The comparison in the first place of `if`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Comparison {
     Less,
@@ -51,18 +51,18 @@ pub(super) enum Comparison {
 /// One operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Node {
-    /// The bits of the number, which can be hashed.
+    /// The bits of the number, which unlike the number can be hashed.
     Constant(u64),
     Variable(u32),
     Unary(Unary, Id),
     Binary(Binary, Id, Id),
-    /// A whole power, as a product.
+    /// A power with a whole exponent, computed as a product.
     Power(Id, i32),
-    /// Left and right side of the comparison, value if it holds, value if not.
+    /// Left and right side of the comparison, the value if it holds, and the value if not.
     Choice(Comparison, [Id; 4]),
 }
 
-/// Whole powers beyond this go through `powf`: a long product loses digits.
+/// Whole powers above this are computed by `powf`: a long product loses digits.
 const MAX_PRODUCT: f64 = 32.0;
 
 impl Node {
@@ -77,7 +77,7 @@ impl Node {
         }
     }
 
-    /// Visits the operands.
+    /// Calls a function for each operand.
     pub fn each(self, mut visit: impl FnMut(Id)) {
         self.map(|id| {
             visit(id);
@@ -86,7 +86,7 @@ impl Node {
     }
 }
 
-/// Nodes in the order they were made, and where each stands.
+/// The nodes in the order in which they were made, with an index to find equal ones.
 #[derive(Default)]
 pub(super) struct Graph {
     nodes: Vec<Node>,
@@ -103,7 +103,7 @@ impl Graph {
         self.place(Node::Constant(value.to_bits()))
     }
 
-    /// The number that a node is, if it is one.
+    /// The number that a node stands for, if it is a constant.
     pub fn value(&self, id: Id) -> Option<f64> {
         match self.nodes[id as usize] {
             Node::Constant(bits) => Some(f64::from_bits(bits)),
@@ -111,8 +111,7 @@ impl Graph {
         }
     }
 
-    /// An operation, simplified where no operand can tell the difference: `0*x` and `x + 0` are not, because of NaN, ∞
-    /// and −0.
+    /// Adds an operation, simplified where that changes no value. `0*x` and `x + 0` stay, because of NaN, ∞ and −0.
     pub fn push(&mut self, node: Node) -> Id {
         use Binary::{Divide, Multiply, Power, Subtract};
         if let Some(value) = self.folded(node) {
@@ -146,7 +145,7 @@ impl Graph {
         }
     }
 
-    /// Its value, if all operands are numbers.
+    /// The value of an operation if all its operands are constants.
     fn folded(&self, node: Node) -> Option<f64> {
         let (mut operands, mut known) = (Vec::new(), true);
         let local = node.map(|id| {
@@ -159,10 +158,10 @@ impl Graph {
         Some(value[0])
     }
 
-    /// A node as it is, unless it stands there already.
+    /// Adds a node without simplification, unless there is an equal one.
     fn place(&mut self, node: Node) -> Id {
         let node = match node {
-            // a + b = b + a to the last bit
+            // a + b and b + a are the same to the last bit
             Node::Binary(f @ (Binary::Add | Binary::Multiply), a, b) => Node::Binary(f, a.min(b), a.max(b)),
             node => node,
         };
@@ -172,7 +171,7 @@ impl Graph {
         })
     }
 
-    /// Takes over the nodes of another graph; returns where they are now.
+    /// Copies the nodes of another graph, and returns their new indices.
     pub fn import(&mut self, nodes: &[Node]) -> Vec<Id> {
         let mut ids = Vec::with_capacity(nodes.len());
         for node in nodes {
@@ -182,7 +181,7 @@ impl Graph {
         ids
     }
 
-    /// The nodes that the value of one of them needs, itself the last.
+    /// The nodes that the value of one node depends on; the node itself comes last.
     pub fn only(&self, root: Id) -> Vec<Node> {
         let mut needed = vec![false; root as usize + 1];
         needed[root as usize] = true;
@@ -195,7 +194,7 @@ impl Graph {
     }
 }
 
-/// The nodes in another order, operands still first, and the new place of each.
+/// The nodes in another order, in which operands still come first, and the new index of each.
 pub(super) fn reordered(nodes: &[Node], order: impl Iterator<Item = Id>) -> (Vec<Node>, Vec<Id>) {
     let (mut out, mut places) = (Vec::new(), vec![0; nodes.len()]);
     for id in order {

@@ -1,12 +1,12 @@
 //! Formulas of a few variables, with exact derivatives of any order.
 //!
-//! A [`Formula`] is read from text by whoever owns its variables: `x y t` for a prescribed field, `u v x y t` for a PDE,
-//! `x` for a density. A [`Program`] evaluates several of them at many points, each common part once.
+//! A [`Formula`] is parsed from text with the names of its variables: `x y t` for a prescribed field, `u v x y t` for a
+//! PDE, `x` for a density. A [`Program`] evaluates several formulas at many points and computes common parts once.
 //!
 //! | | |
 //! |---|---|
 //! | numbers | `1`, `.5`, `1e-3`, `2.5E+4`; the constants `pi` and `e` |
-//! | operators | `+ - * / ^ ( )`; `^` goes before a sign and to the right: `-2^2` is -4, `2^3^2` is 512, `2^-1` is 0.5 |
+//! | operators | `+ - * / ^ ( )`; `^` binds tighter than a sign, and to the right: `-2^2` is -4, `2^3^2` is 512 |
 //! | functions | `sin cos tan sinh cosh tanh exp log sqrt abs erf min max`; `log` is the natural logarithm |
 //! | cases | `if(x < 0, a, b)`, with one of `< <= > >= == !=` in its first place and nowhere else |
 //!
@@ -15,15 +15,15 @@
 //!
 //! # Derivatives
 //!
-//! Derivatives are again formulas, by the rules of calculus. Where there is none, they take a side: |f|′ = 0 at f = 0;
-//! `min`, `max` and `if` have the derivative of the branch taken, `min` and `max` that of their first argument in a tie.
+//! Derivatives are formulas again. Where a function has none, a side is chosen: |f|′ = 0 at f = 0; `min`, `max` and
+//! `if` have the derivative of the branch that is taken, and `min` and `max` of equal arguments that of the first one.
 //!
 //! ```text
 //! (fᶜ)′ = c fᶜ⁻¹ f′,   (f^g)′ = g f^(g−1) f′ + f^g log(f) g′
 //! ```
 //!
-//! The second rule holds only where g depends on the variable, its last term being 0 where f^g is. Terms without the
-//! variable are dropped, even where they would multiply an infinite value.
+//! The second rule applies only where g depends on the variable; its last term is 0 where f^g is. Terms that do not
+//! depend on the variable are dropped, even where they would multiply an infinite value.
 
 mod derivative;
 mod graph;
@@ -40,11 +40,11 @@ use graph::{Graph, Node};
 use std::fmt;
 use std::ops::Range;
 
-/// Longest text that is read, in bytes.
+/// Longest text that is parsed, in bytes.
 pub const MAX_LENGTH: usize = 10_000;
-/// Deepest nesting of parentheses, signs and powers.
+/// Deepest nesting of parentheses, signs and powers: the parser calls itself for each.
 pub const MAX_DEPTH: usize = 100;
-/// Most operations that a derivative may take, equal ones counted once.
+/// Largest number of operations in a derivative, with equal ones counted once.
 pub const MAX_OPERATIONS: usize = 100_000;
 
 /// What is wrong with a formula, and where.
@@ -53,7 +53,7 @@ pub const MAX_OPERATIONS: usize = 100_000;
 pub struct Mistake {
     /// What is wrong.
     pub message: String,
-    /// The bytes of the text that are meant, on character boundaries; empty where the text is not to blame.
+    /// The bytes of the text to point at, on character boundaries; empty where no part of the text is wrong.
     pub at: Range<usize>,
     /// The remedy, where there is one.
     pub help: Option<String>,
@@ -90,7 +90,7 @@ impl Mistake {
 pub struct Formula {
     text: String,
     variables: Vec<String>,
-    /// Variables it was differentiated by, first one first.
+    /// Variables by which it was differentiated, in that order.
     by: Vec<usize>,
     /// Operands before operations; the last one is the value.
     nodes: Vec<Node>,
@@ -100,15 +100,16 @@ impl Formula {
     /// Reads a formula of the given variables.
     ///
     /// # Errors
-    /// A [`Mistake`] where the text is no formula, is longer than [`MAX_LENGTH`] or deeper than [`MAX_DEPTH`]; also
-    /// where a variable is no name, is given twice or has the name of a function or constant (`at` is then empty).
+    /// A [`Mistake`] where the text is no formula, is longer than [`MAX_LENGTH`] or nested deeper than [`MAX_DEPTH`];
+    /// also where the name of a variable is not a name, occurs twice, or is that of a function or constant (`at` is
+    /// then empty).
     pub fn parse(text: &str, variables: &[&str]) -> Result<Self, Mistake> {
         let (graph, root) = parse::parse(text, variables)?;
         let variables = variables.iter().map(|name| name.to_string()).collect();
         Ok(Self { text: text.into(), variables, by: Vec::new(), nodes: graph.only(root) })
     }
 
-    /// The text as it was parsed, for a derivative that of the formula it comes from.
+    /// The text that was parsed. A derivative has the text of the original formula.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -118,7 +119,7 @@ impl Formula {
         &self.variables
     }
 
-    /// True if the variable is left in the formula: in `0*x` it is, in the derivative of `3*x` by `x` it is not.
+    /// Whether the formula contains the variable: `0*x` does, and the derivative of `3*x` by `x` does not.
     pub fn depends_on(&self, variable: usize) -> bool {
         self.nodes.iter().any(|node| matches!(node, Node::Variable(v) if *v as usize == variable))
     }
@@ -142,7 +143,7 @@ impl Formula {
         Ok(Self { by, nodes: graph.only(root), text: self.text.clone(), variables: self.variables.clone() })
     }
 
-    /// The value at one point; a variable without a value is NaN. A [`Program`] is faster for many points.
+    /// The value at one point; a variable without a value counts as NaN. A [`Program`] is faster for many points.
     pub fn eval(&self, values: &[f64]) -> f64 {
         let (mut small, mut large) = ([0.0; 64], Vec::new());
         let done = match small.get_mut(..self.nodes.len()) {
@@ -174,7 +175,7 @@ impl fmt::Display for Formula {
     }
 }
 
-/// Equal if written alike: the same text, variables and derivatives.
+/// Formulas are equal if they are written alike: the same text, variables and derivatives.
 impl PartialEq for Formula {
     fn eq(&self, other: &Self) -> bool {
         (&self.text, &self.variables, &self.by) == (&other.text, &other.variables, &other.by)

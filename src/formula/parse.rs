@@ -1,4 +1,4 @@
-//! Text → graph, by recursive descent, without a tree between them.
+//! Parses text into the graph of a formula by recursive descent, without a syntax tree in between.
 
 use super::graph::{Binary, Comparison, Graph, Id, Node, Unary};
 use super::tokens::{COMPARISONS, Token, is_letter, is_start, shortened, tokens};
@@ -33,7 +33,7 @@ const FUNCTIONS: [(&str, Function); 14] = [
     ("if", Function::If),
 ];
 
-/// What other languages have, for which the nearest name here would mislead.
+/// Names from other languages for which the nearest name here would mislead, with what to write instead.
 const ABSENT: [(&str, &str); 17] = [
     ("ln", "the natural logarithm is log(…)"),
     ("log10", "write log(…)/log(10)"),
@@ -54,7 +54,7 @@ const ABSENT: [(&str, &str); 17] = [
     ("or", "put one if(…) into another"),
 ];
 
-/// Reads a formula into a graph; also returns the node that is its value.
+/// Parses a formula into a graph, and returns the node of its value as well.
 pub(super) fn parse(text: &str, variables: &[&str]) -> Result<(Graph, Id)> {
     check_variables(variables)?;
     if text.len() > MAX_LENGTH {
@@ -96,7 +96,7 @@ enum Value {
     Truth(Comparison, Id, Id),
 }
 
-/// A part of the formula and where it stands.
+/// A part of the formula, and its place in the text.
 struct Part {
     value: Value,
     span: Range<usize>,
@@ -120,7 +120,7 @@ impl Parser<'_> {
         self.tokens[self.next].1.clone()
     }
 
-    /// Steps over a token, never over the end, and returns its place.
+    /// Moves past a token, but not past the end, and returns its place.
     fn skip(&mut self) -> Range<usize> {
         let span = self.span();
         self.next = (self.next + 1).min(self.tokens.len() - 1);
@@ -141,7 +141,7 @@ impl Parser<'_> {
         Part { value: Value::Number(self.graph.push(node)), span }
     }
 
-    /// The node of a part that must be a number.
+    /// The node of a part, which must be a number and not a comparison.
     fn number(&self, part: &Part) -> Result<Id> {
         match part.value {
             Value::Number(id) => Ok(id),
@@ -174,7 +174,7 @@ impl Parser<'_> {
         self.row(&[("*", Binary::Multiply), ("/", Binary::Divide)], Self::signed)
     }
 
-    /// Operations of one rank, from left to right.
+    /// Operations of equal precedence, from left to right.
     fn row(&mut self, operators: &[(&str, Binary)], operand: fn(&mut Self) -> Result<Part>) -> Result<Part> {
         let mut left = operand(self)?;
         while let Some(operator) = self.operator(operators) {
@@ -187,7 +187,7 @@ impl Parser<'_> {
         Ok(left)
     }
 
-    /// A power under signs. Whatever nests passes here.
+    /// A power with signs before it. All nesting goes through this function, which limits the depth.
     fn signed(&mut self) -> Result<Part> {
         if self.depth == MAX_DEPTH {
             let message = format!("the formula is nested deeper than {MAX_DEPTH} levels");
@@ -312,13 +312,13 @@ impl Parser<'_> {
         }
     }
 
-    /// A comma outside a call.
+    /// The mistake of a comma outside a function call.
     fn comma(&self) -> Mistake {
         Mistake::new(self.span(), "a comma stands only between the arguments of a function")
             .help("write a point in numbers, such as 1.5")
     }
 
-    /// An operator, a comma or a parenthesis where something to work on is due.
+    /// The mistake of an operator, comma or parenthesis in the place of an operand.
     fn missing(&self) -> Mistake {
         let sign = |span: Range<usize>| &self.text[span];
         match (self.before(), self.token()) {
@@ -332,7 +332,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Two operands side by side.
+    /// The mistake of two operands without an operator between them.
     fn juxtaposed(&self) -> Mistake {
         let (token, before) = self.before().unwrap_or((Token::End, 0..0));
         let (left, right) = (shortened(&self.text[before.clone()]), shortened(&self.text[self.span()]));
@@ -351,7 +351,7 @@ impl Parser<'_> {
             .chain(FUNCTIONS.iter().map(|(name, _)| *name))
             .collect();
         let lower = name.to_ascii_lowercase();
-        // short names all lie near each other: at most every other letter may differ
+        // short names are all similar, so a suggestion may differ in every other letter at most
         let distance = |k: &str| strsim::damerau_levenshtein(&lower, &k.to_ascii_lowercase());
         let nearest = (known.iter().map(|k| (distance(k), (!lower.starts_with(k), k.len().abs_diff(name.len())), *k)))
             .filter(|(distance, _, k)| *distance <= (k.len().min(name.len()) / 2).min(2))

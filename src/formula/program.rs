@@ -1,15 +1,17 @@
 use super::Formula;
 use super::graph::{Binary, Comparison, Graph, Id, Node, Unary, reordered};
 
-/// Doubles that stay in the second cache: the registers of one block of points.
+/// Number of doubles in the registers of one block of points: they fit the second-level cache.
 const CACHE: usize = 16384;
 
-/// Several formulas compiled for many points, their common parts computed once
+/// Several formulas compiled for evaluation at many points, with common parts computed once
 ///
-/// The first P variables have a value a point; the others, such as the time, are shared by all points of a call, and what
-/// depends on these alone is computed once a call. Formulas meet by the place of a variable, not by its name.
+/// The first P variables have a value at each point. The others, such as the time, are shared by all points of a call,
+/// and what depends on these alone is computed once in a call. Variables of different formulas are the same if they
+/// have the same index, whatever their names.
 ///
-/// Points pass in blocks, operation by operation. Every value has the bits of [`Formula::eval`].
+/// Points are evaluated in blocks, one operation after the other. Every value has the same bits as that of
+/// [`Formula::eval`].
 ///
 /// # Example
 /// ```
@@ -24,7 +26,7 @@ const CACHE: usize = 16384;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Program<const P: usize, const K: usize> {
-    /// Operands first; before all others the `shared` operations that no variable of a point reaches.
+    /// Operands before operations, and before all others the `shared` ones that do not depend on variables of a point.
     pub(super) nodes: Vec<Node>,
     shared: usize,
     roots: [Id; K],
@@ -53,8 +55,8 @@ impl<const P: usize, const K: usize> Program<P, K> {
         out[0]
     }
 
-    /// The values of all formulas at every point, as many as the shorter slice holds. `shared` has the values of the
-    /// variables from place P on; one without a value is NaN.
+    /// The values of all formulas at every point, for as many points as the shorter of both slices holds. `shared`
+    /// holds the values of the variables from index P on; a missing value counts as NaN.
     pub fn eval_each(&self, points: &[[f64; P]], shared: &[f64], out: &mut [[f64; K]]) {
         let width = (CACHE / self.nodes.len().max(1)).clamp(8, 128).min(points.len()).max(1);
         let mut rows = vec![0.0; self.nodes.len() * width];
@@ -82,10 +84,10 @@ impl<const P: usize, const K: usize> Program<P, K> {
     }
 }
 
-/// One operation on rows of `width` values, of which `to` has the first ones. Variables are the caller's.
+/// One operation on rows of `width` values, the results of which go to `to`. Variables are set by the caller.
 ///
-/// All that an operation means stands here, for one point, for many and for constants alike; inlined, because for one
-/// point the rows fall away.
+/// Every operation is defined here alone, for one point, for many points and for constants. The function is inlined, so
+/// that for one point the loops over rows disappear.
 #[inline(always)]
 pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
     let lanes = to.len();
@@ -119,7 +121,7 @@ pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
                 Binary::Multiply => pairs(to, a, b, |a, b| a * b),
                 Binary::Divide => pairs(to, a, b, |a, b| a / b),
                 Binary::Power => pairs(to, a, b, f64::powf),
-                // std's drop NaN
+                // the functions of the standard library drop NaN
                 Binary::Min => pairs(to, a, b, |a, b| if b < a || b.is_nan() { b } else { a }),
                 Binary::Max => pairs(to, a, b, |a, b| if b > a || b.is_nan() { b } else { a }),
             }
@@ -127,7 +129,7 @@ pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
         Node::Power(a, n) => {
             let a = row(a);
             match n {
-                // without a loop a lane
+                // a square takes no loop in each lane
                 2 => each(to, a, |a| power(a, 2)),
                 3 => each(to, a, |a| power(a, 3)),
                 4 => each(to, a, |a| power(a, 4)),
@@ -155,7 +157,7 @@ fn pairs(to: &mut [f64], a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
     to.iter_mut().zip(a).zip(b).for_each(|((to, a), b)| *to = f(*a, *b));
 }
 
-/// aⁿ by repeated squaring; `powi` may round differently from call to call.
+/// aⁿ by repeated squaring; the result of `powi` may be rounded differently from call to call.
 #[inline(always)]
 fn power(a: f64, n: i32) -> f64 {
     let (mut square, mut rest, mut product) = (a, n.unsigned_abs(), 1.0);
@@ -170,7 +172,7 @@ fn power(a: f64, n: i32) -> f64 {
 }
 
 impl Comparison {
-    /// Whether it holds; next to NaN only `!=` does.
+    /// Whether the comparison holds; with NaN only `!=` does.
     #[inline]
     pub fn holds(self, left: f64, right: f64) -> bool {
         match self {

@@ -208,7 +208,7 @@ fn trees() -> impl Strategy<Value = Tree> {
             5 => (prop::sample::select(&["+", "-", "*", "/", "^", "min", "max"][..]), inner.clone(), inner.clone())
                 .prop_map(|(f, a, b)| Tree::Binary(f, a.into(), b.into())),
             1 => (inner.clone(), -3..5i32).prop_map(|(a, n)| Tree::Power(a.into(), n)),
-            1 => (prop::sample::select(&["<", "<=", ">", ">="][..]), [inner.clone(), inner.clone(), inner.clone(), inner])
+            1 => (prop::sample::select(&["<", "<=", ">", ">="][..]), std::array::from_fn::<_, 4, _>(|_| inner.clone()))
                 .prop_map(|(c, parts)| Tree::If(c, parts.into())),
         ]
     })
@@ -342,7 +342,12 @@ proptest! {
                 for (k, f) in all.iter().enumerate() {
                     let found = f.eval(&at);
                     let error = (found - expected[k]).abs();
-                    prop_assert!(error <= 1e-13 * hard.powi(3), "order {k} of {} at {at:?}: {found}, {}", tree.text(), expected[k]);
+                    let text = tree.text();
+                    prop_assert!(
+                        error <= 1e-13 * hard.powi(3),
+                        "order {k} of {text} at {at:?}: {found}, {}",
+                        expected[k]
+                    );
                 }
             }
         }
@@ -376,7 +381,8 @@ proptest! {
         any::<String>(),
         "[xyt0-9.eE+*/^(),<>=! -]{0,40}",
         prop::collection::vec(prop::sample::select(&[
-            "x", "y", "2", "1e5", ".5", "pi", "sin", "if", "max", "(", ")", "(", ")", ",", "+", "-", "*", "^", "<", "==", " ", "²", "é",
+            "x", "y", "2", "1e5", ".5", "pi", "sin", "if", "max", "(", ")", "(", ")", ",", "+", "-", "*", "^", "<",
+            "==", " ", "²", "é",
         ][..]), 0..25).prop_map(|parts| parts.concat()),
     ]) {
         match Formula::parse(&text, &XYT) {

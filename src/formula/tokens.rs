@@ -1,4 +1,4 @@
-//! Text → tokens.
+//! Splits text into tokens.
 
 use super::Mistake;
 use super::graph::Comparison;
@@ -15,7 +15,7 @@ pub(super) const COMPARISONS: [(&str, Comparison); 6] = [
     (">", Comparison::Greater),
 ];
 
-/// What stands in texts where a symbol was meant.
+/// Texts of other languages in the place of a symbol, with what to write instead.
 const FOREIGN: [(&str, &str); 16] = [
     ("**", "write ^ for powers"),
     ("&", "put one if(…) into another"),
@@ -51,13 +51,13 @@ pub(super) fn is_letter(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_'
 }
 
-/// At most so much of a text as a message can bear, on one line.
+/// A text shortened to what a message can hold, on one line.
 pub(super) fn shortened(text: &str) -> String {
     let start: String = text.chars().take(40).flat_map(char::escape_debug).collect();
     if text.chars().nth(40).is_some() { format!("{start}…") } else { start }
 }
 
-/// The tokens with their places, `End` the last.
+/// The tokens with their places in the text, ended by `End`.
 pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Range<usize>)>> {
     let mut tokens = Vec::new();
     let mut at = 0;
@@ -84,7 +84,7 @@ fn number(rest: &str, at: usize) -> Result<(Token, usize)> {
     let digits =
         |from: usize| rest[from..].find(|c| !matches!(c, '0'..='9' | '.' | '_')).map_or(rest.len(), |n| from + n);
     let mut end = digits(0);
-    // `2exp(x)` and `2e` have no exponent: there `e` begins a name
+    // `2exp(x)` and `2e` contain no exponent: there `e` begins a name
     let exponent = rest[end..].strip_prefix(['e', 'E']).map(|after| after.strip_prefix(['+', '-']).unwrap_or(after));
     if let Some(after) = exponent.filter(|after| after.starts_with(|c: char| c.is_ascii_digit())) {
         end = digits(rest.len() - after.len());
@@ -105,7 +105,7 @@ fn symbol(rest: &str, at: usize, c: char) -> Result<(Token, usize)> {
         .find(|sign| rest.starts_with(sign));
     match (ours, foreign) {
         (Some(sign), None) => Ok((Token::Symbol(sign), sign.len())),
-        // == and != begin like signs that are none
+        // == and != begin like signs that mean nothing alone
         (Some(sign), Some((other, _))) if sign.len() > other.len() => Ok((Token::Symbol(sign), sign.len())),
         (_, Some((sign, help))) => {
             Err(Mistake::new(at..at + sign.len(), format!("`{sign}` has no meaning in a formula")).help(*help))

@@ -5,16 +5,17 @@ use crate::parallel;
 /// Finite-volume geometry of a mesh: the dual cell of every node
 ///
 /// ```text
-/// c_ij = ¼ (x_ij + x_{i+1,j} + x_{i,j+1} + x_{i+1,j+1}),   dual cell of node (i, j): c_{i−1,j−1}, c_{i,j−1}, c_ij, c_{i−1,j}
+/// c_ij = ¼ (x_ij + x_{i+1,j} + x_{i,j+1} + x_{i+1,j+1})
+/// dual cell of node (i, j): c_{i−1,j−1}, c_{i,j−1}, c_ij, c_{i−1,j}
 /// face to (i+1, j):  t = c_ij − c_{i,j−1},      face to (i, j+1):  t = c_{i−1,j} − c_ij,      N = (t_y, −t_x)
 /// ```
 ///
-/// N points to the neighbour above and is as long as the face. The cells tile the box. Beyond a bounded side the side's
-/// own nodes are repeated, so that the centres there are the middles of its edges: side nodes have half cells, corners
+/// N points to the node above and is as long as the face. The cells tile the box. Beyond a bounded side its own nodes
+/// are repeated, so that the cell centres there are the middles of its edges: nodes on a side have half cells, corners
 /// quarters, and the outermost faces lie on the side.
 ///
-/// Faces are stored with the node below them, padded as on [`patch`](Self::patch), images of periodic axes included bit
-/// by bit: what leaves one cell enters the next.
+/// A face is stored with the node below it, in arrays padded like those of [`patch`](Self::patch). Images on periodic
+/// axes are equal to the last bit, so that what leaves one cell enters the next.
 ///
 /// # Example
 /// ```
@@ -74,7 +75,7 @@ impl DualCells {
         Self { patch, centres, normals, areas }
     }
 
-    /// All nodes, those on bounded sides included.
+    /// The patch of all nodes, those on bounded sides included.
     pub fn patch(&self) -> &Patch<2> {
         &self.patch
     }
@@ -89,8 +90,8 @@ impl DualCells {
         &self.normals
     }
 
-    /// Areas that the faces sweep in the direction of N on the way to `later`, the dual cells of another mesh over the
-    /// same lattice, padded like [`normals`](Self::normals)
+    /// The areas that the faces sweep in the direction of N on the way to `later`, the dual cells of another mesh over
+    /// the same lattice. They are padded like [`normals`](Self::normals).
     ///
     /// ```text
     /// s = d × ½ (t + t′),   d = the mean displacement of the two ends of the face
@@ -100,7 +101,8 @@ impl DualCells {
     /// the geometric conservation law.
     ///
     /// # Source
-    /// Thomas and Lombard, *Geometric conservation law and its application to flow computations on moving grids* (1979).
+    /// Thomas and Lombard, *Geometric conservation law and its application to flow computations on moving grids*
+    /// (1979).
     pub fn swept(&self, later: &Self) -> Vec<[f64; 2]> {
         debug_assert_eq!(self.patch, later.patch);
         let ([n, m], s) = (self.patch.size, self.patch.size[1] + 2);
@@ -127,11 +129,12 @@ impl DualCells {
     }
 }
 
-/// Nodal values with a ring around them, padded like [`DualCells::patch`]: images across periodic axes, `jump[d]` further
-/// for each turn around axis d, and beyond bounded sides the side's own values again.
+/// Nodal values with a ring around them, padded like [`DualCells::patch`]. Across a periodic axis the ring holds
+/// images, to which `jump[d]` is added for each turn around axis d; beyond a bounded side it repeats the values of the
+/// side.
 pub fn padded<const K: usize>(lattice: &Lattice<2>, values: &[[f64; K]], jump: [[f64; K]; 2]) -> Vec<[f64; K]> {
     let ([n, m], wraps) = (lattice.nodes(), lattice.periodic());
-    // the node at a padded place, and how often it lies around the axis
+    // the node at a padded place, and how many turns around the axis lead there
     let along = |d: usize, place: usize, n: usize| {
         let above = place + n - 1;
         if wraps[d] { (above % n, (above / n) as f64 - 1.0) } else { (place.clamp(1, n) - 1, 0.0) }
@@ -153,7 +156,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A mesh of [0, 2] × [−1, 2] with every node up to 0.3 cells away from its uniform place, side nodes on their sides.
+    /// A mesh of [0, 2] × [−1, 2] with every node up to 0.3 cells away from its uniform place, side nodes on their
+    /// sides.
     fn random(cells: [usize; 2], periodic: [bool; 2], seed: u64) -> Mesh<2> {
         let mesh = Mesh::uniform(Lattice::new(cells, periodic).unwrap(), [0.0, -1.0], [2.0, 2.0]).unwrap();
         let mut state = seed;

@@ -27,7 +27,7 @@ impl Field {
         Self { components: K, values: values.into_flattened() }
     }
 
-    /// A field of so many unknowns from all values, node by node.
+    /// A field of a number of unknowns from all values, node by node.
     ///
     /// # Example
     /// ```
@@ -37,7 +37,7 @@ impl Field {
     /// ```
     ///
     /// # Errors
-    /// [`Failure::OutOfRange`] where the values are not as many for every node, or there is no unknown.
+    /// [`Failure::OutOfRange`] where the number of values is no multiple of the number of unknowns, or that is 0.
     pub fn of(components: usize, values: Vec<f64>) -> Result<Self, Failure> {
         if components == 0 || !values.len().is_multiple_of(components) {
             let rule = format!("{} values must be as many for every node", values.len());
@@ -60,7 +60,7 @@ impl Field {
     /// ```
     ///
     /// # Errors
-    /// [`Failure::WrongLength`] where an unknown has other nodes than the first.
+    /// [`Failure::WrongLength`] where an unknown has another number of nodes than the first.
     pub fn joined(unknowns: &[Vec<f64>]) -> Result<Self, Failure> {
         let nodes = unknowns.first().map_or(0, Vec::len);
         if let Some(other) = unknowns.iter().find(|values| values.len() != nodes) {
@@ -70,7 +70,7 @@ impl Field {
         Ok(Self { components: unknowns.len().max(1), values })
     }
 
-    /// Unknowns a node.
+    /// Number of unknowns at a node.
     pub fn components(&self) -> usize {
         self.components
     }
@@ -96,7 +96,7 @@ impl Field {
     }
 }
 
-/// max |value|, in vectors; a NaN is lost.
+/// The largest |value|, computed in vectors. A NaN does not show in it.
 #[inline(always)]
 pub(crate) fn largest(values: &[f64]) -> f64 {
     let (lanes, rest) = values.as_chunks::<8>();

@@ -13,7 +13,7 @@ use crate::error::Failure;
 /// det(x_{c+e_1} − x_c, …, x_{c+e_D} − x_c) ≤ 0,
 /// ```
 ///
-/// edges that run against their axis taken with the opposite sign.
+/// where edges that run against their axis are taken with the opposite sign.
 ///
 /// # Errors
 /// [`Failure::NonFinite`] for the first such node, else [`Failure::Folded`] for the worst cell.
@@ -40,7 +40,7 @@ pub fn check_unfolded<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
             for corner in 0..1 << D {
                 let at = (0..D).filter(|d| corner >> d & 1 == 1).map(|d| steps[d]).sum::<usize>() + cell;
                 let volume = corner_volume(&x, at, corner, steps);
-                // not `<=` alone: a volume that overflowed to NaN is not positive either
+                // not `<=` alone: a volume that overflowed to NaN is not positive either, and NaN is not ≤ 0
                 if volume.is_nan() || volume <= worst.map_or(0.0, |worst| worst.0) {
                     worst = Some((volume, cell, at));
                 }
@@ -66,7 +66,7 @@ fn pencils<const D: usize>(cells: [usize; D], steps: [usize; D]) -> impl Iterato
     })
 }
 
-/// What the edges from a corner span.
+/// The volume that the edges from a corner span.
 fn corner_volume<const D: usize>(x: &[[f64; D]], at: usize, corner: usize, steps: [usize; D]) -> f64 {
     determinant::<D>(std::array::from_fn(|d| {
         let upper = corner >> d & 1 == 1;
@@ -75,7 +75,7 @@ fn corner_volume<const D: usize>(x: &[[f64; D]], at: usize, corner: usize, steps
     }))
 }
 
-/// Of up to three rows.
+/// The determinant of up to three rows.
 fn determinant<const D: usize>(rows: [[f64; D]; D]) -> f64 {
     let cross = |a: usize, b: usize, c: usize, d: usize| rows[a][c] * rows[b][d] - rows[a][d] * rows[b][c];
     match D {

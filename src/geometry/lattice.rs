@@ -77,7 +77,7 @@ impl<const D: usize> Lattice<D> {
         self.cells.map(|n| 1.0 / n as f64)
     }
 
-    /// How far apart in memory two neighbours along each axis are.
+    /// Distance in memory between neighbours along each axis.
     pub fn strides(&self) -> [usize; D] {
         strides(self.nodes())
     }
@@ -100,7 +100,7 @@ impl<const D: usize> Lattice<D> {
         )
     }
 
-    /// Which bounded sides a node stands on: at the lower and upper end of each axis.
+    /// Whether a node stands on the bounded side at the lower and at the upper end of each axis.
     pub fn beyond(&self, index: usize) -> [[bool; 2]; D] {
         let (node, nodes) = (self.node(index), self.nodes());
         std::array::from_fn(|d| [node[d] == 0, node[d] + 1 == nodes[d]].map(|at_end| at_end && !self.periodic[d]))

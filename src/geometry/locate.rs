@@ -1,11 +1,12 @@
 use super::Mesh;
 
-/// Carries a nodal field from one mesh to the nodes of another over the same lattice and box
+/// Interpolates a nodal field from one mesh to the nodes of another over the same lattice and box
 ///
-/// Every cell is two triangles, cut along its diagonal from (i, j) to (i+1, j+1), and the field is linear on each. A
-/// node is searched from its own cell outwards, so meshes that differ by one time step cost a few tests a node; on periodic
-/// axes the image next to that cell is searched for, so that meshes may have drifted by any number of periods. Points outside
-/// a bounded box take the value of the nearest point of the cell where the search ends.
+/// Every cell is divided into two triangles by its diagonal from (i, j) to (i+1, j+1), and the field is linear on each.
+/// The search for a node begins in the cell with its index, so that meshes that differ by one time step cost a few
+/// tests for each node. On periodic axes the image next to that cell is searched for: the meshes may have drifted apart
+/// by any number of periods. Points outside a bounded box take the value at the nearest point of the cell where the
+/// search ends.
 ///
 /// # Example
 /// ```
@@ -36,7 +37,8 @@ pub fn interpolate(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
         .collect()
 }
 
-/// The cell of a mesh, by its lowest corner, that holds each of some points; neighbours among them cost a few tests each.
+/// The cell of a mesh, by its lowest corner, that holds each of some points. The search begins in the cell of the point
+/// before, so that neighbouring points cost a few tests each.
 pub(crate) fn cells_of(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -> Vec<[usize; 2]> {
     let cells = Cells { mesh };
     let mut near = [0; 2];
@@ -48,7 +50,7 @@ pub(crate) fn cells_of(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -
     points.map(cell).collect()
 }
 
-/// Cells by signed index: on a periodic axis the cells continue beyond the box.
+/// The cells of a mesh by signed index, which on a periodic axis counts beyond the box.
 struct Cells<'a> {
     mesh: &'a Mesh<2>,
 }
@@ -66,7 +68,7 @@ impl Cells<'_> {
         (index, std::array::from_fn(|d| x[d] + [i, j][d].div_euclid(nodes[d] as isize) as f64 * extent[d]))
     }
 
-    /// Nodes and barycentric weights of the triangle that holds `point`, searching from cell `start`.
+    /// Nodes and barycentric weights of the triangle that holds `point`; the search begins in cell `start`.
     fn find(&self, point: [f64; 2], start: [isize; 2]) -> Triangle {
         let cells = self.mesh.lattice().cells().map(|n| n as isize);
         let periodic = self.mesh.lattice().periodic();
@@ -78,8 +80,8 @@ impl Cells<'_> {
             true => point[d] - extent[d] * ((point[d] - near[d]) / extent[d]).round(),
             false => point[d],
         });
-        // each cell is crossed at most once, and the image is at most a period away: more means that the walk is caught
-        // between cells that are not convex, and all of them are looked at
+        // A straight walk crosses each cell once at most, and the image is at most a period away. A longer walk is
+        // caught among cells that are not convex; then all cells are tried.
         let mut left = 4 * (cells[0] + cells[1]);
         loop {
             if left == 0 {
@@ -103,7 +105,7 @@ impl Cells<'_> {
         self.triangle(point, cell)
     }
 
-    /// The triangle that holds a point, or is nearest to it, of all.
+    /// Of all triangles the one that holds a point, or is nearest to it.
     fn nearest(&self, point: [f64; 2]) -> Triangle {
         let (cells, extent) = (self.mesh.lattice().cells().map(|n| n as isize), self.mesh.extent());
         let periodic = self.mesh.lattice().periodic();
@@ -140,7 +142,7 @@ impl Cells<'_> {
     }
 }
 
-/// Signed distance of a point to the right of the line from p to q: positive is outside a counter-clockwise cell.
+/// Signed distance of a point to the right of the line from p to q; positive outside a counter-clockwise cell.
 fn outside(point: [f64; 2], p: [f64; 2], q: [f64; 2]) -> f64 {
     let edge = [q[0] - p[0], q[1] - p[1]];
     let turn = edge[1] * (point[0] - p[0]) - edge[0] * (point[1] - p[1]);

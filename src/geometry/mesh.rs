@@ -30,8 +30,8 @@ impl<const D: usize> Mesh<D> {
     /// The uniform mesh of the box from `lower` to `upper`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless `lower < upper` along every axis, both are finite, and cells between them are far
-    /// larger than round-off.
+    /// [`Error::Invalid`] unless `lower < upper` along every axis, both are finite, and the cells are much larger than
+    /// the round-off of coordinates.
     pub fn uniform(lattice: Lattice<D>, lower: [f64; D], upper: [f64; D]) -> Result<Self> {
         for d in 0..D {
             if !lower[d].is_finite() {
@@ -41,7 +41,8 @@ impl<const D: usize> Mesh<D> {
                 let rule = format!("must be finite and above lower = {lower:?} along every axis");
                 return Err(Error::invalid("upper", format!("{upper:?}"), rule));
             }
-            // cells must be told apart from round-off, and areas from zero and infinity
+            // below 1e-12 of the largest coordinate a cell is lost in rounding, and extents beyond these give areas of
+            // 0 or ∞
             let (extent, size) = (upper[d] - lower[d], lower[d].abs().max(upper[d].abs()));
             if extent / (lattice.cells()[d] as f64) < 1e-12 * size || !(1e-100..1e100).contains(&extent) {
                 let rule =
@@ -62,7 +63,7 @@ impl<const D: usize> Mesh<D> {
         Ok(Self { lattice, lower, upper, x })
     }
 
-    /// A mesh of any shape from one position a node in lattice order; its box is the smallest around it.
+    /// A mesh of any shape from the positions of its nodes in lattice order. Its box is the smallest one around them.
     ///
     /// # Errors
     /// [`Error::Invalid`] where an axis is periodic; [`Failure::WrongLength`] where the number of positions is not the
@@ -84,11 +85,11 @@ impl<const D: usize> Mesh<D> {
         Ok(Self { lattice, lower, upper, x })
     }
 
-    /// The same lattice and box with other positions, one a node in lattice order.
+    /// A mesh over the same lattice and box with other positions of the nodes, in lattice order.
     ///
     /// # Errors
-    /// [`Failure::WrongLength`] where the number of positions is not the number of nodes; [`Failure::NonFinite`] for the
-    /// first position that is not finite.
+    /// [`Failure::WrongLength`] where the number of positions is not the number of nodes; [`Failure::NonFinite`] for
+    /// the first position that is not finite.
     pub fn moved(&self, x: Vec<[f64; D]>) -> Result<Self, Failure> {
         check_length(&self.lattice, "the mesh", x.len())?;
         if let Some(k) = x.iter().position(|x| !x.iter().all(|v| v.is_finite())) {
@@ -99,8 +100,8 @@ impl<const D: usize> Mesh<D> {
         Ok(Self { x, ..*self })
     }
 
-    /// The map from the computational domain to the mesh on a lattice of other `cells`, linear between the nodes of this one
-    /// along each axis.
+    /// This mesh on a lattice of other `cells`: the same map from the computational domain, linear between the nodes of
+    /// this mesh along each axis.
     ///
     /// # Errors
     /// [`Error::Invalid`] where `cells` make no lattice.
@@ -117,7 +118,8 @@ impl<const D: usize> Mesh<D> {
         let (x, here) = (self.closed(), self.lattice.cells());
         let strides = strides(here.map(|n| n + 1));
         let at = |node: [usize; D]| {
-            // the cell that a node lies in, the last one for the upper end, and how far from its lower end
+            // the cell that a node lies in, which at the upper end of the axis is the last one, and its distance from
+            // the lower end
             let cell: [usize; D] = std::array::from_fn(|d| (node[d] * here[d] / cells[d]).min(here[d] - 1));
             let share: [f64; D] =
                 std::array::from_fn(|d| (node[d] * here[d] - cell[d] * cells[d]) as f64 / cells[d] as f64);
@@ -141,7 +143,7 @@ impl<const D: usize> Mesh<D> {
         &self.x
     }
 
-    /// The image of a point that lies in the box, on periodic axes; the point itself along others.
+    /// The image of a point inside the box. Along bounded axes it is the point itself.
     ///
     /// # Example
     /// ```
@@ -157,12 +159,12 @@ impl<const D: usize> Mesh<D> {
                 return x[d];
             }
             let inside = x[d] - (upper - lower) * ((x[d] - lower) / (upper - lower)).floor();
-            // round-off may leave it on the upper side, which is the lower one
+            // round-off may leave the image on the upper side, which is the same as the lower one
             if inside < upper { inside.max(lower) } else { lower }
         })
     }
 
-    /// The [images](Self::image) of all nodes: where formulas of x and y are evaluated.
+    /// The [images](Self::image) of all nodes, at which formulas of x and y are evaluated.
     pub fn images(&self) -> Cow<'_, [[f64; D]]> {
         match self.lattice.periodic().contains(&true) {
             false => Cow::Borrowed(&self.x),
@@ -170,7 +172,8 @@ impl<const D: usize> Mesh<D> {
         }
     }
 
-    /// Positions with the closing nodes of periodic axes appended, shape cells + 1: what is drawn and written.
+    /// Positions with the closing nodes of periodic axes appended, an array of shape cells + 1, as pictures and files
+    /// need them.
     pub fn closed(&self) -> Cow<'_, [[f64; D]]> {
         let nodes = self.lattice.nodes();
         if nodes == self.lattice.cells().map(|n| n + 1) {
@@ -199,12 +202,12 @@ impl<const D: usize> Mesh<D> {
         std::array::from_fn(|d| self.upper[d] - self.lower[d])
     }
 
-    /// A node and its place as failures tell them: with two coordinates, 0 as the second on a line.
+    /// Indices and position of a node, as failures carry them: with two entries, of which the second is 0 on a line.
     pub(crate) fn told(&self, k: usize) -> ([usize; 2], [f64; 2]) {
         (first_two(&self.lattice.node(k)), first_two(&self.x[k]))
     }
 
-    /// The longest way of a node from another mesh over the same lattice.
+    /// The largest distance of a node from its position in another mesh over the same lattice.
     pub fn farthest(&self, other: &Self) -> f64 {
         let way = |(a, b): (&[f64; D], &[f64; D])| (0..D).map(|d| (a[d] - b[d]) * (a[d] - b[d])).sum::<f64>();
         self.x.iter().zip(&other.x).map(way).fold(0.0, f64::max).sqrt()
@@ -220,7 +223,7 @@ impl<const D: usize> Mesh<D> {
             shortest = if length2 < shortest { length2 } else { shortest };
         };
         for d in 0..D {
-            // neighbours along an axis are a stride apart, within blocks of all its nodes
+            // neighbours along an axis lie a stride apart, within blocks of `size[d]` strides
             let stride = size[d + 1..].iter().product::<usize>();
             for block in x.chunks_exact(stride * size[d]) {
                 block.iter().zip(&block[stride..]).for_each(|(a, b)| measure(a, b));
@@ -230,7 +233,7 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-/// The first two of some numbers, 0 where there are fewer.
+/// The first two of some numbers, filled up with 0 where there are fewer.
 pub(super) fn first_two<T: Copy + Default>(values: &[T]) -> [T; 2] {
     [0, 1].map(|d| values.get(d).copied().unwrap_or_default())
 }

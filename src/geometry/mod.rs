@@ -1,4 +1,4 @@
-//! Where things are: the lattice of computational nodes, the mesh over it, fields on it, and how good the mesh is.
+//! The lattice of computational nodes, the mesh over it, fields on it, and the quality of the mesh.
 
 mod dual;
 mod field;

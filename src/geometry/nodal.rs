@@ -1,9 +1,9 @@
-//! Checks of one value a node.
+//! Checks of arrays that hold one value for each node.
 
 use super::{Lattice, Mesh};
 use crate::error::Failure;
 
-/// Refuses an array that has not one value a node.
+/// Refuses an array whose length is not the number of nodes.
 pub(crate) fn check_length<const D: usize>(
     lattice: &Lattice<D>,
     what: &'static str,
@@ -15,7 +15,7 @@ pub(crate) fn check_length<const D: usize>(
     }
 }
 
-/// Refuses values that are not one a node, not finite, or not above 0.
+/// Refuses an array whose length is not the number of nodes, and values that are not finite or not above 0.
 pub(crate) fn check_positive<const D: usize>(
     mesh: &Mesh<D>,
     what: &'static str,

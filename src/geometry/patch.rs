@@ -2,9 +2,10 @@ use super::{Lattice, strides};
 
 /// A box of unknown nodes with a ring of known ones around it
 ///
-/// The unit in which mesh equations are solved. Vectors over a patch are *padded*: they hold the ring too, so that a
-/// stencil never asks whether a neighbour exists. What the ring means depends on the axis: given values (a side of the
-/// domain, an interface between subdomains), or, where `wraps` is set, images of the opposite nodes.
+/// Mesh equations are solved patch by patch. Vectors over a patch are *padded*: they also hold the ring, so that a
+/// stencil never has to ask whether a neighbour exists. Along an axis with `wraps` the ring holds images of the
+/// opposite nodes; along another one it holds given values, on a side of the domain or on an interface between
+/// subdomains.
 ///
 /// The same type serves the whole domain, one subdomain of many, and one side of the domain (D = 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +40,7 @@ impl<const D: usize> Patch<D> {
         self.size.iter().map(|n| n + 2).product()
     }
 
-    /// How far apart in a padded vector two neighbours along each axis are.
+    /// Distance in a padded vector between neighbours along each axis.
     pub fn padded_strides(&self) -> [usize; D] {
         strides(self.size.map(|n| n + 2))
     }
@@ -54,7 +55,7 @@ impl<const D: usize> Patch<D> {
         self.size[..D - 1].iter().product()
     }
 
-    /// Where the p-th run of unknowns along the last axis starts in a padded vector.
+    /// The start, in a padded vector, of the p-th pencil, which is a run of unknowns along the last axis.
     pub fn pencil(&self, p: usize) -> usize {
         let strides = self.padded_strides();
         let mut rest = p;
@@ -66,7 +67,8 @@ impl<const D: usize> Patch<D> {
         start
     }
 
-    /// The pencil in the q-th row of a padded vector cut into rows of `pencil_len() + 2`; none in rows of the ring.
+    /// The pencil in the q-th row of a padded vector that is cut into rows of `pencil_len() + 2`; none in rows of the
+    /// ring.
     pub fn pencil_in_row(&self, q: usize) -> Option<usize> {
         let (mut rest, mut pencil, mut stride) = (q, 0, 1);
         for d in (0..D - 1).rev() {
@@ -81,12 +83,12 @@ impl<const D: usize> Patch<D> {
         Some(pencil)
     }
 
-    /// All runs of unknowns along the last axis, as starts in a padded vector.
+    /// The starts of all pencils in a padded vector.
     pub fn pencils(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.pencil_count()).map(|p| self.pencil(p))
     }
 
-    /// Nodal values as a padded vector, ring included; `jump[d]` is added on wrapping around axis d.
+    /// Nodal values as a padded vector with its ring; `jump[d]` is added on wrapping around axis d.
     pub fn gather<const K: usize>(
         &self,
         lattice: &Lattice<D>,
@@ -109,7 +111,7 @@ impl<const D: usize> Patch<D> {
         padded
     }
 
-    /// Calls `visit(index of the node, turns around each axis)` for every place of a padded vector in turn.
+    /// Calls `visit(index of the node, turns around each axis)` for every place of a padded vector, in order.
     fn for_each_padded(&self, lattice: &Lattice<D>, mut visit: impl FnMut(usize, [i32; D])) {
         let (nodes, strides) = (lattice.nodes(), lattice.strides());
         let mut place = [0; D];
@@ -117,7 +119,7 @@ impl<const D: usize> Patch<D> {
             let mut index = 0;
             let mut turns = [0; D];
             for d in 0..D {
-                // one period more, so that the ring below the origin is not negative
+                // a period is added, so that the ring below the origin has no negative index
                 let i = self.origin[d] + nodes[d] + place[d] - 1;
                 index += i % nodes[d] * strides[d];
                 turns[d] = (i / nodes[d]) as i32 - 1;
@@ -140,7 +142,8 @@ impl<const D: usize> Patch<D> {
         self.entries(lattice).map(|(node, _)| node)
     }
 
-    /// For each unknown its node, and on which axes it lies beyond the seam of the lattice, one period from there.
+    /// For each unknown its node, and along which axes it lies beyond the end of the lattice, one period from that
+    /// node.
     pub fn entries(&self, lattice: &Lattice<D>) -> impl Iterator<Item = (usize, [bool; D])> {
         let (strides, nodes, last) = (lattice.strides(), lattice.nodes(), D - 1);
         (0..self.pencil_count()).flat_map(move |p| {
@@ -188,7 +191,7 @@ impl<const D: usize> Patch<D> {
         }
     }
 
-    /// Copies the images of wrapping axes into the ring of a vector without a jump; other rings stay.
+    /// Copies the images of wrapping axes into the ring of a vector, without adding a jump; the rest of the ring stays.
     pub fn wrap<T: Copy>(&self, padded: &mut [T]) {
         let strides = self.padded_strides();
         for d in (0..D).filter(|&d| self.wraps[d]) {

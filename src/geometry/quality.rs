@@ -53,7 +53,7 @@ fn for_each_cell(mesh: &Mesh<2>, mut visit: impl FnMut([usize; 2], [usize; 4], C
     }
 }
 
-/// Nodes before and after a row of cells: x and y of each, as arrays that the compiler makes vectors of.
+/// The nodes on both sides of a row of cells, x and y in separate arrays, over which the compiler can vectorise.
 struct Row<'a> {
     before: [&'a [f64]; 2],
     after: [&'a [f64]; 2],
@@ -67,8 +67,8 @@ impl Row<'_> {
     }
 }
 
-/// Calls `visit(nodes before, nodes after, row)` for every row of cells, in lattice order: the ranges of arrays of shape
-/// cells + 1 in which they stand, and where they are.
+/// Calls `visit(nodes before, nodes after, row)` for every row of cells, in lattice order. The first two are the ranges
+/// of its nodes in arrays of shape cells + 1, the third their positions.
 #[inline(always)]
 fn for_each_row_of_cells(mesh: &Mesh<2>, mut visit: impl FnMut([Range<usize>; 2], &Row<'_>)) {
     let x = mesh.closed();
@@ -81,14 +81,14 @@ fn for_each_row_of_cells(mesh: &Mesh<2>, mut visit: impl FnMut([Range<usize>; 2]
         for (d, after) in after.iter_mut().enumerate() {
             after.iter_mut().zip(column(i + 1, d)).for_each(|(to, from)| *to = from);
         }
-        // of a length that is known where they are read
+        // slices of a known length, so that the loops over them need no bounds checks
         let [before_it, after_it] = [&before, &after].map(|[x, y]| [&x[..m + 1], &y[..m + 1]]);
         visit([range(i), range(i + 1)], &Row { before: before_it, after: after_it });
         std::mem::swap(&mut before, &mut after);
     }
 }
 
-/// A cell by its edges south, east, north and west, each along its axis.
+/// The edges of a cell at its south, east, north and west, each in the direction of its axis.
 struct Edges([[f64; 2]; 4]);
 
 impl Edges {
@@ -117,7 +117,7 @@ impl Edges {
         [[south, north], [west, east]].map(|[p, q]| [0, 1].map(|d| 0.5 * (p[d] + q[d])))
     }
 
-    /// Q and the area.
+    /// Q and the area of the cell.
     #[inline(always)]
     fn shape(&self) -> [f64; 2] {
         let [e, f] = self.averaged();
@@ -126,7 +126,7 @@ impl Edges {
     }
 }
 
-/// The minimum of two numbers, in one instruction: `f64::min` takes four, for NaN.
+/// The minimum of two numbers in one instruction; `f64::min` takes four, to handle NaN.
 #[inline(always)]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
@@ -136,7 +136,7 @@ fn area([a, b, c, d]: Corners) -> f64 {
     0.5 * cross(minus(c, a), minus(d, b))
 }
 
-/// Area of the box over the number of cells: what every corner Jacobian of the uniform mesh is.
+/// Area of the box over the number of cells, which is every corner Jacobian of the uniform mesh.
 fn uniform_jacobian(mesh: &Mesh<2>) -> f64 {
     let ([w, h], [n, m]) = (mesh.extent(), mesh.lattice().cells());
     w * h / (n * m) as f64
@@ -149,7 +149,7 @@ pub fn cell_areas(mesh: &Mesh<2>) -> Vec<f64> {
     areas
 }
 
-/// Area that belongs to each node: a quarter of each cell around it. They add up to the area of the box.
+/// The area of each node: a quarter of every cell around it. These add up to the area of the box.
 pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
     let lattice = mesh.lattice();
     let nodes = lattice.nodes();
@@ -188,18 +188,18 @@ pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Result<Quality, Failure> {
     Ok(quality_and_integral(mesh, rho, rho).0)
 }
 
-/// The same, and the integral of nodal values: of each cell, its area times the mean over its corners.
+/// The quality figures, and the integral of nodal values: over each cell, its area times the mean at its corners.
 pub(crate) fn quality_and_integral(mesh: &Mesh<2>, rho: &[f64], values: &[f64]) -> (Quality, f64) {
     let lattice = mesh.lattice();
     let (rho, values) = (lattice.closed(rho), lattice.closed(values));
     pulp::Arch::new().dispatch(AllCells { mesh, rho: &rho, values: &values })
 }
 
-/// All cells as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has. Products
-/// and sums are not fused: the same bits on every machine.
+/// The figures of all cells as a task for [`pulp`], which compiles it once more for wider vectors and runs what the
+/// machine supports. Products and sums are not fused, so that the bits are the same on every machine.
 struct AllCells<'a> {
     mesh: &'a Mesh<2>,
-    /// Of shape cells + 1.
+    /// ρ at the nodes, of shape cells + 1.
     rho: &'a [f64],
     values: &'a [f64],
 }
@@ -211,10 +211,10 @@ impl pulp::WithSimd for AllCells<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) -> (Quality, f64) {
         let Self { mesh, rho, values } = self;
         let [n, m] = mesh.lattice().cells();
-        // its scale cancels, and must not overflow
+        // the scale of ρ cancels, and products with it must not overflow
         let quarter = 0.25 * largest(rho).recip();
         let [mut q, mut share, mut part, mut least] = [0; 4].map(|_| vec![0.0; m]);
-        // sums and extremes of each column of cells: those of a row would wait for one another
+        // accumulated for each column of cells: within a row every sum would wait for the last one
         let mut q_all = Column::new(m);
         let mut share_all = Column::new(m);
         let (mut parts, mut least_all) = (vec![0.0; m], vec![f64::INFINITY; m]);
@@ -246,7 +246,7 @@ impl pulp::WithSimd for AllCells<'_> {
     }
 }
 
-/// Sums and largest values over rows of positive numbers, place by place.
+/// Sums and maxima over rows of positive numbers, for each place of a row.
 struct Column {
     sums: Vec<f64>,
     most: Vec<f64>,
@@ -272,16 +272,16 @@ impl Column {
     }
 }
 
-/// How a mesh compares with a reference over the same lattice.
+/// Quality of a mesh relative to that of a reference over the same lattice.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Comparison {
     /// Largest Q of the reference over largest Q of the mesh.
     pub r_max: f64,
-    /// The same for the means.
+    /// Mean Q of the reference over mean Q of the mesh.
     pub r_mean: f64,
-    /// Largest Q of the reference over Q of the mesh in one cell.
+    /// Largest ratio, over the cells, of Q in the reference to Q in the mesh.
     pub cell_max: f64,
-    /// √ of the mean over the nodes of the squared distance.
+    /// Root mean square, over the nodes, of the distance between the two meshes.
     pub mesh_rms: f64,
 }
 

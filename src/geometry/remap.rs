@@ -4,18 +4,20 @@ use crate::error::Failure;
 /// Carries a nodal field from one mesh to another over the same lattice and domain and keeps its integral
 ///
 /// ```text
-/// A′ u′ = A u + Σ_faces s u_f,   A, A′ = areas of the dual cell before and after,   s = the area that a face sweeps outward
+/// A′ u′ = A u + Σ_faces s u_f
+/// A, A′ = areas of the dual cell before and after,   s = the area that a face sweeps outward
 /// ```
 ///
-/// Σ A u ([`DualCells::areas`]) is kept to round-off, constants exactly. u_f is the value upwind with van Leer's limited
-/// slope, of second order in the mean where u is smooth (of first at nodes on sides and at extrema), and no value leaves the
-/// range of its neighbours. Nodes go from one mesh to the other in straight lines, in as many steps as keep what the faces of a
-/// dual cell sweep below half of it: one for meshes that differ by a time step. On periodic axes they begin at the nodes,
-/// counted from another one, that lie nearest in the mean: meshes may have drifted by any number of periods.
+/// Σ A u ([`DualCells::areas`]) is conserved to round-off, and constants stay exactly. u_f is the upwind value with van
+/// Leer's limited slope: of second order in the mean where u is smooth, of first order at nodes on sides and at
+/// extrema, and within the range of the neighbours. The nodes move from one mesh to the other along straight lines, in
+/// so many steps that the faces of a dual cell sweep at most half of its area in each; meshes that differ by a time
+/// step take one. On periodic axes the nodes of the first mesh are renumbered so that they start nearest to those of
+/// the second in the mean: the meshes may have drifted apart by any number of periods.
 ///
 /// # Errors
-/// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one between them, is no mesh, and where values
-/// are not finite or so large that their integrals are not.
+/// [`Failure::Folded`] or [`Failure::NonFinite`] where one of the meshes, or one on the way between them, has folded
+/// cells or nodes that are not finite, and where values are not finite or so large that their integrals overflow.
 ///
 /// # Example
 /// ```
@@ -24,7 +26,9 @@ use crate::error::Failure;
 /// let b = a.moved(a.x().iter().map(|&[x, y]| [x * x, y]).collect())?;
 /// let u: Vec<f64> = a.x().iter().map(|[x, _]| x.exp()).collect();
 /// let v = remap(&a, &u, &b)?;
-/// let sum = |mesh: &Mesh<2>, u: &[f64]| -> f64 { DualCells::new(mesh).areas().iter().zip(u).map(|(a, u)| a * u).sum() };
+/// let sum = |mesh: &Mesh<2>, u: &[f64]| -> f64 {
+///     DualCells::new(mesh).areas().iter().zip(u).map(|(a, u)| a * u).sum()
+/// };
 /// assert!((sum(&a, &u) - sum(&b, &v)).abs() < 1e-14);
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
@@ -33,7 +37,8 @@ use crate::error::Failure;
 /// If the two meshes have different lattices or `values` has not one value a node.
 ///
 /// # Source
-/// van Leer, *Towards the ultimate conservative difference scheme V* (1979), with faces that move through a field at rest.
+/// van Leer, *Towards the ultimate conservative difference scheme V* (1979), with faces that move through a field at
+/// rest.
 pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, Failure> {
     assert_eq!(from.lattice(), to.lattice(), "both meshes need the same lattice");
     assert_eq!(values.len(), from.lattice().len(), "one value a node");
@@ -43,7 +48,7 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
     let (from, values) = (&begin, values.as_slice());
     let (mut cells, last) = (DualCells::new(from), DualCells::new(to));
     let steps = (largest_share(&cells, &last) / SHARE).ceil().max(1.0);
-    // differences of the largest numbers are not finite
+    // the difference of the two largest numbers may overflow
     let [low, high] = values.iter().fold([0.0_f64; 2], |[low, high], &u| [low.min(u), high.max(u)]);
     let unit = if high.max(-low) > LARGE { LARGE.recip() } else { 1.0 };
     let mut u: Vec<f64> = values.iter().map(|u| u * unit).collect();
@@ -63,12 +68,12 @@ pub fn remap(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<Vec<f64>, F
     }
 }
 
-/// The same mesh and values with the nodes along periodic axes counted from where those of `to` begin, to the nearest cell
-/// in the mean.
+/// The same mesh and values with the nodes along periodic axes numbered from those nearest, in the mean, to the first
+/// ones of `to`.
 fn counted_from_near(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<(Mesh<2>, Vec<f64>), Failure> {
     let (lattice, extent) = (from.lattice(), from.extent());
     let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
-    // how many nodes further the new first one stands
+    // by how many nodes the numbering is shifted
     let first = [0, 1].map(|d| {
         let ways = from.x().iter().zip(to.x()).map(|(a, b)| b[d] - a[d]);
         let cells = ways.sum::<f64>() / (from.x().len() as f64) / extent[d] * nodes[d] as f64;
@@ -91,12 +96,14 @@ fn counted_from_near(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Result<(Me
     Ok((from.moved(x)?, u))
 }
 
-/// Values above this are carried in units of it: a power of two, so that they keep their bits.
+/// Values above this are carried in units of it, so that nothing overflows. It is a power of two, so that they keep
+/// their bits.
 const LARGE: f64 = (1_u128 << 127) as f64;
-/// The most that the faces of a dual cell may sweep in a step, over its area.
+/// The largest area that the faces of a dual cell may sweep in one step, as a share of its area. Up to a half, limited
+/// slopes and Heun's method keep values within the range of their neighbours.
 const SHARE: f64 = 0.5;
 
-/// The mesh so far on the way from one to another.
+/// The mesh at a share of the way from one to another.
 fn between(from: &Mesh<2>, to: &Mesh<2>, share: f64) -> Result<Mesh<2>, Failure> {
     let x = from.x().iter().zip(to.x()).map(|(a, b)| [0, 1].map(|d| a[d] + share * (b[d] - a[d])));
     let mesh = from.moved(x.collect())?;
@@ -104,7 +111,7 @@ fn between(from: &Mesh<2>, to: &Mesh<2>, share: f64) -> Result<Mesh<2>, Failure>
     Ok(mesh)
 }
 
-/// The largest sum of what the faces of a dual cell sweep, over the smaller of its areas.
+/// The largest area that the faces of a dual cell sweep, as a share of the smaller of its two areas.
 fn largest_share(old: &DualCells, new: &DualCells) -> f64 {
     let (swept, strides) = (old.swept(new), old.patch().padded_strides());
     let areas = old.areas().iter().zip(new.areas()).map(|(a, b)| a.min(*b));
@@ -116,7 +123,7 @@ fn largest_share(old: &DualCells, new: &DualCells) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
-/// A u + Σ s u_f, by Heun's method: both stages with the same swept areas, so that constants stay.
+/// A u + Σ s u_f by Heun's method. Both stages use the same swept areas, so that constants stay.
 fn stepped(mesh: &Mesh<2>, values: &[f64], old: &DualCells, new: &DualCells) -> Vec<f64> {
     let swept = old.swept(new);
     let first = carried(mesh, values, old, &swept);
@@ -127,13 +134,13 @@ fn stepped(mesh: &Mesh<2>, values: &[f64], old: &DualCells, new: &DualCells) -> 
     areas().zip(changes).map(|(((u, before), after), change)| (before * u + change) / after).collect()
 }
 
-/// What the faces of each dual cell bring in.
+/// The amount of u that the faces of each dual cell bring in.
 fn carried(mesh: &Mesh<2>, values: &[f64], cells: &DualCells, swept: &[[f64; 2]]) -> Vec<f64> {
     let patch = cells.patch();
     let strides = patch.padded_strides();
     let nodal: Vec<[f64; 1]> = values.iter().map(|u| [*u]).collect();
     let u: Vec<f64> = padded(mesh.lattice(), &nodal, [[0.0]; 2]).into_flattened();
-    // beyond a bounded side stands the value of the side, so that no slope is seen there
+    // beyond a bounded side the value of the side is repeated, which makes the slope there 0
     let mut slopes = vec![[0.0; 2]; u.len()];
     for k in patch.places() {
         slopes[k] = strides.map(|s| limited(u[k] - u[k - s], u[k + s] - u[k]));
@@ -141,13 +148,13 @@ fn carried(mesh: &Mesh<2>, values: &[f64], cells: &DualCells, swept: &[[f64; 2]]
     patch.wrap(&mut slopes);
     let through = |k: usize, d: usize| {
         let (s, above) = (swept[k][d], k + strides[d]);
-        // a face that moves up takes from above
+        // a face that moves up takes in the value above it
         s * if s > 0.0 { u[above] - 0.5 * slopes[above][d] } else { u[k] + 0.5 * slopes[k][d] }
     };
     patch.places().map(|k| (0..2).map(|d| through(k, d) - through(k - strides[d], d)).sum()).collect()
 }
 
-/// Van Leer's mean of two differences: harmonic where they agree in sign, 0 where they do not.
+/// Van Leer's limiter of two differences: their harmonic mean where they agree in sign, else 0.
 fn limited(below: f64, above: f64) -> f64 {
     if (below > 0.0) == (above > 0.0) && below != 0.0 && above != 0.0 {
         below * (2.0 * (above / (below + above)))
@@ -175,7 +182,8 @@ mod tests {
     }
 
     proptest! {
-        /// The integral is kept to round-off and the range is not left, for any values, motion, sides and periodic axes.
+        /// The integral is kept to round-off and the range is not left, for any values, motion, sides and periodic
+        /// axes.
         #[test]
         fn keeps_the_integral_and_the_range(
             n in 3_usize..14, periodic: bool, there in -0.1..0.1, back in -0.1..0.1, seed: u64,
@@ -223,8 +231,8 @@ mod tests {
         assert!(carried.iter().all(|u| u / f64::MAX > 1.0 - 1e-14));
     }
 
-    /// A periodic mesh that went around any number of times, and by whole cells, has the very values of the nodes that it
-    /// meets.
+    /// A periodic mesh that went around any number of times, and by whole cells, has the very values of the nodes that
+    /// it meets.
     #[test]
     fn meshes_that_drifted_by_periods_are_carried_to() {
         let mesh = bent(16, true, 0.0);

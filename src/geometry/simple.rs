@@ -4,11 +4,11 @@ use crate::error::Failure;
 
 /// Refuses a bounded mesh whose sides touch or cross each other
 ///
-/// With [`check_unfolded`](super::check_unfolded) this makes the mapping one to one: no cell is folded, and the sides are
-/// one simple curve.
+/// Together with [`check_unfolded`](super::check_unfolded) this makes the map from the lattice one to one: no cell is
+/// folded, and the sides form one simple curve.
 ///
 /// # Errors
-/// [`Failure::SelfTouching`] with the two cells at the first place found. Nothing is said of periodic meshes.
+/// [`Failure::SelfTouching`] with the two cells at the first such place. Periodic meshes are not checked.
 pub fn check_simple(mesh: &Mesh<2>) -> Result<(), Failure> {
     let lattice = mesh.lattice();
     if lattice.periodic().contains(&true) {
@@ -16,7 +16,7 @@ pub fn check_simple(mesh: &Mesh<2>) -> Result<(), Failure> {
     }
     let [n, m] = lattice.cells();
     let x = mesh.x();
-    // around the mesh: (place along the sides, ends, cell)
+    // the sides in one turn around the mesh: (nodes at both ends of an edge, its cell)
     let south = (0..n).map(|i| ([i, 0], [i + 1, 0], [i, 0]));
     let east = (0..m).map(|j| ([n, j], [n, j + 1], [n - 1, j]));
     let north = (0..n).rev().map(|i| ([i + 1, m], [i, m], [i, m - 1]));
@@ -27,7 +27,7 @@ pub fn check_simple(mesh: &Mesh<2>) -> Result<(), Failure> {
     let count = edges.len();
     let low = |e: &[[f64; 2]; 2], d: usize| e[0][d].min(e[1][d]);
     let high = |e: &[[f64; 2]; 2], d: usize| e[0][d].max(e[1][d]);
-    // what rounding may part
+    // points closer than this may coincide but for rounding
     let reach = 8.0 * f64::EPSILON * x.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
     edges.sort_by(|a, b| low(&a.1, 0).total_cmp(&low(&b.1, 0)));
     for (place, (k, a, cell)) in edges.iter().enumerate() {
@@ -58,7 +58,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Lattice, check_unfolded};
 
-    /// An annulus of 1.1 turns folds no cell but lies on itself, one of a whole turn but for rounding; one of 0.9 does not.
+    /// An annulus of 1.1 turns folds no cell but lies on itself, one of a whole turn but for rounding; one of 0.9 does
+    /// not.
     #[test]
     fn a_mesh_that_lies_on_itself_is_refused() {
         let annulus = |turns: f64| {

@@ -1,4 +1,4 @@
-//! Σ a_j u(x_j) = Σ b_j Δu(x_j) on 5 × 5 points, exact to degree 5.
+//! The compact scheme Σ a_j u(x_j) = Σ b_j Δu(x_j) on 5 × 5 points, exact for polynomials up to degree 5.
 
 // loops over places of several arrays of one length, which the compiler makes vectors of
 #![allow(clippy::needless_range_loop)]
@@ -9,10 +9,11 @@ use crate::geometry::{Mesh, Patch};
 use crate::numerics::lanes::{LANES, Lanes, Qr};
 use crate::parallel;
 
-/// Exponents of the monomials of degree 3 and less: what Δ makes of those of degree 5 and less.
+/// Exponents of the monomials up to degree 3, which are the Laplacians of polynomials up to degree 5.
 const SOURCES: [[i32; 2]; 10] = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2], [3, 0], [2, 1], [1, 2], [0, 3]];
 
-/// The weights fall with the distance like (c + r²)^(−P/2), r in units of the nearest neighbours.
+/// c in the weighting (c + r²)^(−P/2) of points by their distance r, in units of the distance to the nearest
+/// neighbours: it keeps the node itself from an infinite weight.
 const SOFT: f64 = 0.3;
 
 /// Stencils of a mesh that is not folded.
@@ -43,7 +44,7 @@ pub(super) fn stencils(mesh: &Mesh<2>, patch: Patch<2>) -> Result<Stencils> {
     Ok(Stencils::twenty_five(mesh, patch, rows, &conditions))
 }
 
-/// Some nodes with the points around them.
+/// Nodes that are computed side by side, with the points around them.
 struct Group {
     first: [[usize; 2]; LANES],
     e: [[Lanes; 2]; 25],
@@ -115,7 +116,7 @@ impl pulp::WithSimd for &mut Group {
         for p in 0..25 {
             a[p] = a[p] * share[p];
         }
-        // what the weights make of a polynomial whose Laplacian is each monomial
+        // the value of the stencil for a polynomial whose Laplacian is each monomial
         let mut d = [Lanes::ZERO; 10];
         for (d, exponents) in d.iter_mut().zip(SOURCES) {
             for p in 0..25 {

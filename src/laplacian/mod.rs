@@ -4,8 +4,8 @@
 //! Δu(x₀) ≈ Σ_j a_j (u(x_j) − u(x₀))        or, for `compact25`,        Σ_j a_j u(x_j) = Σ_j b_j Δu(x_j)
 //! ```
 //!
-//! The weights a of each node follow from the positions of its neighbours alone: no elements, no assembly, every node by
-//! itself. [`stencils`] gives those of a whole mesh, for any [`Laplacian`].
+//! The weights a of a node follow from the positions of its neighbours alone, without elements or assembly.
+//! [`stencils`] computes those of a whole mesh, for any [`Laplacian`].
 //!
 //! # Source
 //! Castillo and Izsák, *Efficient discretization of the Laplacian: application to moving boundary problems* (2024).
@@ -24,50 +24,51 @@ use crate::parallel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the weights of a node follow from its neighbours.
+/// How the weights of a node are determined from the positions of its neighbours.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Laplacian {
-    /// Exact for all quadratics; among those the weights of smallest Σ(|d_j|³ a_j)², d_j the distances. Second order on
-    /// meshes that a smooth mapping makes, and on perturbed ones.
+    /// Exact for all quadratics. Among such weights it takes those with the smallest Σ(|d_j|³ a_j)², d_j being the
+    /// distances. Second order on meshes from smooth mappings and on perturbed ones.
     #[default]
     Optimised,
-    /// Exact for all quadratics; the rest by least squares on the harmonic polynomials of degree 3 to 5 in the unit of the
-    /// coordinates. More accurate on sheared meshes, unstable on moving ones.
+    /// Exact for all quadratics. The remaining freedom fits the harmonic polynomials of degrees 3 to 5 by least
+    /// squares, in the unit of the coordinates. More accurate on sheared meshes, unstable on moving ones.
     Harmonic,
-    /// The slides' least squares on eleven weighted polynomials: exact for nothing but constants.
+    /// The published method: least squares on eleven weighted polynomials, exact for constants only. It does not
+    /// converge on perturbed meshes.
     Published {
-        /// The polynomials as they are printed, or without the misprints.
+        /// The polynomials as printed, or with the misprints corrected.
         polynomials: Polynomials,
-        /// The unit of length of the polynomials.
+        /// The unit of length in which the polynomials are evaluated.
         scaling: Scaling,
     },
-    /// 25 points and weights on Δu too, exact to degree 5: fourth order where the solution is smooth.
+    /// 25 points, with weights on Δu too, exact up to degree 5: fourth order where the solution is smooth.
     Compact25,
-    /// The conservative curvilinear form, for comparison.
+    /// The conservative curvilinear form with metrics by central differences, for comparison.
     Mapped,
 }
 
-/// The polynomials of [`Laplacian::Published`].
+/// The polynomials that [`Laplacian::Published`] fits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Polynomials {
-    /// As the slides print them: three of them are not harmonic.
+    /// As the source prints them; three of them are not harmonic.
     #[default]
     Printed,
-    /// x³ − 3xy², y³ − 3x²y and x⁴ − 6x²y² + y⁴ in their places.
+    /// Harmonic ones, with x³ − 3xy², y³ − 3x²y and x⁴ − 6x²y² + y⁴ in place of those three.
     Harmonic,
 }
 
-/// The unit of length of [`Laplacian::Published`].
+/// The unit of length of the polynomials of [`Laplacian::Published`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Scaling {
-    /// That of the coordinates.
+    /// The unit of the coordinates.
     #[default]
     None,
     /// The spacing of the lattice along ξ.
     Global,
-    /// The largest distance to a neighbour along an axis, node by node.
+    /// For each node the largest distance to a neighbour along an axis.
     Local,
 }
 
@@ -81,7 +82,7 @@ impl Laplacian {
         ("mapped", "the conservative curvilinear form, for comparison"),
     ];
 
-    /// Its name in a study.
+    /// The name of the kind in a study.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Optimised => "optimised",
@@ -93,7 +94,8 @@ impl Laplacian {
     }
 }
 
-/// Condition numbers above this are told: exactness of degree 2 then falls behind 1e-11.
+/// Condition number above which a node is reported as [near degenerate](Stencils::near_degenerate): rounding then
+/// breaks the exactness for quadratics by more than 1e-11.
 pub const NEAR_DEGENERATE: f64 = 3e3;
 
 /// The weights of all nodes of a mesh that are not on a bounded side
@@ -102,12 +104,13 @@ pub const NEAR_DEGENERATE: f64 = 3e3;
 /// (A u)_i = Σ_j a_ij u_j ≈ Δu(x_i)
 /// ```
 ///
-/// Nodes are independent of each other; all threads take part, with the same bits for any number of them.
+/// Nodes are computed independently on all threads, with the same bits for any number of them.
 ///
 /// # Errors
-/// [`Failure::Folded`] or [`Failure::NonFinite`] where the mesh is no mesh; [`Failure::DegenerateStencil`] where the
-/// neighbours of a node determine no Laplacian; [`Error::Invalid`] for `compact25` on a periodic axis or with fewer than 4
-/// cells. Nodes that come near that are in [`Stencils::near_degenerate`].
+/// [`Failure::Folded`] or [`Failure::NonFinite`] for a mesh with folded cells or nodes that are not finite;
+/// [`Failure::DegenerateStencil`] where the neighbours of a node determine no Laplacian; [`Error::Invalid`] for
+/// `compact25` on a periodic axis or with fewer than 4 cells. Nodes that come near to that are listed by
+/// [`Stencils::near_degenerate`].
 ///
 /// # Example
 /// ```
@@ -141,7 +144,7 @@ pub fn unchecked(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
     if laplacian == Laplacian::Compact25 {
         return compact25::stencils(mesh, patch);
     }
-    // padded like the patch: positions of the sides, or of images
+    // padded like the patch, with positions of nodes on the sides or of images
     let everything = padded(lattice, mesh.x(), [[extent[0], 0.0], [0.0, extent[1]]]);
     let width = lattice.nodes()[1] + 2;
     let skip = patch.wraps.map(|wraps| usize::from(!wraps));
@@ -177,7 +180,7 @@ fn degenerate(mesh: &Mesh<2>, patch: &Patch<2>, k: usize, condition: f64) -> Fai
     Failure::DegenerateStencil { node, x: mesh.x()[mesh.lattice().index(node)], condition }
 }
 
-/// Refuses settings that go only with another kind.
+/// Settings that belong to one kind only are refused with another.
 impl Laplacian {
     /// The kind of this name; `polynomials` and `scaling` belong to `published`.
     ///

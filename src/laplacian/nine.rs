@@ -1,4 +1,4 @@
-//! Weights on the eight neighbours of a node, for several nodes side by side.
+//! Weights on the eight neighbours of a node, for several nodes side by side, one in each lane.
 
 // loops over places of several arrays of one length, which the compiler makes vectors of
 #![allow(clippy::needless_range_loop)]
@@ -6,7 +6,7 @@
 use super::{Laplacian, Polynomials, Scaling};
 use crate::numerics::lanes::{LANES, Lanes, Qr};
 
-/// Neighbours relative to their node, in local units, and what they make of it.
+/// The neighbours of a node relative to it, in units of its local length.
 pub(super) struct Neighbourhood {
     /// The eight neighbours in the order of `LatticeMatrix::POINTS`.
     pub e: [[Lanes; 2]; 8],
@@ -17,7 +17,7 @@ pub(super) struct Neighbourhood {
 /// Weights of the neighbours in local units, and the condition number.
 pub(super) type Weights = ([Lanes; 8], Lanes);
 
-/// (node, then eight neighbours) of up to [`LANES`] nodes of one row
+/// The nine-point rows (the node, then its eight neighbours) of up to [`LANES`] nodes of one lattice row
 ///
 /// ```text
 /// rows[l][0] = −Σ a_j,   rows[l][1 + j] = a_j / h²
@@ -26,7 +26,7 @@ pub(super) struct Batch<'a> {
     pub laplacian: &'a Laplacian,
     /// Spacing of the lattice along the first axis.
     pub spacing: f64,
-    /// Padded positions; row before, of and after the nodes, each two longer than `rows`.
+    /// Padded positions: the lattice rows before, of and after the nodes, each two longer than `rows`.
     pub x: [&'a [[f64; 2]]; 3],
     pub rows: &'a mut [[f64; 9]],
     pub conditions: &'a mut [f64],
@@ -66,7 +66,7 @@ fn each(
     let count = rows.len();
     for first in (0..count).step_by(LANES) {
         let mut e = [[Lanes::ZERO; 2]; 8];
-        // a last, shorter group repeats its last node
+        // the last group may be shorter, and repeats its last node
         for l in 0..LANES {
             let j = (first + l).min(count - 1) + 1;
             let centre = x[1][j];
@@ -93,7 +93,7 @@ fn each(
             *a = *a * unit;
             sum += *a;
         }
-        // the size of what must cancel in Σ a_j d_j
+        // the condition number also counts the size of the terms that cancel in Σ a_j d_j
         let condition = condition.max(terms);
         for l in 0..LANES.min(count - first) {
             let row = &mut rows[first + l];
@@ -106,7 +106,7 @@ fn each(
     }
 }
 
-/// Twice the identity for x², nothing for the other four.
+/// The Laplacians of x, y, xy, x² − y² and x² at the node: 2 for x², 0 for the others.
 #[inline(always)]
 fn laplacians() -> [Lanes; 5] {
     let mut c = [Lanes::ZERO; 5];
@@ -114,7 +114,7 @@ fn laplacians() -> [Lanes; 5] {
     c
 }
 
-/// x, y, xy, x² − y², x² at a point.
+/// x, y, xy, x² − y² and x² at a point.
 #[inline(always)]
 fn quadratics([x, y]: [Lanes; 2]) -> [Lanes; 5] {
     let (xx, yy) = (x * x, y * y);
@@ -140,7 +140,7 @@ fn optimised(near: &Neighbourhood) -> Weights {
     for j in 0..8 {
         a[j] = a[j] * shares[j];
     }
-    // shares differ by orders of magnitude in flat cells: once more for what round-off left
+    // in flat cells the weights differ by orders of magnitude, so the residual is corrected once
     let correction = qr.shortest(&missing(near, &a));
     for j in 0..8 {
         a[j] += correction[j] * shares[j];
@@ -148,7 +148,7 @@ fn optimised(near: &Neighbourhood) -> Weights {
     (a, qr.condition())
 }
 
-/// What the weights leave of the Laplacians of the five quadratics.
+/// The errors of the weights for the five quadratics.
 #[inline(always)]
 fn missing(near: &Neighbourhood, a: &[Lanes; 8]) -> [Lanes; 5] {
     let mut c = laplacians();
@@ -160,8 +160,8 @@ fn missing(near: &Neighbourhood, a: &[Lanes; 8]) -> [Lanes; 5] {
     c
 }
 
-/// Exact for all quadratics; the other three freedoms make the harmonic cubics to quintics vanish as well as they can,
-/// in the unit of the coordinates.
+/// Exact for all quadratics. The other three degrees of freedom make the values for harmonic polynomials of degrees 3
+/// to 5 as small as possible, in the unit of the coordinates.
 #[inline(always)]
 fn harmonic(near: &Neighbourhood) -> Weights {
     let (mut columns, mut rest) = ([[Lanes::ZERO; 8]; 5], [[Lanes::ZERO; 8]; 6]);
@@ -169,7 +169,7 @@ fn harmonic(near: &Neighbourhood) -> Weights {
         for (column, p) in columns.iter_mut().zip(quadratics(near.e[j])) {
             column[j] = p;
         }
-        // h³, h⁴ and h⁵ over a common h³
+        // h³, h⁴ and h⁵, divided by h³
         let scales = [Lanes::ONE, Lanes::ONE, near.h, near.h, near.h * near.h, near.h * near.h];
         for ((row, p), scale) in rest.iter_mut().zip(harmonics(near.e[j], false)).zip(scales) {
             row[j] = p * scale;
@@ -177,7 +177,7 @@ fn harmonic(near: &Neighbourhood) -> Weights {
     }
     let qr = Qr::new(columns);
     let mut a = qr.forward(&laplacians());
-    // in the basis Q the first five coordinates are fixed, and the last three free
+    // in the basis Q the first five coordinates are determined by the quadratics, and the last three are free
     let (mut free, mut fixed) = ([[Lanes::ZERO; 6]; 3], [Lanes::ZERO; 6]);
     for (k, row) in rest.iter_mut().enumerate() {
         qr.multiply_transposed(row);
@@ -199,7 +199,7 @@ fn harmonic(near: &Neighbourhood) -> Weights {
     (a, qr.condition().max(freedoms.condition()))
 }
 
-/// The harmonic polynomials of degree 3 to 5, right or as the slides print them.
+/// The harmonic polynomials of degrees 3 to 5; with `printed`, three of them as the source prints them.
 #[inline(always)]
 fn harmonics([x, y]: [Lanes; 2], printed: bool) -> [Lanes; 6] {
     let (xx, yy, xy) = (x * x, y * y, x * y);
@@ -211,10 +211,11 @@ fn harmonics([x, y]: [Lanes; 2], printed: bool) -> [Lanes; 6] {
     [cubic_x, cubic_y, xy * (xx - yy), quartic, quintic(y, yy, xx), quintic(x, xx, yy)]
 }
 
-/// The slides' least squares on eleven weighted polynomials, in coordinates over `unit`, or over the local unit.
+/// The published least squares on eleven weighted polynomials, in coordinates divided by `unit`, or by the local
+/// length.
 #[inline(always)]
 fn published(near: &Neighbourhood, printed: bool, unit: Option<f64>) -> Weights {
-    // coordinates over `unit` are e s
+    // coordinates divided by `unit` are e s
     let s = unit.map_or(Lanes::ONE, |unit| near.h * (1.0 / unit));
     let mut columns = [[Lanes::ZERO; 11]; 8];
     for j in 0..8 {
@@ -234,7 +235,7 @@ fn published(near: &Neighbourhood, printed: bool, unit: Option<f64>) -> Weights 
     (a, qr.condition())
 }
 
-// places in `Neighbourhood::e`
+// indices of the neighbours in `Neighbourhood::e`
 const WEST: usize = 0;
 const EAST: usize = 1;
 const SOUTH: usize = 2;

@@ -1,4 +1,4 @@
-//! Δu = f on any structured mesh.
+//! Poisson's equation on any structured mesh.
 
 use super::{NEAR_DEGENERATE, Stencils};
 use crate::error::Failure;
@@ -8,9 +8,10 @@ use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport, SparseSystem};
 use crate::work::Work;
 
-/// Residual of the iteration, rows over their diagonal, as a share of the largest given value.
+/// Tolerance of the iteration: the largest residual, with each row divided by its diagonal, as a share of the largest
+/// given value.
 const ITERATED: f64 = 1e-13;
-/// Condition number above which a derivative at a side is lost to rounding.
+/// Condition number above which the one-sided derivative at a side counts as lost to rounding.
 const DEGENERATE: f64 = 1e7;
 
 /// Poisson's equation with given values or normal derivatives on the sides of a mesh
@@ -38,7 +39,8 @@ pub struct Poisson<'a> {
     pub source: &'a [f64],
     /// g, at every node of the sides: a value, or on Neumann sides the normal derivative.
     pub side: &'a [f64],
-    /// Neumann sides: the lower and upper one across each axis. A corner between two kinds belongs to the other kind.
+    /// Which sides are Neumann sides: the lower and the upper one across each axis. A corner with a side of the other
+    /// kind belongs to that.
     pub neumann: [[bool; 2]; 2],
 }
 
@@ -89,11 +91,13 @@ impl Poisson<'_> {
         Ok(u)
     }
 
-    /// The solution by an iteration, for nine-point stencils on a mesh with values on all sides: less memory than the direct
-    /// solver, and faster on fine meshes. The work tells the iterations, and whether the direct solver had to step in.
+    /// The solution by an iterative solver, for nine-point stencils on a mesh with given values on all sides. It takes
+    /// less memory than the direct solver and is faster on fine meshes. The work counts iterations, and the systems
+    /// that needed the direct solver after all.
     ///
     /// # Errors
-    /// As [`Poisson::solve`]; [`Failure::WrongLength`] for stencils of 25 points or Neumann sides, which it does not take.
+    /// As [`Poisson::solve`]; [`Failure::WrongLength`] also for stencils of 25 points and for Neumann sides, which it
+    /// cannot solve.
     pub fn iterate(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<(Vec<f64>, Work), Failure> {
         let lattice = mesh.lattice();
         let expected = lattice.len();
@@ -113,7 +117,7 @@ impl Poisson<'_> {
             matrix.rows[k] = row.map(|a| [[a / row[0]]]);
             b[k] = [self.source[stencils.index(k)] / row[0]];
         }
-        // with bounded axes a padded vector is the lattice
+        // on bounded axes a padded vector has the layout of the lattice
         let mut x: Vec<[f64; 1]> = self.side.iter().map(|&u| [u]).collect();
         patch.places().for_each(|k| x[k] = [0.0]);
         let size = b.as_flattened().iter().chain(self.side).copied().fold(f64::MIN_POSITIVE, larger);
@@ -121,7 +125,8 @@ impl Poisson<'_> {
         Ok((x.into_flattened(), work))
     }
 
-    /// The Neumann side that a node stands on, as (axis, upper), if it stands on no other kind.
+    /// The Neumann side on which a node stands, as (axis, upper); none for a node that also stands on a side with given
+    /// values.
     pub fn neumann_side(&self, lattice: &Lattice<2>, index: usize) -> Option<(usize, bool)> {
         let beyond = lattice.beyond(index);
         let on = |kind: bool| {
@@ -144,7 +149,8 @@ pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f
     };
     let (before, after) = (at(node[along].max(1) - 1), at((node[along] + 1).min(nodes[along] - 1)));
     let t = [after[0] - before[0], after[1] - before[1]];
-    // rotated to the upper side of the axis, where the mesh is not mirrored
+    // rotating the tangent by a right angle points outward on the upper side of axis 0 and on the lower one of axis 1,
+    // unless the mesh is mirrored
     let sign = if (axis == 0) == upper { 1.0 } else { -1.0 };
     let size = t[0].hypot(t[1]);
     [sign * t[1] / size, -sign * t[0] / size]
@@ -152,13 +158,14 @@ pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f
 
 /// n·∇u at a node of a side from the 3 × 3 nodes next to it, exact for quadratics: (lattice index, weight)
 ///
-/// Among those rows the one with the smallest Σ(|ξ_j|³ a_j)², ξ = J⁻¹(x − x₀). J is a length; where cells are so flat that
-/// rounding is all that is left then, its columns are half the way across the nodes along each axis: a quadratic of x is one
-/// of ξ, n·∇ₓ = (J⁻¹n)·∇_ξ, and distances are measured in cells.
+/// Among the rows that are exact it takes the one with the smallest Σ(|ξ_j|³ a_j)², where ξ = J⁻¹(x − x₀) and J is a
+/// local length. Where the cells are so flat that such a row is lost to rounding, the columns of J are instead half the
+/// way across the nodes along each axis, so that distances are measured in cells. A quadratic in x is one in ξ, and
+/// n·∇ₓ = (J⁻¹n)·∇_ξ.
 ///
-/// The node itself may end up with next to no weight, and its value would be anything. Where it has less than half of what it
-/// has in the one-sided difference inward, (d₁ + d₂)/(d₁ d₂) with distances d from the side, it is given that, unless cells
-/// are flat.
+/// The node itself may then have next to no weight, which would leave its value undetermined. If its weight is less
+/// than half of that in the one-sided difference inward, (d₁ + d₂)/(d₁ d₂) with distances d from the side, it is given
+/// the latter, except in flat cells.
 fn derivative(
     mesh: &Mesh<2>,
     index: usize,
@@ -211,8 +218,8 @@ fn derivative(
     Err(Failure::DegenerateStencil { node, x: x[index], condition })
 }
 
-/// The a with the smallest Σ(|ξ_j|³ a_j)² among those with Σ a_j p_k(ξ_j) as wanted, p = x, y, xy, x² − y², x², 1, and the
-/// condition number.
+/// The weights a with the smallest Σ(|ξ_j|³ a_j)² among those with given values Σ a_j p_k(ξ_j), for p = x, y, xy, x² −
+/// y², x² and 1, and their condition number.
 fn shortest<const N: usize>(places: &[[f64; 2]; 8], wanted: [f64; N]) -> ([f64; 8], f64) {
     let share = places.map(|[x, y]| x.hypot(y).powi(-3));
     let mut columns = [[Lanes::ZERO; 8]; N];

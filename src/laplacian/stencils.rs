@@ -14,10 +14,10 @@ pub struct NearDegenerate {
     pub condition: f64,
 }
 
-/// One row: which nodes it takes, and how.
+/// One row of the compact scheme: its points, and their weights.
 #[derive(Debug, Clone)]
 pub(super) struct Window {
-    /// Lattice node of the first of 5 × 5 points.
+    /// Lattice node of the first of the 5 × 5 points.
     pub first: [usize; 2],
     /// Weights on u.
     pub a: [f64; 25],
@@ -60,7 +60,8 @@ impl Stencils {
         let tell = |(k, &condition): (usize, &f64)| {
             let node = node(&patch, k);
             let x = mesh.x()[mesh.lattice().index(node)];
-            // the slides' columns differ in size by design: their condition says nothing about the mesh
+            // The columns of the published method differ in size by design: their condition number says nothing about
+            // the mesh.
             let near = !matches!(laplacian, Laplacian::Published { .. })
                 && (condition.is_nan() || condition > NEAR_DEGENERATE);
             near.then_some(NearDegenerate { node, x, condition })
@@ -69,12 +70,12 @@ impl Stencils {
         Self { laplacian, patch, nodes: mesh.lattice().nodes(), rows: Rows::Nine(Vec::new()), near_degenerate }
     }
 
-    /// The kind.
+    /// The kind of Laplacian.
     pub fn laplacian(&self) -> Laplacian {
         self.laplacian
     }
 
-    /// The nodes that have a row, in lattice order.
+    /// The patch of the nodes that have a row.
     pub fn patch(&self) -> &Patch<2> {
         &self.patch
     }
@@ -98,12 +99,12 @@ impl Stencils {
         i * self.nodes[1] + j
     }
 
-    /// (lattice index, weight on u, weight on Δu) of all points of row k; none where there is no such row.
+    /// (lattice index, weight on u, weight on Δu) of all points of row k; none where k is too large.
     pub fn row(&self, k: usize) -> Option<Vec<(usize, f64, f64)>> {
         (k < self.patch.len()).then(|| self.points(k))
     }
 
-    /// The points of a row that is there.
+    /// The points of row k, which must exist.
     pub(super) fn points(&self, k: usize) -> Vec<(usize, f64, f64)> {
         let [i, j] = node(&self.patch, k);
         match &self.rows {
@@ -125,7 +126,7 @@ impl Stencils {
         }
     }
 
-    /// A u at the nodes of [`patch`](Self::patch), in order, from one value for every node of the lattice.
+    /// A u at the nodes of [`patch`](Self::patch), in order, from the values at all nodes of the lattice.
     ///
     /// # Errors
     /// [`Failure::WrongLength`] where `u` has not one value a node.
@@ -137,7 +138,7 @@ impl Stencils {
         Ok((0..self.patch.len()).map(|k| self.points(k).iter().map(|&(index, a, _)| a * u[index]).sum()).collect())
     }
 
-    /// Share of rows in which no neighbour's weight is negative.
+    /// The share of rows in which all neighbours have weights ≥ 0.
     pub fn nonnegative_fraction(&self) -> f64 {
         let kept = |k: &usize| {
             let (own, row) = (self.index(*k), self.points(*k));
@@ -147,7 +148,7 @@ impl Stencils {
         (0..self.patch.len()).filter(kept).count() as f64 / self.patch.len() as f64
     }
 
-    /// Largest error on monomials of degree 0 to 6, in local units of length, over all rows
+    /// The largest error over all rows on the monomials of each degree from 0 to 6, in local units of length
     ///
     /// ```text
     /// |Σ a_j p(d_j/h) h² − Σ b_j (Δp)(d_j/h)|,   h = the largest distance to a neighbour along an axis
@@ -156,7 +157,7 @@ impl Stencils {
         self.residuals_in(mesh, |_| 1.0)
     }
 
-    /// The same in units that follow from the sum of the sizes of all terms.
+    /// The same errors in units that are a function of the sum of the magnitudes of all terms.
     fn residuals_in(&self, mesh: &Mesh<2>, unit: impl Fn(f64) -> f64) -> [f64; 7] {
         let (x, extent, wraps) = (mesh.x(), mesh.extent(), mesh.lattice().periodic());
         let mut worst = [0.0_f64; 7];
@@ -165,7 +166,7 @@ impl Stencils {
             let distance = |index: usize| -> [f64; 2] {
                 std::array::from_fn(|c| {
                     let d = x[index][c] - x[own][c];
-                    // the nearest image
+                    // the difference to the nearest image
                     if wraps[c] { d - extent[c] * (d / extent[c]).round() } else { d }
                 })
             };
@@ -201,8 +202,9 @@ impl Stencils {
         worst
     }
 
-    /// The highest degree up to which the Laplacian of every polynomial is exact at every node, to 1e-9 in local units or of
-    /// the terms that cancel, which are large where cells are flat; none where constants are not.
+    /// The highest degree up to which the Laplacian of every polynomial is exact at every node; none where not even
+    /// constants are. Exact means an error of at most 1e-9, in local units or of the terms that cancel, which are large
+    /// where cells are flat.
     pub fn exact_degree(&self, mesh: &Mesh<2>) -> Option<usize> {
         let residuals = self.residuals_in(mesh, |size| size.max(1.0));
         residuals.iter().take_while(|&&residual| residual <= 1e-9).count().checked_sub(1)

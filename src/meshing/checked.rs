@@ -1,15 +1,16 @@
-//! What a step of a mesh generator is given, and what it returns.
+//! Checks of what a step of a mesh generator is given, and of what it returns.
 
 use super::{Mmpde, Moved, Relaxation, Steps};
 use crate::error::Failure;
 use crate::geometry::{Mesh, check_length, check_positive, check_unfolded};
 
-/// Standard error of interface values, as a share of the shortest edge, above which it may have folded a mesh.
+/// A folded mesh is blamed on noise where the standard error of the interface values exceeds this share of its shortest
+/// edge.
 const NOISE_THAT_FOLDS: f64 = 0.05;
-/// Distance from the side of a box, as a share of its extent, that is round-off.
+/// Nodes may lie off the sides of the box by this share of its extent, which is round-off.
 const ROUNDING: f64 = 1e-9;
 
-/// Refuses what no step of a mesh equation can begin with.
+/// Refuses meshes, densities and time steps with which no mesh equation can be stepped.
 pub(super) fn check_given<const D: usize>(
     equation: &Mmpde,
     mesh: &Mesh<D>,
@@ -32,7 +33,7 @@ pub(super) fn check_given<const D: usize>(
     check_positive(mesh, "the mesh density", rho)
 }
 
-/// Refuses a mesh whose bounded sides do not lie on the box around it: on those, nodes move along straight lines.
+/// Refuses a mesh whose bounded sides do not lie on the box around it: nodes on sides move along straight lines.
 pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
     let (lattice, ends, extent) = (mesh.lattice(), [mesh.lower(), mesh.upper()], mesh.extent());
     for k in lattice.sides() {
@@ -49,7 +50,7 @@ pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a folded mesh, and tells the noise that may have folded it.
+/// Refuses a folded mesh; the failure carries the noise that may have folded it.
 pub(super) fn check_made<const D: usize>(moved: Moved<D>) -> Result<Moved<D>, Failure> {
     let noise = moved.interface.and_then(|interface| interface.noise).filter(|noise| *noise > NOISE_THAT_FOLDS);
     check_unfolded(&moved.mesh).map_err(|failure| match failure {

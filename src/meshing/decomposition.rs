@@ -3,8 +3,9 @@ use crate::geometry::{Lattice, Patch};
 
 /// A division of the lattice into S_ξ × S_η subdomains
 ///
-/// Cuts are lines of nodes, as evenly apart as the cells allow: s·cells/S, rounded. On a bounded axis S subdomains have
-/// S − 1 cuts between them. On a periodic axis they have S, the first at node 0; a single subdomain has none and wraps.
+/// Cuts are lines of nodes, spaced as evenly as the cells allow: at s·cells/S, rounded. On a bounded axis S subdomains
+/// have S − 1 cuts between them. On a periodic axis they have S cuts, the first of them at node 0; a single subdomain
+/// has none and wraps.
 ///
 /// # Example
 /// ```
@@ -18,7 +19,7 @@ use crate::geometry::{Lattice, Patch};
 #[derive(Debug, Clone)]
 pub struct Decomposition {
     lattice: Lattice<2>,
-    /// Ends of the subdomains along each axis, in nodes.
+    /// The first and the last node of the subdomains along each axis.
     spans: [Vec<[usize; 2]>; 2],
 }
 
@@ -27,7 +28,7 @@ pub struct Decomposition {
 pub struct Cut {
     /// The axis along which it runs.
     pub along: usize,
-    /// Its nodes in order, those on bounded sides included.
+    /// Its nodes in order, with those on bounded sides.
     pub nodes: Vec<usize>,
 }
 
@@ -50,28 +51,28 @@ impl Decomposition {
         Ok(Self { lattice: *lattice, spans })
     }
 
-    /// What is divided.
+    /// The lattice that is divided.
     pub fn lattice(&self) -> &Lattice<2> {
         &self.lattice
     }
 
-    /// True where there are cuts across an axis.
+    /// Whether there are cuts across an axis.
     pub fn is_divided(&self, d: usize) -> bool {
         self.spans[d].len() > 1
     }
 
-    /// Cells of the narrowest subdomain across any cuts; as many as can be counted where there are none.
+    /// Cells of the narrowest subdomain along axes with cuts; the largest number there is where there are no cuts.
     pub fn narrowest(&self) -> usize {
         let divided = self.spans.iter().filter(|spans| spans.len() > 1).flatten();
         divided.map(|[low, high]| high - low).min().unwrap_or(usize::MAX)
     }
 
-    /// True where a whole periodic axis is one subdomain.
+    /// Whether a single subdomain fills a periodic axis.
     fn wraps(&self, d: usize) -> bool {
         self.lattice.periodic()[d] && self.spans[d].len() == 1
     }
 
-    /// Cuts across one axis, as places along it.
+    /// The cuts across one axis, as node indices along it.
     fn cuts(&self, d: usize) -> impl Iterator<Item = usize> {
         let none = self.spans[d].len() == 1;
         let first = if self.lattice.periodic()[d] && !none { 0 } else { 1 };
@@ -92,7 +93,7 @@ impl Decomposition {
         lines
     }
 
-    /// All nodes on cuts, bounded sides left out, in order.
+    /// All nodes on cuts in ascending order, without those on bounded sides.
     pub fn points(&self) -> Vec<usize> {
         let inner = |k: &usize| !self.on_side(*k);
         let mut points: Vec<usize> = self.lines().into_iter().flat_map(|cut| cut.nodes).filter(inner).collect();
@@ -101,7 +102,8 @@ impl Decomposition {
         points
     }
 
-    /// The number of the subdomain of every cell, in lattice order; they are counted along η first.
+    /// The number of the subdomain that each cell lies in, in lattice order. Subdomains are numbered with the second
+    /// axis fastest.
     pub fn of_cells(&self) -> Vec<usize> {
         let number = |d: usize, cell: usize| self.spans[d].iter().position(|span| cell < span[1]).unwrap_or(0);
         let [n, m] = self.lattice.cells();
@@ -112,19 +114,19 @@ impl Decomposition {
             .collect()
     }
 
-    /// True for a node on a bounded side.
+    /// Whether a node stands on a bounded side.
     pub fn on_side(&self, index: usize) -> bool {
         let (node, nodes, periodic) = (self.lattice.node(index), self.lattice.nodes(), self.lattice.periodic());
         (0..2).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d]))
     }
 
-    /// The insides of all subdomains; one of a single cell has none and is left out.
+    /// The unknowns of all subdomains; a subdomain of a single cell has none and is left out.
     pub fn patches(&self) -> Vec<Patch<2>> {
         self.extended([0, 0]).into_iter().map(|(patch, _)| patch).collect()
     }
 
-    /// All subdomains made larger by `more[0]` cells downwards and `more[1]` upwards along each axis, as far as there
-    /// are nodes, each with the nodes that it alone answers for: those above its lower cut up to its upper one.
+    /// All subdomains, enlarged along each axis by `more[0]` cells downwards and `more[1]` upwards as far as there are
+    /// nodes. Each comes with the nodes that it owns: those above its lower cut up to its upper one.
     pub fn extended(&self, more: [usize; 2]) -> Vec<(Patch<2>, Vec<usize>)> {
         let (cells, nodes, periodic) = (self.lattice.cells(), self.lattice.nodes(), self.lattice.periodic());
         let mut all = Vec::new();
@@ -135,7 +137,8 @@ impl Decomposition {
                 for (d, [low, high]) in [a, b].into_iter().enumerate().filter(|&(d, _)| !self.wraps(d)) {
                     let n = cells[d];
                     let (from, to) = if periodic[d] {
-                        // both rings may be the same node, but a patch never overlaps itself and holds its upper cut
+                        // on a short periodic axis both rings may be the same node, but a patch never overlaps itself,
+                        // and it holds its upper cut
                         let spare = n - (high - low);
                         let down = more[0].min(spare / 2);
                         (low + n - down, high + n + more[1].min(spare - down))

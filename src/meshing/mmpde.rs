@@ -6,33 +6,33 @@ use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Pcg};
 use crate::work::Work;
 
-/// The moving mesh equation, with ρ frozen over a step
+/// The moving mesh equation, with ρ frozen over a time step
 ///
 /// ```text
 /// x_t = (1/τ) (b·∇_ξ x + ∇²_ξ x),   b = ∇_ξ ρ / ρ      or the same as      ρ x_t = (1/τ) ∇_ξ·(ρ ∇_ξ x),
 /// ```
 ///
-/// the same for y. τ > 0 (`relaxation`) has the unit of time: how long the mesh takes to follow its density across the
-/// domain.
+/// and the same for y. τ > 0 (`relaxation`) has the unit of time: it is how long the mesh takes to follow its density
+/// across the domain.
 ///
 /// # Source
 /// (2.4) of Bihlo, Haynes and Walsh (2015), MMPDE5 divided by ρ before it is relaxed.
 ///
-/// The default is that of studies and of Python: the conservative form, and a τ that the mesh chooses, which is
-/// [`STEPS_TO_BEGIN_WITH`](super::STEPS_TO_BEGIN_WITH) time steps for a generator by itself. [`Mmpde::published`] is that of
-/// the paper.
+/// The default is that of studies and of Python: the conservative form, with a τ that is chosen from how the mesh
+/// moves. A generator used alone takes [`STEPS_TO_BEGIN_WITH`](super::STEPS_TO_BEGIN_WITH) time steps for it.
+/// [`Mmpde::published`] is the form of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mmpde {
-    /// τ.
+    /// The relaxation time τ.
     pub relaxation: Relaxation,
-    /// How it is discretised.
+    /// The discretisation.
     pub form: Form,
 }
 
 /// How the mesh equation is discretised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
-    /// b·∇x + ∇²x at the nodes, as published, with this difference for b.
+    /// b·∇x + ∇²x at the nodes, as published, with this difference scheme for b.
     Gradient(Gradient),
     /// Fluxes ρ∇x through the faces of dual cells
     ///
@@ -40,12 +40,14 @@ pub enum Form {
     /// W_i (xⁿ⁺¹ − xⁿ)_i = Δt/(τh²) Σ_e ρ_e (x_e − x_i)ⁿ⁺¹
     /// ```
     ///
-    /// with the ρ of mesh cells, the mean of their nodes: ρ_e that of the cells beside an edge, W_i of those around a
-    /// node. Over W a symmetric M-matrix for any ρ, the same for x and y.
+    /// ρ is averaged from the nodes to the mesh cells; ρ_e is the mean over the cells beside an edge, W_i the one over
+    /// the cells around a node. Multiplied by W, the matrix is a symmetric M-matrix for any ρ, and the same for x and
+    /// y.
     Conservative,
 }
 
-/// How exactly mesh equations are solved, as a share of the largest coordinate: far below any cell.
+/// Tolerance of the gradient form and of solves on subdomains and sides, as a share of the largest coordinate: far
+/// below any cell.
 const EXACTNESS: f64 = 1e-12;
 
 impl Default for Mmpde {
@@ -103,13 +105,14 @@ impl Mmpde {
         Ok(MeshOperator { lattice: *lattice, weights, volumes: None })
     }
 
-    /// The conservative form from one ρ a mesh cell. Nodes on sides, where no row stands, have weights of zero.
+    /// The conservative form from one value of ρ for each mesh cell. Nodes on sides, which have no row, have weights of
+    /// zero.
     pub(super) fn on_cells<const D: usize>(&self, lattice: &Lattice<D>, cells: &[f64], dt: f64) -> MeshOperator<D> {
         let a = self.stiffness(lattice, dt);
         let mut weights = vec![[[0.0; 2]; D]; lattice.len()];
         let mut volumes = vec![1.0; lattice.len()];
         let cells = around_nodes(lattice, cells);
-        // cells around a node have its own place, or one less along some axes
+        // the cells around a node have its indices, or one less along some of the axes
         let below = strides(lattice.nodes().map(|n| n + 1));
         let patch = Patch::whole(lattice);
         for (k, place) in patch.nodes(lattice).zip(places(&patch, below)) {
@@ -127,7 +130,7 @@ impl Mmpde {
     }
 }
 
-/// Places of the cells below the nodes of a patch in an array with these strides.
+/// Indices, in an array with these strides, of the cells below the nodes of a patch.
 fn places<const D: usize>(patch: &Patch<D>, strides: [usize; D]) -> impl Iterator<Item = usize> {
     let (size, origin) = (patch.size, patch.origin);
     (0..patch.pencil_count()).flat_map(move |p| {
@@ -140,8 +143,8 @@ fn places<const D: usize>(patch: &Patch<D>, strides: [usize; D]) -> impl Iterato
     })
 }
 
-/// Cell values with one cell more along each axis: entry i lies below node i, entry i + 1 above it. Below the first
-/// node of a bounded axis and above its last lie zeros.
+/// Cell values in an array with one cell more along each axis: entry i is the cell below node i, entry i + 1 the one
+/// above. Below the first node of a bounded axis and above its last one the values are zero.
 fn around_nodes<const D: usize>(lattice: &Lattice<D>, cells: &[f64]) -> Vec<f64> {
     let (n, size, periodic) = (lattice.cells(), lattice.nodes().map(|n| n + 1), lattice.periodic());
     let mut out = Vec::with_capacity(size.iter().product());
@@ -165,7 +168,7 @@ fn around_nodes<const D: usize>(lattice: &Lattice<D>, cells: &[f64]) -> Vec<f64>
     out
 }
 
-/// Means of nodal values over the mesh cells, last axis fastest.
+/// Means of nodal values over the mesh cells, in an array with the last axis fastest.
 pub(super) fn cell_means<const D: usize>(lattice: &Lattice<D>, values: &[f64]) -> Vec<f64> {
     let (cells, closed) = (lattice.cells(), lattice.closed(values));
     let strides = strides(cells.map(|n| n + 1));
@@ -175,7 +178,7 @@ pub(super) fn cell_means<const D: usize>(lattice: &Lattice<D>, values: &[f64]) -
     places(&patch, strides).map(mean).collect()
 }
 
-/// How far apart neighbours along each axis are in an array, last axis fastest.
+/// Distance in an array between neighbours along each axis, with the last axis fastest.
 fn strides<const D: usize>(size: [usize; D]) -> [usize; D] {
     std::array::from_fn(|d| size[d + 1..].iter().product())
 }
@@ -186,25 +189,25 @@ fn strides<const D: usize>(size: [usize; D]) -> [usize; D] {
 /// (1 + Σ_e w_e) x_i − Σ_e w_e x_e = xⁿ_i,   e the 2D neighbours of node i
 /// ```
 ///
-/// Rows add up to one, so with all weights ≥ 0 a residual bounds the error of the mesh in the maximum norm, and the
-/// weights over 1 + Σ w_e are the jump probabilities of a walk on the lattice that stops with 1/(1 + Σ w_e). Every form
-/// of the mesh equation and every way to solve it meets here.
+/// Rows sum to one. With all weights ≥ 0 a residual therefore bounds the error of the mesh in the maximum norm, and
+/// w_e/(1 + Σ w) are the jump probabilities of a random walk on the lattice that stops with 1/(1 + Σ w). Every form of
+/// the mesh equation is turned into this type, and every way to solve it starts from it.
 #[derive(Debug, Clone)]
 pub struct MeshOperator<const D: usize> {
     lattice: Lattice<D>,
-    /// For each node and axis the weights toward the neighbour below and above.
+    /// For each node and axis the weights of the neighbours below and above.
     weights: Vec<[[f64; 2]; D]>,
-    /// W at each node where rows times W are symmetric.
+    /// W at each node, if the rows multiplied by W are symmetric.
     volumes: Option<Vec<f64>>,
 }
 
 impl<const D: usize> MeshOperator<D> {
-    /// The lattice it stands on.
+    /// The lattice of the mesh.
     pub fn lattice(&self) -> &Lattice<D> {
         &self.lattice
     }
 
-    /// For each node and axis the weights toward the neighbour below and above.
+    /// For each node and axis the weights of the neighbours below and above.
     pub fn weights(&self) -> &[[[f64; 2]; D]] {
         &self.weights
     }
@@ -223,13 +226,13 @@ impl<const D: usize> MeshOperator<D> {
         matrix
     }
 
-    /// True in the conservative form.
+    /// Whether the rows are symmetric up to a factor, as in the conservative form.
     pub fn is_symmetric(&self) -> bool {
         self.volumes.is_some()
     }
 
-    /// Solves a symmetric step on one patch like [`solve`](Self::solve), by conjugate gradients, each position to
-    /// `closeness` or better; none where the operator is not symmetric or they fail.
+    /// Solves a symmetric step on one patch by conjugate gradients, to an error of at most `closeness` in each
+    /// position; otherwise as [`solve`](Self::solve). None where the operator is not symmetric or the iteration fails.
     pub fn solve_symmetric<const S: usize, const K: usize>(
         &self,
         patch: Patch<D>,
@@ -251,7 +254,7 @@ impl<const D: usize> MeshOperator<D> {
         Some((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
     }
 
-    /// The first node off the sides that has a weight below zero: |b|h > 2, or no number.
+    /// The first node off the sides that has a weight below zero (|b|h > 2) or NaN.
     pub(super) fn negative_weight(&self) -> Option<usize> {
         let negative = |k: &usize| !self.weights[*k].as_flattened().iter().all(|&w| w >= 0.0);
         Patch::whole(&self.lattice).nodes(&self.lattice).find(negative)
@@ -275,8 +278,9 @@ impl<const D: usize> MeshOperator<D> {
     /// Solves the step on one patch, given new values on the ring around it
     ///
     /// `old` and `new` are nodal values on the whole lattice. `new` holds the known values on the ring and a guess
-    /// inside; what returns is the padded vector of the patch, exact to 1e-12 of `size`, the largest coordinate, or to
-    /// round-off where Δt/(τh²) is so large that it is more. `jump[d]` is added on wrapping around axis d.
+    /// inside. The result is the padded vector of the patch. Its error is at most 1e-12 of `size`, the largest
+    /// coordinate, or round-off where that is more because Δt/(τh²) is large. `jump[d]` is added on wrapping around
+    /// axis d.
     ///
     /// # Errors
     /// [`Failure::LinearStalled`].
@@ -296,7 +300,7 @@ impl<const D: usize> MeshOperator<D> {
         Ok((x, work))
     }
 
-    /// The right-hand side on one patch: old values, continued across the seam of a periodic axis.
+    /// The right-hand side on one patch: the old positions, continued across the ends of periodic axes.
     pub(super) fn right<const K: usize>(
         &self,
         patch: Patch<D>,
@@ -310,7 +314,7 @@ impl<const D: usize> MeshOperator<D> {
     }
 }
 
-/// The residual at which a mesh equation counts as solved.
+/// The residual below which a mesh equation counts as solved.
 pub(super) fn exactness<const D: usize, const S: usize, const K: usize>(
     matrix: &LatticeMatrix<D, S>,
     size: [f64; K],

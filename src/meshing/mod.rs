@@ -1,4 +1,4 @@
-//! From a density to a mesh: the mesh equation, and the ways to solve it.
+//! From a density to a mesh: the moving mesh equation, and the methods to solve it.
 
 mod checked;
 mod decomposition;
@@ -31,19 +31,19 @@ use crate::kind::kinds;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
-/// A way to advance the mesh by one time step.
+/// A method to advance the mesh by one time step.
 ///
-/// Laws, tested for every implementation: the mesh does not change under ρ → cρ; constant ρ leaves a uniform mesh at
-/// rest; side nodes stay exactly on the box.
+/// Every implementation is tested for these laws: the mesh does not change under ρ → cρ, a constant ρ leaves a uniform
+/// mesh at rest, and nodes on sides stay exactly on the box.
 pub trait MeshGenerator<const D: usize = 2>: Send {
-    /// The mesh at t + `dt` from the mesh at t and the density on it, one value a node: [`solve`](Self::solve), with checks
-    /// of what it is given and of what it returns.
+    /// The mesh at t + `dt`, from the mesh at t and the density at its nodes. It calls [`solve`](Self::solve), and
+    /// checks what is given and what is returned.
     ///
     /// # Errors
-    /// [`Failure::OutOfRange`] for a `dt` or τ that is not finite and positive, and for a prediction, which takes a
-    /// [`Mover`](crate::mover::Mover); [`Failure::WrongLength`], [`Failure::NonFinite`] or [`Failure::NotPositive`] for the
-    /// density; [`Failure::NotABox`] for a mesh whose sides are not those of the box around it;
-    /// [`Failure::Folded`] for a new mesh with a folded cell; or what `solve` fails with.
+    /// [`Failure::OutOfRange`] for a `dt` or τ that is not finite and positive, and for a prediction, which needs a
+    /// [`Mover`](crate::mover::Mover). [`Failure::WrongLength`], [`Failure::NonFinite`] or [`Failure::NotPositive`] for
+    /// the density. [`Failure::NotABox`] for a mesh whose sides are not those of the box around it. [`Failure::Folded`]
+    /// for a new mesh with a folded cell. Any failure of `solve`.
     ///
     /// # Example
     /// ```
@@ -62,66 +62,67 @@ pub trait MeshGenerator<const D: usize = 2>: Send {
         checked::check_made(self.solve(equation, mesh, rho, dt)?)
     }
 
-    /// Solves for that mesh: what an implementation writes, and nobody calls but [`step`](Self::step).
+    /// Solves for the new mesh, without checks. Implementations write this method; callers use [`step`](Self::step).
     ///
     /// # Errors
     /// A [`Failure`] where a system cannot be solved or the settings do not fit the lattice.
     fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &[f64], dt: f64) -> Result<Moved<D>, Failure>;
 
-    /// False for a mesh that stays, which nothing predicts either.
+    /// Whether the method moves the mesh at all; a mesh that stays is not predicted either.
     fn moves(&self) -> bool {
         true
     }
 
-    /// Puts what it carries from step to step into a checkpoint; nothing where steps depend on their arguments alone.
+    /// Puts the state that it carries from step to step into a checkpoint. There is none if a step depends on its
+    /// arguments alone.
     fn keep(&self, _kept: &mut Kept) {}
 
-    /// Goes on from what [`keep`](Self::keep) left. `mesh` is any mesh of the run.
+    /// Restores the state that [`keep`](Self::keep) stored. `mesh` is any mesh of the run.
     ///
     /// # Errors
-    /// [`Unfit`] where that is not there, or cannot be.
+    /// [`Unfit`] where the state is missing or does not fit.
     fn resume(&mut self, _mesh: &Mesh<D>, _kept: &Kept) -> Result<(), Unfit> {
         Ok(())
     }
 }
 
-/// A mesh that was moved.
+/// The result of a step of a mesh generator.
 #[derive(Debug, Clone)]
 pub struct Moved<const D: usize = 2> {
     /// The mesh at the end of the step.
     pub mesh: Mesh<D>,
-    /// What it cost.
+    /// The work of the step.
     pub work: Work,
-    /// How well the subdomains fit together, where there are any.
+    /// How well the subdomains fit together; none for methods without subdomains.
     pub interface: Option<Interface>,
 }
 
-/// What one step knows about the values at which subdomains meet.
+/// What one step tells of the interface values, at which subdomains meet.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Interface {
     /// Nodes at which subdomains meet.
     pub points: usize,
-    /// Root mean square of the standard errors of their values, both coordinates of all points; none where a single
-    /// sample has no spread, and none for deterministic methods.
+    /// Root mean square of the standard errors of the interface values, over both coordinates of all points. None for
+    /// deterministic methods, and for a single sample, which has no spread.
     pub standard_error: Option<f64>,
-    /// That over the shortest edge of the mesh.
+    /// `standard_error` as a share of the shortest edge of the mesh.
     pub noise: Option<f64>,
-    /// Relaxation sweeps in strips before the walks.
+    /// Relaxation sweeps in the strips before the walks.
     pub sweeps: usize,
-    /// Walks or paths from each point; 0 of deterministic methods, and where strips alone are better than walks.
+    /// Walks or paths from each point; 0 for deterministic methods, and where strips alone are better than walks.
     pub walks: usize,
-    /// Exchanges between neighbours.
+    /// Exchanges of data between neighbouring subdomains.
     pub exchanges: usize,
-    /// Nodes that the subdomain with the most to read reads from its neighbours in one exchange.
+    /// Nodes that a subdomain reads from its neighbours in one exchange; the largest number over the subdomains.
     pub read: usize,
-    /// Unknowns of a coarse lattice, whose right-hand sides are gathered in an exchange.
+    /// Unknowns of the coarse lattice, whose right-hand sides are gathered from all subdomains in each exchange.
     pub gathered: usize,
-    /// Walks that ended where another subdomain pays.
+    /// Walks that ended so far away that their value had to come from another subdomain.
     pub handed_on: usize,
-    /// How fast an iteration between the subdomains converged.
+    /// Convergence of a Schwarz iteration between the subdomains; none for other methods.
     pub contraction: Option<Contraction>,
-    /// Seconds spent on interface values.
+    /// Seconds spent on the interface values.
     #[serde(skip)]
     pub seconds: f64,
 }
@@ -131,10 +132,10 @@ pub struct Interface {
 pub struct Contraction {
     /// Iterations done.
     pub iterations: usize,
-    /// Bound on the factor by which an iteration shrinks the error, from the operator itself; none of optimised
+    /// Bound on the factor by which an iteration reduces the error, computed from the operator; none for optimised
     /// conditions.
     pub predicted: Option<f64>,
-    /// Geometric mean of the factors seen between the first and the last change.
+    /// Geometric mean of the factors by which the change of the mesh shrank from iteration to iteration.
     pub observed: f64,
 }
 
@@ -142,7 +143,8 @@ kinds! {
     /// `mesh.generator` of a study.
     GeneratorKind {
         "whole" = Whole: "one implicit solve of the mesh equation on the whole domain",
-        "stochastic" = Stochastic: "walks or strips give the interfaces between subdomains, then each is solved by itself",
+        "stochastic" = Stochastic: "walks or strips give the interfaces between subdomains, then each is solved by \
+                                    itself",
         "schwarz" = Schwarz: "overlapping subdomains, solved in parallel and iterated to a tolerance or so many times",
         "fixed" = Fixed: "the mesh does not move",
     }

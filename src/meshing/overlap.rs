@@ -1,4 +1,4 @@
-//! Subdomains that overlap: each corrects the mesh on its own.
+//! Overlapping subdomains, each of which corrects the mesh by itself.
 
 use super::MeshOperator;
 use super::mmpde::exactness;
@@ -9,31 +9,31 @@ use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust, Smoother, rel
 use crate::parallel;
 use crate::work::Work;
 
-/// A subdomain with a part of its neighbours
+/// A subdomain extended into its neighbours
 ///
-/// It solves M c = r for a correction c of the mesh, given on the ring around it. Corrections are the same on both
-/// sides of the seam of a periodic axis, and zero on the sides of the domain.
+/// It solves M c = r for a correction c of the mesh, which is given on the ring around it. Corrections are zero on the
+/// sides of the domain, and the same at both ends of a periodic axis.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     pub patch: Patch<2>,
-    /// The nodes it answers for, and where they are in its padded vectors.
+    /// The nodes that it owns, with their places in its padded vectors.
     pub own: Vec<(usize, usize)>,
     pub matrix: LatticeMatrix<2, 5>,
-    /// r of the unknowns.
+    /// r at the unknowns.
     pub right: Vec<[f64; 2]>,
     solver: Robust<2>,
-    /// c, padded: on its ring what is given, inside a guess and then the solution.
+    /// c as a padded vector: given values on the ring; inside, first a guess and then the solution.
     pub correction: Vec<[f64; 2]>,
-    /// True where there was nothing to correct but round-off.
+    /// Whether r was zero up to round-off, so that nothing was corrected.
     pub rests: bool,
 }
 
-/// How a part corrects the mesh.
+/// How a part computes its correction.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Local {
-    /// By a solve, until the residual is this share of the largest that there is, or round-off.
+    /// By a solve, until the residual is this share of its largest value, or round-off.
     Solve { share: f64 },
-    /// By sweeps, with the weights for this lower end of the spectrum.
+    /// By relaxation sweeps, with the lower end of the spectrum for their weights.
     Sweeps { smoother: Smoother, sweeps: usize, lowest: f64 },
 }
 
@@ -44,25 +44,25 @@ impl Part {
         Self { patch, own, matrix, right: Vec::new(), solver: Robust::default(), correction: Vec::new(), rests: false }
     }
 
-    /// The system of a step, for a residual at all nodes.
+    /// Sets up the system of a step, for a residual at all nodes.
     pub fn prepare(&mut self, operator: &MeshOperator<2>, residual: &[[f64; 2]]) {
         self.matrix = operator.matrix(self.patch);
         self.right.clear();
         self.right.extend(self.patch.nodes(operator.lattice()).map(|k| residual[k]));
     }
 
-    /// Takes ring and guess from nodal values.
+    /// Takes ring and guess of c from nodal values.
     pub fn start(&mut self, lattice: &Lattice<2>, guess: &[[f64; 2]]) {
         self.correction = self.patch.gather(lattice, guess, [[0.0; 2]; 2]);
     }
 
-    /// Corrects. `size` is the largest coordinate along each axis.
+    /// Computes the correction. `size` is the largest coordinate along each axis.
     pub fn correct(&mut self, local: Local, size: [f64; 2]) -> Result<Work, Failure> {
         let exact = exactness(&self.matrix, size);
         let nothing = |v: &[f64; 2]| (0..2).all(|c| v[c].abs() <= exact[c]);
         self.rests = self.right.iter().chain(&self.correction).all(nothing);
         if self.rests {
-            // a mesh that is at rest but for round-off stays, to the last bit
+            // a mesh that is at rest up to round-off stays the same to the last bit
             self.correction.fill([0.0; 2]);
             return Ok(Work::default());
         }
@@ -78,13 +78,13 @@ impl Part {
         }
     }
 
-    /// Nodes that it reads from its neighbours: those of its patch and the ring, corners included, that are not its own
-    /// and not on bounded sides, which all know.
+    /// Number of nodes that it reads from its neighbours: those of its patch and ring, corners included, that it does
+    /// not own. Nodes on bounded sides are not counted, since every subdomain computes them.
     pub fn read(&self, lattice: &Lattice<2>) -> usize {
         let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
         let along = |d: usize| {
             let ring = if self.patch.wraps[d] { 0 } else { 1 };
-            // one period more, so that the ring below the origin is not negative
+            // a period is added, so that the ring below the origin has no negative index
             let first = self.patch.origin[d] + nodes[d] - ring;
             let all = (first..first + self.patch.size[d] + 2 * ring).map(|i| i % nodes[d]);
             all.filter(|&i| periodic[d] || (i > 0 && i + 1 < nodes[d])).count().min(nodes[d])
@@ -93,15 +93,15 @@ impl Part {
     }
 }
 
-/// A share of the largest value of each right-hand side, but no less than `least`.
+/// For each right-hand side a share of its largest value, but at least `least`.
 pub(super) fn share_of_largest(values: &[[f64; 2]], share: f64, least: [f64; 2]) -> [f64; 2] {
     let mut largest = [0.0; 2];
     values.iter().for_each(|v| (0..2).for_each(|c| largest[c] = larger(largest[c], v[c])));
     [0, 1].map(|c| (share * largest[c]).max(least[c]))
 }
 
-/// Where a node is in the padded vectors of a patch, unless it is one of the outermost `margin` unknowns or no unknown
-/// at all.
+/// The place of a node in the padded vectors of a patch; none for a node that is no unknown, or among the `margin`
+/// outermost ones.
 pub(super) fn place(patch: &Patch<2>, lattice: &Lattice<2>, node: usize, margin: usize) -> Option<usize> {
     let (node, nodes, strides) = (lattice.node(node), lattice.nodes(), patch.padded_strides());
     let mut place = 0;
@@ -116,8 +116,8 @@ pub(super) fn place(patch: &Patch<2>, lattice: &Lattice<2>, node: usize, margin:
     Some(place)
 }
 
-/// xⁿ − M x at every node, as xⁿ_i − x_i + Σ w_e (x_e − x_i); zero on bounded sides. `jump[d]` is added on wrapping
-/// around axis d.
+/// The residual xⁿ − M x at every node, as xⁿ_i − x_i + Σ w_e (x_e − x_i), and zero on bounded sides. `jump[d]` is
+/// added on wrapping around axis d.
 pub(super) fn residual(
     operator: &MeshOperator<2>,
     old: &[[f64; 2]],

@@ -2,7 +2,7 @@ use crate::error::{Error, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// τ of the mesh equation: how long the mesh takes to follow its density across the domain
+/// The relaxation time τ of the mesh equation: how long the mesh takes to follow its density across the domain
 ///
 /// # Example
 /// ```
@@ -13,12 +13,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "Written", into = "Written")]
 pub enum Relaxation {
-    /// Chosen from step to step by how the mesh moves, with prediction: see [`Gait`](crate::mover::Gait).
+    /// Chosen from step to step by how the mesh moves, with a prediction: see [`Gait`](crate::mover::Gait).
     #[default]
     Auto,
-    /// In units of time.
+    /// τ in units of time: how long the mesh takes to follow its density.
     Time(f64),
-    /// In units of the time step.
+    /// τ in units of the time step.
     Steps(Steps),
 }
 
@@ -26,9 +26,9 @@ pub enum Relaxation {
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected \"auto\", a number, or a table such as { steps = 25 }")]
 enum Written {
-    /// The mesh chooses τ from step to step by how it moves.
+    /// Chosen from step to step by how the mesh moves.
     Auto(Word),
-    /// τ in units of time.
+    /// τ in units of time: how long the mesh takes to follow its density.
     Time(f64),
     /// τ in units of the time step.
     Steps(Steps),
@@ -60,23 +60,25 @@ impl From<Relaxation> for Written {
     }
 }
 
-/// `{ steps = 40, prediction = 0.2 }`: τ is so many time steps, and the mesh is predicted before it relaxes.
+/// `{ steps = 40, prediction = 0.2 }`: τ in time steps, and a mesh that is predicted before it relaxes.
 ///
-/// A mesh that only relaxes lags behind a moving density by as much as the density moves in τ. With a prediction every
-/// node has a velocity v that learns from what relaxation corrects
+/// A mesh that only relaxes lags behind a moving density by what the density moves in τ. With a prediction every node
+/// has a velocity v, which learns from the corrections made by the relaxation:
 ///
 /// ```text
 /// x* = xⁿ + Δt v,   xⁿ⁺¹ = the mesh equation's step from x*, with the density of xⁿ,   v ← v + γ (xⁿ⁺¹ − x*)/Δt
 /// ```
 ///
-/// and the lag behind a density that moves evenly vanishes: an observer, with gain γ.
+/// This is an observer with gain γ. The lag behind a density that moves evenly vanishes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Steps {
-    /// τ over Δt.
+    /// τ as a number of time steps, at least 2. How many are enough depends on how many cells resolve the thinnest
+    /// layer.
     pub steps: f64,
-    /// γ, from 0 (no prediction) to ½. It takes a [`Mover`](crate::mover::Mover), which studies have: a generator by itself
-    /// keeps no velocities, and refuses a γ above 0.
+    /// γ: the share of each correction that the velocity of a node learns, from 0 (no prediction) to ½. It needs a
+    /// [`Mover`](crate::mover::Mover), as studies have; a generator used alone keeps no velocities, and refuses a γ
+    /// above 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prediction: f64,
 }
@@ -85,13 +87,13 @@ fn is_zero(gain: &f64) -> bool {
     *gain == 0.0
 }
 
-/// τ over Δt at the first step of a mesh that chooses it.
+/// τ/Δt at the first step of a mesh for which τ is chosen.
 pub const STEPS_TO_BEGIN_WITH: f64 = 40.0;
-/// γ of a mesh that chooses τ.
+/// γ of a mesh for which τ is chosen.
 const PREDICTION_BY_ITSELF: f64 = 0.2;
-/// With fewer steps than this it folds on any thin layer.
+/// Smallest τ/Δt that may be set: with less, a mesh folds on any thin layer.
 const FEWEST_STEPS: f64 = 2.0;
-/// With more, the mesh swings about its density.
+/// Largest γ that may be set: with more, the mesh oscillates about its density.
 const MOST_PREDICTION: f64 = 0.5;
 
 impl From<f64> for Relaxation {
@@ -101,7 +103,7 @@ impl From<f64> for Relaxation {
 }
 
 impl Relaxation {
-    /// So many time steps, without prediction.
+    /// τ in time steps, without a prediction.
     pub fn steps(steps: f64) -> Self {
         Self::Steps(Steps { steps, prediction: 0.0 })
     }
@@ -115,7 +117,7 @@ impl Relaxation {
         }
     }
 
-    /// τ where the time step is `dt`; for [`Auto`](Self::Auto), that of the first step.
+    /// τ for the time step `dt`; for [`Auto`](Self::Auto) that of the first step.
     pub fn over(self, dt: f64) -> f64 {
         match self {
             Self::Auto => STEPS_TO_BEGIN_WITH * dt,
@@ -127,7 +129,7 @@ impl Relaxation {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless τ is positive and finite, and no less than two steps where it is given in steps.
+    /// [`Error::Invalid`] unless τ is positive and finite, and at least two where it is given in time steps.
     pub fn check(self) -> Result<()> {
         match self {
             Self::Auto => Ok(()),

@@ -1,27 +1,27 @@
-//! What Robin's conditions between overlapping subdomains need to know of their rings.
+//! Robin's conditions between overlapping subdomains: the nodes on the ring of each subdomain.
 
 use super::overlap::{Part, place};
 use crate::geometry::{Lattice, Patch};
 
-/// A node on the ring of a part and the unknown before it.
+/// A node on the ring of a part, with the unknown beside it inside the part.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Trace {
-    /// Across which axis, and whether at its upper end.
+    /// The axis across which the ring lies there, and whether at its upper end.
     pub axis: usize,
     pub upper: bool,
-    /// The row of the unknown, and both places in padded vectors of the part.
+    /// The row of the unknown, and the places of unknown and ring node in padded vectors of the part.
     pub row: usize,
     pub ring: usize,
     pub inner: usize,
-    /// The part that answers for the node on the ring, and both places there.
+    /// The part that owns the ring node, and the places of both nodes in its padded vectors.
     pub other: usize,
     pub other_ring: usize,
     pub other_inner: usize,
-    /// What the unknown draws from the ring.
+    /// The weight of the ring node in the row of the unknown.
     pub weight: f64,
 }
 
-/// What Robin's conditions need of the ring of a part.
+/// All ring nodes of a part, for Robin's conditions.
 pub(super) fn traces(part: &Part, parts: &[Part], owner: &[usize], lattice: &Lattice<2>) -> Vec<Trace> {
     let strides = part.patch.padded_strides();
     let mut all = Vec::new();
@@ -44,8 +44,8 @@ pub(super) fn traces(part: &Part, parts: &[Part], owner: &[usize], lattice: &Lat
     all
 }
 
-/// Nodes of the ring around a patch, without its corners, each with the axis across which it lies, whether at the upper
-/// end, and its place along the other axis; on a wrapping axis there is none.
+/// The nodes of the ring around a patch, without its corners. Each comes with the axis across which it lies, whether at
+/// the upper end, and its index along the other axis. There are none on a wrapping axis.
 pub(super) fn ring<'a>(
     patch: &'a Patch<2>,
     lattice: &'a Lattice<2>,

@@ -13,47 +13,48 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Overlapping subdomains, solved in parallel and iterated
+/// Overlapping subdomains, solved in parallel and iterated until they agree
 ///
-/// Each iteration solves the step on every subdomain with the newest values of its neighbours on the ring around it;
-/// each node takes its value from the subdomain that it belongs to (restricted additive Schwarz). Rows of the mesh
-/// operator sum to one, so an error of size one on a ring makes one of at most
+/// In an iteration every subdomain solves the step with the newest values of its neighbours on the ring around it. Then
+/// each node takes its value from the subdomain that owns it (restricted additive Schwarz). Rows of the mesh operator
+/// sum to one, so that an error of one on the ring makes an error inside of at most w with
 ///
 /// ```text
 /// M w = 0 inside,   w = 1 on the artificial ring,   w = 0 on the sides of the domain
 /// ```
 ///
-/// inside, and the largest w at a node on another subdomain's ring bounds the contraction of an iteration.
+/// The largest w at a node on another subdomain's ring bounds the contraction of an iteration.
 ///
-/// With `method = "optimized"` neighbours exchange c_g − β c_i of the correction c at a node g of the ring and the one
-/// before it, β = 1/(1 + p h), which is a condition of Robin's kind, ∂_n c + p c. β = e^−θ would be exact for one wave:
+/// With `method = "optimized"` the correction c satisfies Robin's condition ∂_n c + p c = g, where g comes from the
+/// neighbour. Its discrete form exchanges c_g − β c_i, with g a node of the ring, i the one beside it inside, and β =
+/// 1/(1 + p h). For a single wave, β = e^−θ would be exact:
 ///
 /// ```text
 /// ρ(φ) = (β − z)/(1 − β z) z^(overlap − 1),   z = e^−θ,   cosh θ = 1 + (1 + 2 a_t (1 − cos φ)) / (2 a_n)
 /// ```
 ///
-/// is what a wave cos φj along a single cut leaves of itself, a = Δt/(τh²) across (n) and along (t) it, for a density
-/// that does not vary; p = "auto" makes the largest of them smallest. Where subdomains have corners it is no bound, and
-/// none is told.
+/// is the factor by which an iteration reduces a wave cos φj along a single cut, for a constant density and a =
+/// Δt/(τh²) across (n) and along (t) the cut. p = "auto" minimises the largest of these factors. Where subdomains have
+/// corners this is no bound, and none is reported.
 ///
 /// # Source
 /// Gander, *Schwarz methods over the course of time* (2008); Gander and Haynes (2012) for mesh equations.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "Written")]
 pub struct Schwarz {
-    /// Along each axis.
+    /// Number of subdomains along each axis.
     pub subdomains: [usize; 2],
     /// Cells that neighbouring subdomains share.
     pub overlap: usize,
-    /// What neighbours exchange.
+    /// What neighbours exchange: positions (`"classical"`) or Robin's conditions (`"optimized"`).
     pub method: Transmission,
-    /// p of the optimised conditions, in units of one over the length of the square of ξ.
+    /// p of Robin's condition, in units of one over the length of the unit square of ξ.
     pub robin: Auto<f64>,
-    /// The iteration stops where its last change is at most this share of the largest coordinate; without it after as
-    /// many iterations as are given, which is no failure.
+    /// The iteration ends once it changes no node by more than this share of the largest coordinate. Without a
+    /// tolerance it ends after `iterations`, which is no failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// Iterations a step; at most so many where there is a tolerance.
+    /// Number of iterations in a step; the largest number where there is a tolerance.
     pub iterations: usize,
     #[serde(skip)]
     line: Robust<1>,
@@ -61,14 +62,14 @@ pub struct Schwarz {
     parts: Parts,
 }
 
-/// Conditions between subdomains.
+/// What neighbouring subdomains exchange.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Transmission {
-    /// The values of the neighbour.
+    /// The positions of nodes.
     #[default]
     Classical,
-    /// Robin's conditions.
+    /// Robin's conditions, which take fewer iterations.
     #[serde(alias = "optimised")]
     Optimized,
 }
@@ -77,20 +78,22 @@ pub enum Transmission {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Written {
-    /// Along each axis.
+    /// Number of subdomains along each axis.
     #[serde(deserialize_with = "pair")]
     subdomains: [usize; 2],
-    /// Cells that neighbouring subdomains share, 2 where nothing is said.
+    /// Cells that neighbouring subdomains share; 2 by default.
     overlap: Option<usize>,
-    /// What neighbours exchange.
+    /// What neighbours exchange: positions (`"classical"`) or Robin's conditions (`"optimized"`).
     #[serde(default)]
     method: Transmission,
-    /// p of the optimised conditions.
+    /// p of Robin's condition ∂_n c + p c with `method = "optimized"`, in units of one over the length of the unit
+    /// square of ξ.
     #[serde(default)]
     robin: Auto<f64>,
-    /// Share of the largest coordinate, 1e-10 where nothing is said of it and of `iterations`.
+    /// Largest change of a node in the last iteration, as a share of the largest coordinate. 1e-10 where neither this
+    /// nor `iterations` is given.
     tolerance: Option<f64>,
-    /// Alone: exactly so many a step. With a tolerance: at most so many, 1000 where nothing is said.
+    /// Number of iterations in a step. With a tolerance it is the largest number, 1000 by default.
     iterations: Option<usize>,
 }
 
@@ -108,6 +111,8 @@ impl From<Written> for Schwarz {
     }
 }
 
+/// Defaults of a study: cells of overlap, tolerance as a share of the largest coordinate, and largest number of
+/// iterations.
 const OVERLAP: usize = 2;
 const TOLERANCE: f64 = 1e-10;
 const ITERATIONS: usize = 1000;
@@ -117,11 +122,11 @@ const ITERATIONS: usize = 1000;
 struct Parts {
     lattice: Option<Lattice<2>>,
     parts: Vec<Part>,
-    /// For each part what Robin's conditions need of its ring.
+    /// For each part its nodes on the ring, for Robin's conditions.
     traces: Vec<Vec<Trace>>,
-    /// The right-hand sides of a step without what the rings add by them.
+    /// The right-hand sides of a step, without the contributions of Robin's conditions.
     right: Vec<Vec<[f64; 2]>>,
-    /// Nodes on the ring of some subdomain, bounded sides left out.
+    /// Nodes that lie on the ring of some subdomain, without those on bounded sides.
     rings: Vec<usize>,
     point: Vec<Robust<1>>,
 }
@@ -195,7 +200,7 @@ impl Schwarz {
     }
 }
 
-/// Waves along a cut, and values of β, that are tried.
+/// Numbers of waves along a cut, and of values of β, among which the minimax for p = "auto" is searched.
 const WAVES: usize = 64;
 const TRIALS: usize = 200;
 
@@ -227,7 +232,7 @@ impl Parts {
         Ok(())
     }
 
-    /// The bound on the contraction.
+    /// The bound on the contraction of an iteration.
     fn predict(&mut self, operator: &MeshOperator<2>, mesh: &Mesh<2>) -> Result<(f64, Work), Failure> {
         let lattice = mesh.lattice();
         let mut side = vec![[1.0]; lattice.len()];
@@ -247,7 +252,8 @@ impl Parts {
         Ok((self.rings.iter().map(|&k| bound[k][0]).fold(0.0, larger), work))
     }
 
-    /// The systems of a step. Robin's conditions take an unknown beside the ring to the left, c_g = β c_i + given.
+    /// Sets up the systems of a step. Robin's condition c_g = β c_i + given is eliminated: its unknown part goes to the
+    /// matrix.
     fn set(&mut self, operator: &MeshOperator<2>, residual: &[[f64; 2]], beta: [f64; 2]) {
         for (part, traces) in self.parts.iter_mut().zip(&mut self.traces) {
             part.prepare(operator, residual);
@@ -261,8 +267,8 @@ impl Parts {
         self.right = self.parts.iter().map(|part| part.right.clone()).collect();
     }
 
-    /// One iteration from corrections `c` at all nodes; returns its largest change. `beta` is that of Robin's
-    /// conditions, 0 for classical ones.
+    /// One iteration, from corrections `c` at all nodes; returns the largest change. `beta` is that of Robin's
+    /// conditions, and 0 for classical ones.
     fn iterate(&mut self, c: &mut [[f64; 2]], beta: [f64; 2], size: [f64; 2]) -> Result<(f64, Work), Failure> {
         let lattice = self.lattice.as_ref().expect("parts are prepared first");
         let robin = beta != [0.0; 2];
@@ -279,7 +285,7 @@ impl Parts {
             }
             part.right.copy_from_slice(&own[*number]);
             for trace in *traces {
-                // a part that has not been solved yet has corrected nothing
+                // a part that has not been solved yet has no corrections
                 let at = |place: usize| before[trace.other].get(place).copied().unwrap_or([0.0; 2]);
                 let (ring, inner) = (at(trace.other_ring), at(trace.other_inner));
                 let given = [0, 1].map(|c| ring[c] - beta[trace.axis] * inner[c]);
@@ -362,7 +368,8 @@ impl MeshGenerator for Schwarz {
     }
 }
 
-/// The mean factor between changes; the first of them is the step itself, the later ones are corrections of the rings.
+/// The mean factor between successive changes. The first change is the step itself and does not count; later ones come
+/// from corrections of the rings.
 fn observed(changes: &[f64]) -> f64 {
     match changes {
         [_, second, .., last] if *second > 0.0 => (last / second).powf(1.0 / (changes.len() - 2) as f64),

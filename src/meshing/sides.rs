@@ -5,14 +5,14 @@ use crate::geometry::{Lattice, Mesh, Patch, strides};
 use crate::numerics::linear::{LinearSolver, Robust};
 use crate::work::Work;
 
-/// Moves the nodes on the bounded sides of the box: the mesh equation on each side by itself, in as many dimensions as the side has
+/// Moves the nodes on the bounded sides of the box
 ///
-/// On a side the coordinates across it are fixed and those along it solve the mesh equation with the ρ of the side, between
-/// the edges around it, which are moved before; corners stay. `x` holds the old positions of all nodes and receives the new
-/// ones on the sides.
+/// Each side solves the mesh equation by itself, in as many dimensions as it has. Coordinates across the side are
+/// fixed; those along it solve the equation with the ρ of the side, between the edges around it, which have been moved
+/// before. Corners stay. `x` holds the old positions of all nodes, and receives the new ones on the sides.
 ///
 /// # Errors
-/// What the solves fail with.
+/// The failures of these solves.
 pub fn move_sides<const D: usize>(
     equation: &Mmpde,
     mesh: &Mesh<D>,
@@ -33,12 +33,12 @@ pub fn move_sides<const D: usize>(
     Ok(work)
 }
 
-/// All sides of a mesh over one step.
+/// All sides of a mesh in one step.
 struct Sides<'a, const D: usize> {
     equation: &'a Mmpde,
     mesh: &'a Mesh<D>,
     rho: &'a [f64],
-    /// ρ in the mesh cells, in the conservative form.
+    /// ρ in the mesh cells; in the conservative form only.
     cells: Option<Vec<f64>>,
     dt: f64,
 }
@@ -52,8 +52,8 @@ impl<'a, const D: usize> Sides<'a, D> {
         Self { equation, mesh, rho, cells, dt }
     }
 
-    /// Moves the nodes of all sides that lie along some axes, S = 2E + 1 points of a star; none where an axis across them is
-    /// periodic, or none is.
+    /// Moves the nodes of all sides that extend along some of the axes, with a star of S = 2E + 1 points. There are no
+    /// such sides where an axis across them is periodic, or where all axes extend along them.
     fn solve<const E: usize, const S: usize>(
         &self,
         along: [usize; E],
@@ -72,7 +72,7 @@ impl<'a, const D: usize> Sides<'a, D> {
         Ok(work)
     }
 
-    /// One of them: at the upper or lower end of each axis across it.
+    /// Moves the nodes of one side: at the upper or lower end of each axis across it.
     fn solve_one<const E: usize, const S: usize>(
         &self,
         along: [usize; E],
@@ -91,7 +91,7 @@ impl<'a, const D: usize> Sides<'a, D> {
                 self.equation.operator(&side, &rho, self.dt)?
             }
             Some(rho) => {
-                // the one layer of cells beside the side
+                // the layer of cells beside the side
                 let steps = strides(cells);
                 let beside =
                     Places { along, origin: at_ends(steps, cells.map(|n| n - 1), &along, &upper), strides: steps };
@@ -117,7 +117,7 @@ impl<'a, const D: usize> Sides<'a, D> {
     }
 }
 
-/// Where the nodes, or cells, of a side are in an array over the whole mesh.
+/// Indices of the nodes, or cells, of a side in an array over the whole mesh.
 struct Places<const D: usize, const E: usize> {
     along: [usize; E],
     origin: usize,
@@ -130,7 +130,7 @@ impl<const D: usize, const E: usize> Places<D, E> {
     }
 }
 
-/// The first entry of a side: at `last` along the axes across it of which it is the upper one.
+/// The first entry of a side, at `last` along those axes across it of which it is the upper end.
 fn at_ends<const D: usize>(
     strides: [usize; D],
     last: [usize; D],
@@ -140,7 +140,7 @@ fn at_ends<const D: usize>(
     (0..D).filter(|&d| !along.contains(&d) && upper(d)).map(|d| last[d] * strides[d]).sum()
 }
 
-/// What is added to positions on wrapping around each axis.
+/// The period that is added to positions on wrapping around each axis.
 pub(super) fn jump<const D: usize>(mesh: &Mesh<D>) -> [[f64; D]; D] {
     diagonal(mesh.extent())
 }

@@ -275,8 +275,8 @@ fn the_conservative_form_carries_any_density() {
     }
 }
 
-/// The conservative form is solved to the share of the shortest edge that is asked for, a hundredth where nothing is said,
-/// and no better than that needs; the gradient form to 1e-12 of the largest coordinate. ARCHITECTURE.md says so.
+/// The conservative form is solved to the share of the shortest edge that is asked for, a hundredth where nothing is
+/// said, and no better than that needs; the gradient form to 1e-12 of the largest coordinate. ARCHITECTURE.md says so.
 #[test]
 fn steps_are_as_exact_as_the_pages_say() {
     let start = mesh([24, 18], [false; 2]);
@@ -640,7 +640,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     /// A step is the solution of its own system, checked against a sparse LU.
     #[test]
-    fn a_step_solves_its_system(n in 4_usize..30, m in 4_usize..30, px: bool, py: bool, height in 0.0..50.0_f64, log_dt in -4.0..0.0_f64) {
+    fn a_step_solves_its_system(
+        n in 4_usize..30,
+        m in 4_usize..30,
+        px: bool,
+        py: bool,
+        height in 0.0..50.0_f64,
+        log_dt in -4.0..0.0_f64,
+    ) {
         let start = mesh([n, m], [px, py]);
         let rho = bump(&start, height, 0.3);
         let dt = 10_f64.powf(log_dt);

@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 
 /// One implicit solve of the mesh equation on the whole domain: the sides first, then all other nodes at once
 ///
-/// In one, two or three dimensions. The gradient form is solved to round-off. The conservative form is solved by conjugate
-/// gradients from the mesh that the last step would lead to if it went on, to a hundredth of the shortest edge or better.
+/// For one, two or three dimensions. The gradient form is solved to round-off. The conservative form is solved by
+/// conjugate gradients to a hundredth of the shortest edge or better, starting from the mesh to which the motion of the
+/// last step would lead.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Whole")]
@@ -19,16 +20,16 @@ pub struct Whole<const D: usize = 2> {
     line: Robust<1>,
     #[serde(skip)]
     inside: Robust<D>,
-    /// In three dimensions, for which alternating directions are not.
+    /// For three dimensions, in which alternating directions do not converge.
     #[serde(skip)]
     elimination: SparseLu,
     #[serde(skip)]
     symmetric: Pcg<D, D>,
-    /// How exactly conjugate gradients solve for positions, as a share of the shortest edge. A residual of the mesh
-    /// equation bounds the error it leaves.
+    /// Tolerance of conjugate gradients, as a share of the shortest edge of the mesh. A residual of the mesh equation
+    /// bounds the error that it leaves in the positions.
     #[serde(skip, default = "closeness")]
     closeness: f64,
-    /// The last step: from where to where, and how long it took.
+    /// The last step: from which mesh to which, and its length.
     #[serde(skip)]
     last: Option<Step<D>>,
 }
@@ -40,8 +41,8 @@ struct Step<const D: usize> {
     dt: f64,
 }
 
-/// Tolerance of the linear solve, as a share of the shortest edge of the mesh. With ten times as much, errors of the solution
-/// still agree in the digits that a run prints.
+/// Default tolerance of the linear solve, as a share of the shortest edge of the mesh. Even with ten times as much,
+/// errors of the solution are the same in the digits that a run prints.
 fn closeness() -> f64 {
     1e-2
 }
@@ -53,7 +54,7 @@ impl<const D: usize> Default for Whole<D> {
 }
 
 impl<const D: usize> Whole<D> {
-    /// Solves the conservative form to a share of the shortest edge of the mesh.
+    /// Solves the conservative form to this share of the shortest edge of the mesh.
     pub fn to(closeness: f64) -> Self {
         Self {
             line: Robust::default(),
@@ -65,7 +66,7 @@ impl<const D: usize> Whole<D> {
         }
     }
 
-    /// One step. S = 2D + 1 is the number of points of the star; `direct` solves what conjugate gradients do not.
+    /// One step. S = 2D + 1 is the number of points of the star; `direct` solves what conjugate gradients cannot.
     fn solve_with<const S: usize, Direct: LinearSolver<D, S, D>>(
         &mut self,
         equation: &Mmpde,
@@ -97,7 +98,7 @@ impl<const D: usize> Whole<D> {
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: None })
     }
 
-    /// The mesh that the last step leads to if it goes on, where that step led to this mesh; on the sides, `x`.
+    /// The mesh to which the motion of the last step would lead, if that step led to this mesh; on the sides it is `x`.
     fn guess(&mut self, mesh: &Mesh<D>, x: &[[f64; D]], dt: f64) -> Vec<[f64; D]> {
         let mut guess = x.to_vec();
         if let Some(Step { from, dt: before, .. }) = self.last.take().filter(|last| last.to == *mesh) {
@@ -131,7 +132,7 @@ impl<const D: usize> Whole<D> {
     }
 }
 
-/// The generator in D dimensions, where a star has S = 2D + 1 points: Rust has no arithmetic of const parameters.
+/// The implementation for D dimensions, with stars of S = 2D + 1 points: Rust cannot compute S from D.
 macro_rules! generator {
     ($D:literal, $S:literal, $direct:ident) => {
         impl MeshGenerator<$D> for Whole<$D> {

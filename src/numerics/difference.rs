@@ -41,7 +41,7 @@ pub fn derivative<const D: usize, const K: usize>(
         for k in 0..s {
             let at = |i: usize, c: usize| f[i * s + k][c];
             if periodic {
-                // a single node is its own neighbour on both sides, one jump away
+                // on an axis of one node it is its own neighbour on both sides, one jump away
                 let (second, last) = (1 % n, n - 1);
                 let over = if n == 1 { 1.0 } else { 0.0 };
                 df[k] = std::array::from_fn(|c| (at(second, c) + over * jump[c] - (at(last, c) - jump[c])) * scale);
@@ -58,17 +58,18 @@ pub fn derivative<const D: usize, const K: usize>(
     out
 }
 
-/// How ∇_ξρ/ρ is differenced.
+/// Difference scheme for b = ∇_ξρ/ρ in the gradient form of the mesh equation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Gradient {
-    /// Central differences of ρ over ρ.
+    /// Central differences of ρ, over ρ.
     #[default]
     Central,
-    /// Central differences of ln ρ; bounded by half the jump of ln ρ over two cells, however steep ρ is.
+    /// Central differences of ln ρ, which a single steep cell cannot make larger than half the jump of ln ρ over two
+    /// cells.
     Log,
-    /// bh = 2 tanh(h ∂ ln ρ / 2) with central differences of ln ρ: second order like the others, and |b|h < 2 for every
-    /// ρ, which is what makes the mesh equation an M-matrix and its weights probabilities.
+    /// bh = 2 tanh(h ∂ ln ρ / 2) with central differences of ln ρ. It is of second order like the others, and |b|h < 2
+    /// for every ρ, so that the mesh equation is an M-matrix and its weights are probabilities of random walks.
     Safe,
 }
 

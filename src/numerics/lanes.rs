@@ -1,17 +1,17 @@
-//! Many small dense matrices at a time, one a lane.
+//! Small dense matrices, eight at a time, one in each lane of a vector.
 //!
-//! Everything is inlined into its caller, so that [`pulp`] can compile the whole of it for wider vectors. Products and
-//! sums are not fused: a lane has the same bits on every machine.
+//! Everything is inlined into its caller, so that [`pulp`] can compile the whole for wider vectors. Products and sums
+//! are not fused: a lane has the same bits on every machine.
 
 // loops over places of several arrays of one length, which the compiler makes vectors of
 #![allow(clippy::needless_range_loop)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Matrices side by side.
+/// Number of matrices that are treated side by side.
 pub(crate) const LANES: usize = 8;
 
-/// A number of each of several problems that are solved side by side.
+/// One number of each of several problems that are solved side by side.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct Lanes(pub [f64; LANES]);
@@ -51,7 +51,7 @@ impl Lanes {
         self.each(f64::abs)
     }
 
-    /// The larger one; a NaN in `self` is lost, one in `other` too.
+    /// The larger of two numbers; a NaN does not show in it.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         self.with(other, |a, b| if b > a { b } else { a })
@@ -116,7 +116,7 @@ impl SubAssign for Lanes {
 /// Golub and Van Loan, *Matrix computations* (2013), 5.2.
 #[derive(Debug, Clone)]
 pub(crate) struct Qr<const M: usize, const N: usize> {
-    /// R above the diagonal, the reflectors from it downwards; column by column.
+    /// R above the diagonal, the reflectors from the diagonal downwards; column by column.
     columns: [[Lanes; M]; N],
     /// 2/vᵀv of each reflector v.
     beta: [Lanes; N],
@@ -159,8 +159,8 @@ impl<const M: usize, const N: usize> Qr<M, N> {
         Self { columns, beta, diagonal, condition }
     }
 
-    /// Largest ratio of a column's length to what the columns before it leave of it: how much of the accuracy is lost.
-    /// Scaling columns does not change it; infinite or NaN where they depend on each other.
+    /// A condition number: the largest ratio of a column's length to that of its part orthogonal to the columns before
+    /// it. It does not change when columns are scaled, and is infinite or NaN where they are dependent.
     #[inline(always)]
     pub fn condition(&self) -> Lanes {
         self.condition
@@ -195,7 +195,7 @@ impl<const M: usize, const N: usize> Qr<M, N> {
         }
     }
 
-    /// z with Rᵀ z = c, filled up with zeros: Q z is the shortest solution of Aᵀ x = c.
+    /// z with Rᵀ z = c, filled up with zeros, so that Q z is the shortest solution of Aᵀ x = c.
     #[inline(always)]
     pub fn forward(&self, c: &[Lanes; N]) -> [Lanes; M] {
         let mut z = [Lanes::ZERO; M];

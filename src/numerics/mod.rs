@@ -1,15 +1,15 @@
-//! How things are computed: differences on the lattice and linear systems on patches of it.
+//! Differences on the lattice, and linear systems on patches of it.
 
 pub mod difference;
 pub(crate) mod lanes;
 pub mod linear;
 
-/// max(m, |value|) that keeps a NaN: for norms in which nothing may be lost.
+/// max(m, |value|) that keeps a NaN, for norms that must not hide one.
 pub(crate) fn larger(m: f64, value: f64) -> f64 {
     if value.abs() <= m || m.is_nan() { m } else { value.abs() }
 }
 
-/// Sum whose round-off does not grow with the number of terms, in order
+/// Compensated sum, in order: its round-off does not grow with the number of terms
 ///
 /// # Source
 /// Neumaier, *Rundungsfehleranalyse einiger Verfahren zur Summation endlicher Summen* (1974).

@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 /// ```
 ///
 /// ν > 0 (`viscosity`) sets the width of the front, about 10ν between u = .1 and .9. Initial and side values come from
-/// the exact solution, or from the formulas `initial` and `boundary`, which on periodic axes are needed (the first) and
-/// not (the second). In the moving coordinate ξ, with the velocity ẋ of the nodes, the right-hand side is
+/// the exact solution, or from the formulas `initial` and `boundary`. On periodic axes `initial` is required and
+/// `boundary` is not. In the moving coordinate ξ, with the velocity ẋ of the nodes, the right-hand side is
 ///
 /// ```text
 /// R = ẋ·∇u − (u²/2)_x − (u²/2)_y + ν Δu   (conservative)      R = (ẋ − u)·∇u + ν Δu   (advective)
@@ -36,28 +36,28 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Burgers {
-    /// ν.
+    /// The viscosity ν, above 0.
     pub viscosity: f64,
     /// Form of the convection term.
     #[serde(default)]
     pub convection: Convection,
-    /// What passes a face in the flux form.
+    /// Numerical flux through the faces of dual cells, in the flux form.
     #[serde(default)]
     pub flux: BurgersFlux,
-    /// u at the start, a formula of x and y (and t, the time there); the front where it is left out.
+    /// u at the start, a formula of x and y (and t, the start time); the exact front by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial: Option<String>,
-    /// u on bounded sides, a formula of x, y and t; given only with `initial`.
+    /// u on bounded sides, a formula of x, y and t; only with `initial`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub boundary: Option<String>,
-    /// Both formulas, in this order.
+    /// The formulas of `initial` and `boundary`, compiled.
     #[serde(skip)]
     given: [Option<Program<2, 1>>; 2],
     #[serde(skip)]
     volumes: FiniteVolumes<1>,
     #[serde(skip)]
     solver: Robust<1>,
-    /// Stencils of the newest mesh, with the mesh: the next step starts on it.
+    /// The newest mesh with its stencils, on which the next step starts.
     #[serde(skip)]
     newest: Option<(Mesh<2>, Stencils)>,
 }
@@ -66,34 +66,36 @@ pub struct Burgers {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Convection {
-    /// (u²/2)_x + (u²/2)_y.
+    /// (u²/2)_x + (u²/2)_y by central differences at nodes.
     Conservative,
-    /// u u_x + u u_y.
+    /// u u_x + u u_y by central differences at nodes.
     Advective,
-    /// Finite volumes on dual cells: Σ A u changes only by what passes the sides, on any moving mesh.
+    /// Finite volumes on dual cells: Σ A u changes only by the flux through the sides, on any moving mesh.
     #[default]
     Flux,
 }
 
-/// What passes a face between values a and b, over N_x + N_y, in the flux form.
+/// Numerical flux for values a and b on both sides of a face with normal N, divided by N_x + N_y, in the flux form.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum BurgersFlux {
-    /// ½ a b: keeps Σ A ln u too, and is the most accurate of the three in thin fronts. u may undershoot a little.
+    /// ½ a b. It conserves Σ A ln u too, and is the most accurate of the three in thin fronts; u may undershoot a
+    /// little.
     #[default]
     Product,
-    /// (a² + ab + b²)/6: keeps Σ A u² too.
+    /// (a² + ab + b²)/6. It conserves Σ A u² too.
     Energy,
-    /// ¼ (a² + b²).
+    /// ¼ (a² + b²), the mean of the fluxes of both values.
     Central,
 }
 
-/// Newton stops where the largest residual is below this, for u of size one.
+/// Newton's method has converged once the largest residual is below this; u is of size one.
 const TOLERANCE: f64 = 1e-10;
+/// Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
 
 impl Burgers {
-    /// Burgers' equation of a viscosity.
+    /// Burgers' equation with a viscosity and a form of its convection term.
     ///
     /// # Errors
     /// As [`Burgers::check`].
@@ -112,7 +114,8 @@ impl Burgers {
         .compiled()
     }
 
-    /// The same equation from initial values of one's own, formulas of x, y and t; `boundary` where a side is bounded.
+    /// The same equation with initial values of your own, as a formula of x, y and t; `boundary` is needed on bounded
+    /// sides.
     ///
     /// # Errors
     /// As [`Burgers::check`].
@@ -123,12 +126,12 @@ impl Burgers {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless ν is positive and finite, [`Error::Formula`] where a formula is none.
+    /// [`Error::Invalid`] unless ν is positive and finite; [`Error::Formula`] where the text of a formula is wrong.
     pub fn check(&self) -> Result<()> {
         self.clone().compiled().map(|_| ())
     }
 
-    /// Ready to step.
+    /// The equation with its formulas compiled.
     pub(super) fn compiled(mut self) -> Result<Self> {
         if !(self.viscosity.is_finite() && self.viscosity > 0.0) {
             return Err(Error::invalid("viscosity", self.viscosity, "must be a finite number above 0"));
@@ -152,7 +155,7 @@ impl Burgers {
         1.0 / (1.0 + exp((x[0] + x[1] - t) / (2.0 * self.viscosity)))
     }
 
-    /// u on a bounded side, where it is known.
+    /// u on a bounded side, where it is given.
     pub(super) fn side_value(&self, t: f64, x: [f64; 2]) -> Option<f64> {
         match &self.given {
             [_, Some(boundary)] => Some(boundary.eval(x, &[t])[0]),
@@ -177,7 +180,7 @@ impl Burgers {
     }
 }
 
-/// The front at many places, as a task for [`pulp`], which compiles it for wider vectors too.
+/// The exact front at many places as a task for [`pulp`], which compiles it for wider vectors too.
 struct FrontAt<'a> {
     burgers: &'a Burgers,
     t: f64,
@@ -194,7 +197,7 @@ impl pulp::WithSimd for FrontAt<'_> {
     }
 }
 
-/// R at one node: what is linear in the nine values, and the weights of ∂_x + ∂_y for the convection.
+/// R at one node: the coefficients of its linear part on the nine points, and those of ∂_x + ∂_y for the convection.
 #[derive(Clone, Copy)]
 struct Row {
     linear: [f64; 9],
@@ -312,7 +315,7 @@ impl Physics for Burgers {
         let n = patch.pencil_len();
         let places = |p: usize| (p * n..(p + 1) * n).zip(patch.pencil(p)..);
 
-        // the half of the step that is known
+        // the first half of the step, from known values
         let stencils_old = match self.newest.take() {
             Some((mesh, stencils)) if mesh == *old => stencils,
             _ => Stencils::new(&patch, &x_old),
@@ -326,7 +329,7 @@ impl Physics for Burgers {
             }
         });
 
-        // the half that is not: new side values around the old ones inside
+        // the second half, from new side values and, as a first guess, the old values inside
         let stencils = Stencils::new(&patch, &x_new);
         let mut rows = vec![Row::ZERO; patch.len()];
         parallel::for_each_row(&mut rows, n, |p, rows| {
@@ -342,7 +345,7 @@ impl Physics for Burgers {
         let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
 
         let size = u_new.iter().fold(1.0, |m, [u]| larger(m, *u));
-        // where Δt·ν/h² is large, round-off alone leaves more than the tolerance
+        // where Δt·ν/h² is large, round-off alone leaves residuals above the tolerance
         let stiffest = rows.iter().fold(0.0, |m, row| larger(m, row.linear.iter().map(|l| l.abs()).sum()));
         let wanted = size * TOLERANCE.max(8.0 * f64::EPSILON * (1.0 + dt * stiffest));
         let mut work = Work::default();
@@ -368,7 +371,7 @@ impl Physics for Burgers {
                 }
             });
             let mut correction = vec![[0.0]; patch.padded_len()];
-            // Newton squares the residual: solving for much less than that is wasted
+            // Newton's method squares the residual, so that a much more accurate linear solve is wasted
             let tolerance = [(0.01 * largest * (largest / size).min(1.0)).max(0.1 * wanted)];
             work += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
             work.newton_iterations += 1;

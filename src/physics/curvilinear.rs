@@ -9,8 +9,8 @@ use crate::parallel;
 /// α = x_η² + y_η²,   β = x_ξ x_η + y_ξ y_η,   γ = x_ξ² + y_ξ²
 /// ```
 ///
-/// Nodal metrics are central differences. Those of the Laplacian's faces come from coordinates: the direct difference
-/// across the face and the mean of the two central differences along it. Points are in the order of
+/// Metrics at nodes are central differences. Those at the faces of the Laplacian follow from the coordinates: the
+/// difference across the face, and the mean of the two central differences along it. Points are in the order of
 /// [`LatticeMatrix`](crate::numerics::linear::LatticeMatrix).
 #[derive(Debug, Clone)]
 pub(super) struct Stencils {
@@ -20,14 +20,14 @@ pub(super) struct Stencils {
     pub laplacian: Vec<[f64; 9]>,
 }
 
-/// How the flux through a face follows from u: weight of the difference across it, and of the four differences of two
-/// spacings whose quarter is the difference along it.
+/// The flux through a face as a function of u: the weight of the difference across the face, and that of the difference
+/// along it, which is a quarter of the sum of four differences over two spacings.
 type Face = [f64; 2];
 
 impl Stencils {
     /// Stencils of a mesh given by its positions, padded on the patch of all unknowns.
     ///
-    /// Written with undivided differences, in which every lattice spacing cancels.
+    /// It uses undivided differences, from which all lattice spacings cancel.
     pub fn new(patch: &Patch<2>, x: &[[f64; 2]]) -> Self {
         let [s, _] = patch.padded_strides();
         let n = patch.pencil_len();
@@ -65,7 +65,7 @@ pub(super) fn gradient(x: &[[f64; 2]], k: usize, strides: [usize; 2]) -> [[f64; 
     gradient_and_inverse(x, k, strides).0
 }
 
-/// The weights, and 1/J in undivided differences.
+/// These weights, and 1/J with undivided differences.
 fn gradient_and_inverse(x: &[[f64; 2]], k: usize, [s, t]: [usize; 2]) -> ([[f64; 2]; 4], f64) {
     let (xi, eta) = (minus(x[k + s], x[k - s]), minus(x[k + t], x[k - t]));
     let inverse = 1.0 / cross(xi, eta);
@@ -74,7 +74,7 @@ fn gradient_and_inverse(x: &[[f64; 2]], k: usize, [s, t]: [usize; 2]) -> ([[f64;
     ([above.map(|v| -v), above, right.map(|v| -v), right], inverse)
 }
 
-/// The face between nodes k and k + `step`; `side` leads along it.
+/// The face between nodes k and k + `step`; `side` is the step along the face.
 fn face(x: &[[f64; 2]], k: usize, step: usize, side: usize) -> Face {
     let across = minus(x[k + step], x[k]);
     let (here, there) = (minus(x[k + side], x[k - side]), minus(x[k + step + side], x[k + step - side]));

@@ -9,21 +9,22 @@ use crate::parallel;
 use crate::work::Work;
 use std::borrow::Cow;
 
-/// What B unknowns conserve: u_t + ∇·F(u) = ∇·(D(u)∇u) + S(u, x, t)
+/// A conservation law for B unknowns: u_t + ∇·F(u) = ∇·(D(u)∇u) + S(u, x, t)
 ///
-/// Faces see their two nodes through what [`nodes`](Self::nodes) makes of these; derivatives are by the unknowns there.
+/// Fluxes at a face are functions of what [`nodes`](Self::nodes) computes for its two nodes, and are differentiated by
+/// the unknowns there.
 pub(super) trait Law<const B: usize>: Sync {
-    /// What faces need to know of a node.
+    /// What is computed once for each node: its values and those of formulas.
     type Node: Copy + Send + Sync;
-    /// Newton stops where all residuals are below this share of the size of their unknown, once a step is solved at all:
-    /// far below what a step leaves out.
+    /// Newton's method has converged once, after at least one step, every residual is below this share of the size of
+    /// its unknown. It is far below the error of a time step.
     const TOLERANCE: f64 = 1e-6;
 
     /// Names of the unknowns, for messages.
     fn names(&self) -> [&'static str; B];
-    /// One for each place of padded vectors.
+    /// The data of the nodes at all places of padded vectors.
     fn nodes(&self, t: f64, x: &[[f64; 2]], u: &[[f64; B]]) -> Vec<Self::Node>;
-    /// Refuses padded nodes that are not finite, with the place.
+    /// Refuses node data that are not finite; the failure names the place.
     fn check(&self, _mesh: &Mesh<2>, _u: &[[f64; B]], _nodes: &[Self::Node]) -> Result<(), Failure> {
         Ok(())
     }
@@ -31,18 +32,18 @@ pub(super) trait Law<const B: usize>: Sync {
     fn convection(&self, below: &Self::Node, above: &Self::Node, normal: [f64; 2]) -> Crossing<B>;
     /// D at a face.
     fn diffusivity(&self, below: &Self::Node, above: &Self::Node) -> Crossing<B>;
-    /// S at a node, and its derivative; none where there is no source.
+    /// S at a node and its derivative; none for an equation without a source.
     fn source(&self, _node: &Self::Node) -> Option<([f64; B], Block<B>)> {
         None
     }
-    /// The unknowns on bounded sides, where they are given; where not, nothing passes the side.
+    /// The unknowns that are given on bounded sides; for the others the flux through the sides is zero.
     fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; B];
 }
 
 /// Derivatives of B equations by B unknowns.
 pub(super) type Block<const B: usize> = [[f64; B]; B];
 
-/// A value at a face for each equation, and its derivatives by the nodes below and above.
+/// A flux at a face for each equation, and its derivatives by the unknowns at the nodes below and above.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossing<const B: usize> {
     pub value: [f64; B],
@@ -57,13 +58,14 @@ pub(super) struct Crossing<const B: usize> {
 /// g = Δt (F·N − D ∇u·N) − s (u_i + u_k)/2,   ∇u·N = (|N|² (u_k − u_i) − (d·t) (u_b − u_a)) / J
 /// ```
 ///
-/// over the faces of each dual cell, N the normal and t the face from a to b, d = x_k − x_i, J = d·N, s the area that the
-/// face sweeps between the meshes, u_a and u_b the means of the four nodes around its ends. What leaves a cell enters the
-/// next, and a constant stays constant on any moving mesh. Crank and Nicolson in time, Newton with the true Jacobian.
+/// where the sum is over the faces of a dual cell, N is the normal of a face and t the vector along it from a to b, d =
+/// x_k − x_i, J = d·N, s is the area that the face sweeps between the meshes, and u_a and u_b are the means of the four
+/// nodes around its ends. What leaves a cell enters its neighbour, and a constant stays constant on any moving mesh.
+/// The scheme is Crank–Nicolson in time, solved by Newton's method with the exact Jacobian.
 #[derive(Debug, Clone)]
 pub(super) struct FiniteVolumes<const B: usize> {
     solver: RobustTransport<B>,
-    /// The newest mesh: the next step starts on it.
+    /// The newest mesh with its dual cells, on which the next step starts.
     newest: Option<(Mesh<2>, DualCells)>,
 }
 
@@ -73,36 +75,37 @@ impl<const B: usize> Default for FiniteVolumes<B> {
     }
 }
 
+/// Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
-/// Newton has failed where residuals are so many times those at its start.
+/// Newton's method is given up once residuals are larger than this multiple of those at its start.
 const DIVERGED: f64 = 10.0;
 
-/// One face in one half of a step: g/2, its derivatives, and the weight of u_b − u_a in it.
+/// One face in one half of a time step: g/2, its derivatives, and the weight of u_b − u_a in it.
 #[derive(Debug, Clone, Copy)]
 struct Face<const B: usize> {
     crossing: Crossing<B>,
     tangent: [f64; B],
 }
 
-/// A node on a bounded side: its number, its place, and what is given there.
+/// A node on a bounded side: its index, its place in padded vectors, and the values given there.
 struct Side<const B: usize> {
     i: usize,
     k: usize,
     given: [Option<f64>; B],
 }
 
-/// One mesh of the two that a step connects.
+/// One of the two meshes of a time step, with its half of the fluxes.
 struct Half<'a> {
     dt: f64,
     t: f64,
     cells: &'a DualCells,
-    /// Padded.
+    /// Positions, padded.
     x: &'a [[f64; 2]],
     swept: &'a [[f64; 2]],
 }
 
 impl<const B: usize> FiniteVolumes<B> {
-    /// The solution on the new mesh, one value a node.
+    /// The solution on the new mesh, with one value for each node and unknown.
     pub fn step<L: Law<B>>(
         &mut self,
         law: &L,
@@ -119,7 +122,7 @@ impl<const B: usize> FiniteVolumes<B> {
         let swept = old_cells.swept(&cells);
         let [width, height] = new.extent();
         let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), [[width, 0.0], [0.0, height]]));
-        // formulas are of the box: what stands beyond a periodic side is an image
+        // formulas hold in the box, so that nodes beyond a periodic side are seen at their images
         let [seen_old, seen_new] = [(old, &x_old), (new, &x_new)].map(|(mesh, x)| inside(mesh, x));
         let patch = *cells.patch();
         let n = patch.pencil_len();
@@ -141,7 +144,7 @@ impl<const B: usize> FiniteVolumes<B> {
             });
         }
 
-        // given values stand from the start
+        // given values are set from the start
         let s = patch.padded_strides()[0];
         let sides: Vec<Side<B>> = lattice
             .sides()
@@ -154,7 +157,7 @@ impl<const B: usize> FiniteVolumes<B> {
         }
         repeat_sides(&patch, &mut u);
 
-        // unknowns may differ in size by far, and one that is 0 has the size of its first change
+        // unknowns may differ much in size, and one that is 0 takes the size of its first change
         let largest_of = |values: &[[f64; B]]| -> [f64; B] {
             std::array::from_fn(|c| values.iter().fold(0.0, |m, value| larger(m, value[c])))
         };
@@ -164,7 +167,7 @@ impl<const B: usize> FiniteVolumes<B> {
         let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
-        // where much passes a cell in a step, round-off alone leaves more than the tolerance
+        // where the flux through a cell in a step is large, round-off alone leaves residuals above the tolerance
         let (mut round_off, tolerance) = (16.0 * f64::EPSILON, L::TOLERANCE);
         let mut at_first = f64::INFINITY;
         let stalled = loop {
@@ -191,7 +194,7 @@ impl<const B: usize> FiniteVolumes<B> {
             }
             let overall = (0..B).fold(0.0, |m, c| larger(m, largest[c] / sizes[c]));
             at_first = if iterations == 0 { overall } else { at_first };
-            // small changes add up over many steps: none is left out
+            // at least one Newton step is done: small changes, if left out, would add up over many time steps
             let share = if iterations == 0 { 0.0 } else { tolerance };
             let wanted: [f64; B] = std::array::from_fn(|c| (share * sizes[c]).max(round_off * size));
             if (0..B).all(|c| largest[c] <= wanted[c]) {
@@ -221,7 +224,7 @@ impl<const B: usize> FiniteVolumes<B> {
             let stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
             round_off = 16.0 * f64::EPSILON * stiffest;
             let mut correction = vec![[0.0; B]; patch.padded_len()];
-            // Newton squares the residual: solving for much less than that is wasted
+            // Newton's method squares the residual, so that a much more accurate linear solve is wasted
             let share = overall.min(1.0);
             let enough = std::array::from_fn(|c| {
                 let newton = (0.01 * largest[c] * share).max(0.1 * tolerance * sizes[c]);
@@ -238,7 +241,7 @@ impl<const B: usize> FiniteVolumes<B> {
         for (i, k) in patch.places().enumerate() {
             values[i] = u[k];
         }
-        // nothing passes the sides where nothing is given there
+        // an unknown that is given nowhere has no flux through the sides
         settle(&cells, &residual, &mut values, |c| sides.iter().all(|side| side.given[c].is_none()));
         check_finite(law.names(), new, &values)?;
         self.newest = Some((new.clone(), cells));
@@ -246,7 +249,7 @@ impl<const B: usize> FiniteVolumes<B> {
     }
 }
 
-/// Positions in the box: those beyond a periodic side as images.
+/// Positions in the box, where those beyond a periodic side are replaced by their images.
 fn inside<'a>(mesh: &Mesh<2>, x: &'a [[f64; 2]]) -> Cow<'a, [[f64; 2]]> {
     match mesh.lattice().periodic() {
         [false, false] => Cow::Borrowed(x),
@@ -254,8 +257,8 @@ fn inside<'a>(mesh: &Mesh<2>, x: &'a [[f64; 2]]) -> Cow<'a, [[f64; 2]]> {
     }
 }
 
-/// Adds what the residuals leave of each sum that is closed to all values alike: sums are then conserved to round-off, however well the
-/// step was solved.
+/// For each unknown without a flux through the sides, adds the mean of the remaining residual to all values: sums are
+/// then conserved to round-off, whatever the tolerance of Newton's method.
 fn settle<const B: usize>(
     cells: &DualCells,
     residual: &[[f64; B]],
@@ -270,7 +273,7 @@ fn settle<const B: usize>(
 }
 
 impl Half<'_> {
-    /// All faces, stored with the node below them; those on bounded sides let nothing pass.
+    /// All faces, each stored with the node below it. Those on bounded sides have no flux.
     fn faces<const B: usize, L: Law<B>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; 2]> {
         let patch = self.cells.patch();
         let ([n, m], wraps) = (patch.size, patch.wraps);
@@ -297,7 +300,7 @@ impl Half<'_> {
         faces
     }
 
-    /// The face between two places; `ends` are the nodes beside its end b, then those beside a.
+    /// The face between two places; `ends` holds the nodes around its end b, then those around its end a.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)] // what a face is made of
     fn face<const B: usize, L: Law<B>>(
@@ -333,7 +336,7 @@ impl Half<'_> {
         face
     }
 
-    /// What leaves the dual cell of a place in this half of the step.
+    /// The sum of the fluxes out of the dual cell of a place, in this half of the step.
     #[inline(always)]
     fn leaving<const B: usize>(&self, faces: &[[Face<B>; 2]], k: usize) -> [f64; B] {
         let [right, left, top, bottom] = self.around(faces, k);
@@ -348,7 +351,7 @@ impl Half<'_> {
         [&faces[k][0], &faces[k - s][0], &faces[k][1], &faces[k - 1][1]]
     }
 
-    /// Derivatives of u + (what leaves) / area by the nine nodes around.
+    /// Derivatives of u + (fluxes out)/area by the nine nodes around a place.
     #[inline(always)]
     fn row<const B: usize>(&self, faces: &[[Face<B>; 2]], i: usize, k: usize) -> [Block<B>; 9] {
         let [right, left, top, bottom] = self.around(faces, k);
@@ -365,7 +368,7 @@ impl Half<'_> {
         #[allow(clippy::needless_range_loop)] // c is an equation and an unknown
         for c in 0..B {
             row[0][c][c] += 1.0;
-            // ends b of the four faces, and ends a, as points of the stencil
+            // the ends b and a of the four faces, as points of the stencil
             for (weight, b, a) in [
                 (share * right.tangent[c], [4, 8], [3, 7]),
                 (-share * left.tangent[c], [6, 4], [5, 3]),
@@ -380,13 +383,14 @@ impl Half<'_> {
     }
 }
 
-/// Beyond a bounded side stand the side's own values: couplings to them belong to the nodes on the side.
+/// Beyond a bounded side the values of the side are repeated, so that couplings to them belong to the nodes on the
+/// side.
 fn fold_sides<const B: usize>([[left, right], [below, above]]: [[bool; 2]; 2], row: &mut [Block<B>; 9]) {
     let mut fold = |from: usize, to: usize| {
         let block = std::mem::replace(&mut row[from], [[0.0; B]; B]);
         add(&mut row[to], 1.0, &block);
     };
-    // (from, to) for the three points beyond each side
+    // the three points beyond each side, as (from, to)
     for (beyond, points) in [
         (left, [(1, 0), (5, 3), (6, 4)]),
         (right, [(2, 0), (7, 3), (8, 4)]),
@@ -399,7 +403,7 @@ fn fold_sides<const B: usize>([[left, right], [below, above]]: [[bool; 2]; 2], r
     }
 }
 
-/// Sets the ring beyond bounded sides to the values on the side, and images of periodic axes.
+/// Fills the ring: beyond bounded sides with the values on the side, on periodic axes with images.
 fn repeat_sides<const B: usize>(patch: &crate::geometry::Patch<2>, u: &mut [[f64; B]]) {
     let [n, m] = patch.size;
     let s = m + 2;
@@ -428,7 +432,8 @@ pub(super) mod tests {
     use crate::geometry::Lattice;
     use crate::physics::{Burgers, BurgersFlux, Convection, Physics};
 
-    /// A mesh of the unit square with every node up to 0.3 cells away from its uniform place, side nodes on their sides.
+    /// A mesh of the unit square with every node up to 0.3 cells away from its uniform place, side nodes on their
+    /// sides.
     fn random(cells: [usize; 2], periodic: [bool; 2], seed: u64) -> Mesh<2> {
         let mesh = Mesh::uniform(Lattice::new(cells, periodic).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
@@ -452,8 +457,8 @@ pub(super) mod tests {
     const FLUXES: [BurgersFlux; 3] = [BurgersFlux::Product, BurgersFlux::Energy, BurgersFlux::Central];
     const WAVE: &str = "1.5 + sin(2*pi*x)*cos(2*pi*y)";
 
-    /// Without viscosity, on a random mesh at rest, Σ A ln u changes only by round-off with the product flux, and Σ A u²
-    /// with the energy-conserving one; neither does with the other.
+    /// Without viscosity, on a random mesh at rest, Σ A ln u changes only by round-off with the product flux, and Σ A
+    /// u² with the energy-conserving one; neither does with the other.
     #[test]
     fn each_flux_keeps_its_own_invariant() {
         let mesh = random([13, 17], [true, true], 5);
@@ -509,8 +514,8 @@ pub(super) mod tests {
     /// max |R(u + ε v) − R(u) − ε J v| = O(ε^order)
     /// ```
     ///
-    /// R being the residual at the end of a step, J the matrix of [`FiniteVolumes::step`] and v random: 2 where J is the
-    /// derivative, and Newton's method converges quadratically; 1 where an entry of it is wrong.
+    /// R being the residual at the end of a step, J the matrix of [`FiniteVolumes::step`] and v random: 2 where J is
+    /// the derivative, and Newton's method converges quadratically; 1 where an entry of it is wrong.
     pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
         law: &L,
         motion: Motion<'_>,
@@ -569,8 +574,8 @@ pub(super) mod tests {
         (left(4e-3) / left(1e-3)).log(4.0)
     }
 
-    /// With every flux the matrix of Newton's method is the derivative of the residual, on a moving mesh with bounded and
-    /// periodic sides: what a step leaves out falls with the square of its length.
+    /// With every flux the matrix of Newton's method is the derivative of the residual, on a moving mesh with bounded
+    /// and periodic sides: what a step leaves out falls with the square of its length.
     #[test]
     fn newton_converges_quadratically() {
         for (flux, periodic) in FLUXES.into_iter().flat_map(|flux| [[false, true], [true, false]].map(|p| (flux, p))) {

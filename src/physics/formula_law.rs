@@ -1,4 +1,4 @@
-//! An equation of one's own as a conservation law.
+//! A user's equation as a conservation law.
 
 use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law};
 use super::formula_pde::Formulas;
@@ -11,22 +11,24 @@ use crate::numerics::sum;
 use crate::parallel;
 use crate::work::Work;
 
-/// B unknowns; P = 2 + B values that the formulas take at a node; K = 4 B (B + 1) that they give there.
+/// B unknowns. P = 2 + B is the number of values that the formulas take at a node, K = 4 B (B + 1) that of the values
+/// they give.
 pub(super) struct FormulaLaw<const B: usize, const P: usize, const K: usize> {
     names: [String; B],
     nodal: Program<P, K>,
     initial: Program<2, B>,
     boundary: [Option<Formula>; B],
-    /// The unknowns that have one.
+    /// The exact solution, for the unknowns that have one.
     exact: Vec<(usize, Program<2, 1>)>,
     has_source: bool,
     volumes: FiniteVolumes<B>,
 }
 
-/// Quantities of an equation in the order of [`Formulas::nodal`].
+/// Indices of the quantities of an equation, in the order of [`Formulas::nodal`].
 const FLUX: [usize; 2] = [0, 1];
 const DIFFUSIVITY: usize = 2;
-/// A diffusivity may be negative by this share of the largest, where it follows a solution that wiggles around zero.
+/// A diffusivity may be negative by up to this share of its largest value, as it may be where it is a function of a
+/// solution that oscillates slightly around zero.
 const WIGGLES: f64 = 1e-3;
 const SOURCE: usize = 3;
 
@@ -51,13 +53,13 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
         node[quantity * B + c]
     }
 
-    /// Its derivative by unknown e.
+    /// The derivative of that quantity by unknown e.
     #[inline(always)]
     fn slope(node: &[f64; K], quantity: usize, c: usize, e: usize) -> f64 {
         node[(4 * (1 + e) + quantity) * B + c]
     }
 
-    /// What place k of all nodal values holds, in the reader's words.
+    /// The name, for messages, of the k-th value at a node.
     fn what(&self, k: usize) -> String {
         let (row, quantity, name) = (k / (4 * B), k / B % 4, &self.names[k % B]);
         let key = match quantity {
@@ -73,7 +75,7 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
         Failure::Formula { what, value, node: mesh.lattice().node(k), x: mesh.x()[k], given }
     }
 
-    /// The node that stands at a place of padded arrays, or whose image or side does.
+    /// The node at a place of padded arrays. In the ring it is the node of which there is an image or a repetition.
     fn node(mesh: &Mesh<2>, place: usize) -> usize {
         let [n, m] = mesh.lattice().nodes();
         let along = |place: usize, n: usize, wraps: bool| {
@@ -83,7 +85,7 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
         mesh.lattice().index([along(place / (m + 2), n, wraps[0]), along(place % (m + 2), m, wraps[1])])
     }
 
-    /// Refuses diffusivities that are negative by more than the solution's own wiggles may make them.
+    /// Refuses a diffusivity that is more negative than oscillations of the solution may make it.
     fn check_diffusivities(&self, mesh: &Mesh<2>, nodes: &[[f64; K]]) -> Result<(), Failure> {
         for c in 0..B {
             let values = || nodes.iter().map(|node| Self::value(node, DIFFUSIVITY, c));
@@ -122,7 +124,7 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
 
 impl<const B: usize, const P: usize, const K: usize> Law<B> for FormulaLaw<B, P, K> {
     type Node = [f64; K];
-    /// What is left may grow: ahead of a front into an unstable state, say.
+    /// Smaller than usual, since an error may grow exponentially, as in an unstable state ahead of a front.
     const TOLERANCE: f64 = 1e-9;
 
     fn names(&self) -> [&'static str; B] {
@@ -182,7 +184,7 @@ impl<const B: usize, const P: usize, const K: usize> Law<B> for FormulaLaw<B, P,
     }
 }
 
-/// The sum of what two nodes give.
+/// The sum of the contributions of two nodes.
 #[inline(always)]
 fn crossing<const B: usize, N>(
     below: &N,
@@ -289,8 +291,8 @@ mod tests {
         }
     }
 
-    /// The matrix of Newton's method is the derivative of the residual for two unknowns that convect, diffuse and make each
-    /// other: what a step leaves out falls with the square of its length.
+    /// The matrix of Newton's method is the derivative of the residual for two unknowns that convect, diffuse and make
+    /// each other: what a step leaves out falls with the square of its length.
     #[test]
     fn newton_converges_quadratically() {
         let pde: FormulaPde = toml::from_str(
@@ -317,7 +319,8 @@ mod tests {
         assert!((order - 2.0).abs() < 0.1, "order {order:.3}");
     }
 
-    /// Burgers' equation with central fluxes is the same equation as formulas, to round-off over 50 steps of a moving mesh.
+    /// Burgers' equation with central fluxes is the same equation as formulas, to round-off over 50 steps of a moving
+    /// mesh.
     #[test]
     fn burgers_as_formulas_is_burgers() {
         let viscosity = 0.01;

@@ -7,23 +7,23 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// An equation of one's own, from one unknown to four, written as formulas
+/// An equation of your own for one to four unknowns, given by formulas
 ///
 /// ```text
 /// u_t + ∇·F(u, x, y, t) = ∇·(D(u, x, y, t) ∇u) + S(u, x, y, t)
 /// ```
 ///
-/// for every unknown u; F (`flux`, along x and along y), D ≥ 0 (`diffusivity`) and S (`source`) may hold all unknowns and
-/// are 0 where they are left out. `initial`, a formula of x and y (and t, the time at the start), is needed for each. On
-/// bounded sides `boundary` gives the value there, a formula of x, y and t, or says `"no-flux"`: then F·N − D ∇u·N = 0.
-/// `exact`, where it is known, gives the errors of a report: the largest and the mean square over the unknowns that have
-/// one.
+/// for every unknown u. F (`flux`, along x and along y), D ≥ 0 (`diffusivity`) and S (`source`) may contain all
+/// unknowns, and are 0 by default. `initial`, a formula of x and y (and t, the start time), is required for each
+/// unknown. On bounded sides `boundary` gives the value, a formula of x, y and t, or is `"no-flux"`, that is F·N − D
+/// ∇u·N = 0. `exact`, the solution if it is known, is used for the errors in a report: the largest and the root mean
+/// square error over the unknowns that have one.
 ///
-/// Finite volumes on [dual cells](crate::geometry::DualCells), Crank and Nicolson in time, solved by Newton's method with
-/// the derivatives of the formulas: second order in space and time. At a face F is the mean of its two nodes, and so is
-/// D. That is central: it does not stop wiggles where the mesh does not resolve a front. Σ A u changes only by what
-/// passes the sides and what S gives, on any moving mesh; with a field of one value a node and unknown, in the order of
-/// `unknowns`.
+/// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and Crank–Nicolson in time, solved by
+/// Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
+/// of their values at the two nodes. Such central fluxes oscillate where the mesh does not resolve a front. Σ A u
+/// changes only by the flux through the sides and by S, on any moving mesh. A solution has one value for each node and
+/// unknown, in the order of `unknowns`.
 ///
 /// # Errors
 /// A step ends with [`Failure::Formula`](crate::Failure::Formula) where a formula is not finite.
@@ -53,57 +53,58 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FormulaPde {
-    /// Their names, at most [`MAX_UNKNOWNS`].
+    /// Names of the unknowns, at most [`MAX_UNKNOWNS`].
     pub unknowns: Vec<String>,
-    /// F along x and along y.
+    /// Flux F of each unknown, as formulas along x and along y; 0 by default.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "text_pairs")]
     #[schemars(with = "BTreeMap<String, [Text; 2]>")]
     pub flux: BTreeMap<String, [String; 2]>,
-    /// D.
+    /// Diffusivity D ≥ 0 of each unknown; 0 by default.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub diffusivity: BTreeMap<String, String>,
-    /// S.
+    /// Source S of each unknown; 0 by default.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub source: BTreeMap<String, String>,
-    /// u at the start.
+    /// Initial value of each unknown, a formula of x and y (and t, the start time).
     #[serde(deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub initial: BTreeMap<String, String>,
-    /// u on bounded sides, or `"no-flux"`.
+    /// Value of each unknown on bounded sides, a formula of x, y and t, or `"no-flux"`. Required unless both axes are
+    /// periodic.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub boundary: BTreeMap<String, String>,
-    /// u, where it is known.
+    /// Exact solution of each unknown, a formula of x, y and t, if it is known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub exact: BTreeMap<String, String>,
 }
 
-/// Most unknowns of a [`FormulaPde`].
+/// Largest number of unknowns of a [`FormulaPde`].
 pub const MAX_UNKNOWNS: usize = 4;
-/// What stands for no formula in `boundary`.
+/// The word in `boundary` that stands for a side without a flux.
 const NO_FLUX: &str = "no-flux";
 
-/// What a [`FormulaPde`] holds, read.
+/// The formulas of a [`FormulaPde`], parsed.
 pub(super) struct Formulas {
     pub names: Vec<String>,
-    /// Of x, y, the unknowns and t: F along x for all unknowns, along y, D and S; then all these differentiated by the
-    /// first unknown, by the second, and so on.
+    /// Formulas of x, y, the unknowns and t: F along x of all unknowns, then F along y, D and S; then the derivatives
+    /// of all of these by the first unknown, by the second, and so on.
     pub nodal: Vec<Formula>,
-    /// Of x, y and t, as the others below.
+    /// Formulas of x, y and t, as all that follow.
     pub initial: Vec<Formula>,
     pub boundary: Vec<Option<Formula>>,
     pub exact: Vec<Option<Formula>>,
 }
 
 impl FormulaPde {
-    /// Refuses what makes no equation.
+    /// Refuses settings that define no equation.
     ///
     /// # Errors
-    /// [`Error::Formula`] where a formula is none or D is a negative number; [`Error::Invalid`] where names do not serve
-    /// as such, an initial value is missing, or a key is no unknown.
+    /// [`Error::Formula`] where the text of a formula is wrong or D is a negative number; [`Error::Invalid`] where a
+    /// name cannot be one of an unknown, an initial value is missing, or a key is no unknown.
     pub fn check(&self) -> Result<()> {
         self.read().map(|_| ())
     }
@@ -111,7 +112,8 @@ impl FormulaPde {
     /// Refuses sides without values and values without sides.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless every unknown has its `boundary` where an axis is bounded, and none has where none is.
+    /// [`Error::Invalid`] unless every unknown has a `boundary` if there is a bounded axis, and none has one if there
+    /// is not.
     pub fn check_sides(&self, periodic: [bool; 2]) -> Result<()> {
         let missing = self.unknowns.iter().find(|name| !self.boundary.contains_key(*name));
         match (periodic, missing, self.boundary.keys().next()) {
@@ -122,7 +124,8 @@ impl FormulaPde {
             ([true, true], _, None) | (_, None, _) => Ok(()),
             (_, Some(name), _) => {
                 let rule = format!(
-                    "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to [true, true]"
+                    "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to [true, \
+                     true]"
                 );
                 Err(Error::invalid("boundary", format!("not given for `{name}`"), rule))
             }
@@ -143,7 +146,7 @@ impl FormulaPde {
         })
     }
 
-    /// The formulas of x, y and t with their keys.
+    /// The formulas of x, y and t alone, with their keys.
     pub fn formulas(&self) -> Vec<(String, &str)> {
         let tables = [("initial", &self.initial), ("boundary", &self.boundary), ("exact", &self.exact)];
         let all = tables
@@ -152,7 +155,7 @@ impl FormulaPde {
         all.filter(|(_, text)| *text != NO_FLUX).collect()
     }
 
-    /// What is given of an unknown at the start and on the sides, with the keys.
+    /// The initial value and the side value of each unknown, with their keys.
     pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
         let both = self.unknowns.iter().filter_map(|name| {
             let (initial, boundary) = (self.initial.get(name)?, self.boundary.get(name)?);
@@ -212,7 +215,8 @@ impl FormulaPde {
         })
     }
 
-    /// Unknowns that can be named in formulas, tables of these unknowns only, and an initial value for each.
+    /// Refuses unknowns that cannot be named in formulas, tables with keys that are no unknowns, and missing initial
+    /// values.
     fn check_names(&self) -> Result<()> {
         let names = &self.unknowns;
         if !(1..=MAX_UNKNOWNS).contains(&names.len()) {
@@ -256,7 +260,7 @@ impl FormulaPde {
     }
 }
 
-/// Adds the remedy where a formula for the sides is `"no-flux"` in another spelling.
+/// Adds a remedy where a formula for the sides looks like `"no-flux"` in another spelling.
 fn meant_no_flux(error: Error) -> Error {
     match error {
         Error::Formula { key, text, at, message, .. } if letters(&text) == letters(NO_FLUX) => {

@@ -1,4 +1,4 @@
-//! What is solved on the moving mesh.
+//! The equations that are solved on the moving mesh.
 
 mod burgers;
 mod curvilinear;
@@ -22,7 +22,7 @@ use crate::kind::kinds;
 use crate::numerics::sum;
 use crate::work::Work;
 
-/// One time step over a mesh that moves.
+/// One time step on a mesh that moves during it.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion<'a> {
     /// Time at the start.
@@ -40,10 +40,11 @@ pub trait Physics: Send {
     /// Names of the unknowns.
     fn unknowns(&self) -> Vec<String>;
 
-    /// The solution at time t on a mesh.
+    /// The initial solution, at time t on a mesh.
     fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field;
 
-    /// The value of each unknown at a place on a bounded side, where one is given there; nothing where none are.
+    /// The value of each unknown at a point of a bounded side, if it is given there; empty if no unknown is given
+    /// anywhere.
     fn side_values(&self, _t: f64, _x: [f64; 2]) -> Vec<Option<f64>> {
         Vec::new()
     }
@@ -54,32 +55,32 @@ pub trait Physics: Send {
     /// A [`Failure`] where the step cannot be solved; [`Failure::NonFinite`] where its result is not finite.
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure>;
 
-    /// True where the solution is given at every place and time: nothing is carried from mesh to mesh.
+    /// Whether the solution is given for every time and place, so that nothing is carried from mesh to mesh.
     fn is_given(&self) -> bool {
         false
     }
 
-    /// ∇ of the first unknown at all nodes, where it is known exactly.
+    /// ∇ of the first unknown at all nodes, if it is known exactly.
     fn gradient(&self, _t: f64, _mesh: &Mesh<2>) -> Option<Vec<[f64; 2]>> {
         None
     }
 
-    /// ∫ of the first unknown, by the areas for which a conservative scheme keeps it.
+    /// The integral of the first unknown, with the areas for which a conservative scheme conserves it.
     fn conserved(&self, mesh: &Mesh<2>, u: &Field) -> f64 {
         sum(node_areas(mesh).iter().zip(u.component(0)).map(|(area, u)| area * u))
     }
 
-    /// The exact solution where it is known, of the unknowns that [`known`](Self::known) names.
+    /// The exact solution, if there is one, for the unknowns in [`known`](Self::known).
     fn exact(&self, _t: f64, _mesh: &Mesh<2>) -> Option<Field> {
         None
     }
 
-    /// The unknowns of which [`exact`](Self::exact) has values; all of them where nothing else is said.
+    /// Indices of the unknowns for which [`exact`](Self::exact) has values; by default all.
     fn known(&self) -> Vec<usize> {
         (0..self.unknowns().len()).collect()
     }
 
-    /// Refuses a start from which the equation has no values.
+    /// Refuses a start at which the equation has no finite values.
     ///
     /// # Errors
     /// A [`Failure`] that names the place.
@@ -92,7 +93,8 @@ kinds! {
     /// `[pde]` of a study.
     PdeKind {
         "burgers" = Burgers: "u_t + u u_x + u u_y = nu (u_xx + u_yy), an oblique front with exact solution",
-        "shallow-water" = ShallowWater: "h_t + div(h u) = 0, (h u)_t + div(h u u) + grad(g h^2/2) = 0, a pile of water that collapses",
+        "shallow-water" = ShallowWater: "h_t + div(h u) = 0, (h u)_t + div(h u u) + grad(g h^2/2) = 0, a pile of water \
+                                         that collapses",
         "formula" = FormulaPde: "u_t + div(F) = div(D grad u) + S, up to four unknowns with F, D and S as formulas",
         "prescribed" = Prescribed: "no equation: the solution or the mesh density is a formula of x, y and t",
     }
@@ -125,7 +127,7 @@ impl PdeKind {
         })
     }
 
-    /// The formulas of x, y and t that are meant on the whole domain, by their keys.
+    /// The formulas of x, y and t that are to hold on the whole domain, with their keys.
     pub fn formulas(&self) -> Vec<(String, &str)> {
         let all = match self {
             Self::Burgers(burgers) => vec![("initial", &burgers.initial), ("boundary", &burgers.boundary)],
@@ -136,7 +138,7 @@ impl PdeKind {
         all.into_iter().filter_map(|(key, text)| Some((key.into(), text.as_deref()?))).collect()
     }
 
-    /// What is given at the start and what on the sides, where both are formulas of x, y and t, with their keys.
+    /// The initial values and the side values that are both formulas of x, y and t, with their keys.
     pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
         match self {
             Self::Burgers(Burgers { initial: Some(initial), boundary: Some(boundary), .. }) => {
@@ -148,7 +150,7 @@ impl PdeKind {
     }
 }
 
-/// Reads a formula of x, y and t.
+/// Parses a formula of x, y and t.
 ///
 /// # Errors
 /// [`Error::Formula`] with the key.
@@ -161,7 +163,8 @@ fn mistaken(key: &str, text: &str, mistake: Mistake) -> Error {
     Error::Formula { key: key.into(), text: text.into(), at, message, help }
 }
 
-/// The K values a node of a solution at the start of a step, where it and both meshes belong to one lattice.
+/// The values of a solution at the start of a step, K for each node. Solution and both meshes must have the same
+/// lattice.
 fn nodal<'a, const K: usize>(motion: Motion<'_>, u: &'a Field) -> Result<&'a [[f64; K]], Failure> {
     let (lattice, expected) = (motion.new.lattice(), motion.new.lattice().len());
     let (nodes, rest) = u.values().as_chunks::<K>();

@@ -6,30 +6,30 @@ use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// No equation: the solution, or the mesh density itself, is a formula of x, y and t
+/// A prescribed field instead of an equation: the solution, or the mesh density itself, as a formula of x, y and t
 ///
-/// The mesh then follows `u` with its exact gradient, or `rho` as it is. Exactly one of the two is given.
+/// The mesh follows `u`, with its exact gradient, or `rho` as it is. Exactly one of the two is given.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Prescribed {
-    /// The solution.
+    /// The solution, a formula of x, y and t.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
-    /// The density, positive everywhere; its monitor is of kind `given`.
+    /// The density, a formula of x, y and t that is positive everywhere; the monitor must be of kind `given`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rho: Option<String>,
 }
 
 impl Prescribed {
-    /// Refuses what is no formula.
+    /// Refuses a text that is no formula.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless exactly one formula is given; [`Error::Formula`] where it is none.
+    /// [`Error::Invalid`] unless exactly one of the two is given; [`Error::Formula`] where its text is wrong.
     pub fn check(&self) -> Result<()> {
         self.field().map(|_| ())
     }
 
-    /// The formula compiled.
+    /// The formula, compiled.
     ///
     /// # Errors
     /// As [`Prescribed::check`].
@@ -69,7 +69,7 @@ impl PrescribedField {
     }
 }
 
-/// Formulas of x, y and t at all nodes of a mesh, or at their images in the box.
+/// The values of formulas of x, y and t at all nodes of a mesh, or at their images in the box.
 pub(super) fn evaluate<const K: usize>(program: &Program<2, K>, t: f64, mesh: &Mesh<2>) -> Vec<[f64; K]> {
     let mut out = vec![[0.0; K]; mesh.x().len()];
     program.eval_each(&mesh.images(), &[t], &mut out);

@@ -7,26 +7,30 @@ use gif::{Encoder, Repeat};
 use plotters::style::RGBColor;
 use std::collections::HashMap;
 
-/// Frames of an animation at most; more are thinned.
+/// Largest number of frames of an animation; of more, evenly spaced ones are taken.
 const MOST: usize = 120;
-/// Hundredths of a second that all frames take together, about, and that one takes at least and at most.
+/// Time that all frames take together, about, in hundredths of a second.
 const WHOLE: usize = 500;
+/// Shortest and longest time of a frame, in hundredths of a second.
 const ONE: [usize; 2] = [4, 25];
-/// The last frame stays.
+/// Time of the last frame, in hundredths of a second: long enough to be looked at.
 const LAST: u16 = 150;
-/// Colours of a drawing: the map itself, under light and under dark lines of two strengths, and greys.
+/// Number of colours of the palette that are those of the map itself.
 const PURE: usize = 96;
+/// Number of colours of the map that are blended with a light and with a dark mesh line, for each opacity of a line.
 const BLENDED: usize = 33;
+/// Opacities of mesh lines that have colours of their own.
 const STRENGTHS: [f64; 2] = [0.25, 0.5];
+/// Number of greys in the palette.
 const GREYS: usize = 26;
-/// From white to a colour.
+/// Steps from white to the colour of a curve.
 const STEPS: usize = 128;
-/// A density that spans so much has a logarithmic axis.
+/// A density whose largest value is so many times its smallest one gets a logarithmic axis.
 const MUCH: f64 = 30.0;
-/// Of a front, and of its soft edge on white.
+/// Colours of a front, and of its antialiased edge on white.
 const FRONT: [[u8; 3]; 2] = [[213, 94, 0], [234, 174, 128]];
 
-/// Writes `animation.gif`: the mesh over the first unknown, in colours that mean the same in all frames.
+/// Writes `animation.gif`: the mesh over the first unknown, with the same colours in all frames.
 pub fn write(run: &mut RunFiles) -> Result<()> {
     let path = run.directory.join("animation.gif");
     let count = run.series[0].frames.len();
@@ -76,7 +80,7 @@ fn title(run: &RunFiles, frame: &Frame) -> String {
         "" => run.word("study").into(),
         "iteration" => format!("{}, iteration {}", run.word("study"), frame.t),
         _ => {
-            // as many decimals in all frames, so that nothing jumps
+            // the same number of decimals in all frames, so that the text does not jump
             let times = &run.series[0].frames;
             let span = times.last().map_or(0.0, |(last, _)| last - times[0].0);
             let decimals = (3.0 - span.log10()).ceil().clamp(2.0, 12.0);
@@ -88,17 +92,17 @@ fn title(run: &RunFiles, frame: &Frame) -> String {
     }
 }
 
-/// Draws a frame, as SVG.
+/// A function that draws a frame as SVG.
 type Drawing<'a> = Box<dyn Fn(&Frame) -> String + 'a>;
 
-/// What draws any of these frames: the mesh over the first field.
+/// The function that draws these frames: the mesh over the first field.
 fn drawing<'a>(run: &'a RunFiles, frames: &'a [Frame]) -> Option<Drawing<'a>> {
     let first = frames.first()?;
     let (field, _) = first.fields.first()?;
     Some(if first.cells[1] == 0 { of_line(run, frames, field) } else { of_mesh(run, frames, field) })
 }
 
-/// Draws `mesh.png` and `.svg` from the last frame, where the run did not come to drawing them.
+/// Draws `mesh.png` and `.svg` from the last frame, for a run that ended before it drew them.
 pub fn still(run: &mut RunFiles) -> Result<()> {
     let Some(last) = run.series[0].frames.len().checked_sub(1) else { return Ok(()) };
     if run.directory.join("mesh.png").exists() {
@@ -109,9 +113,9 @@ pub fn still(run: &mut RunFiles) -> Result<()> {
     picture.map_or(Ok(()), |picture| picture.write(&run.directory, "mesh"))
 }
 
-/// The first field over the line, through all nodes.
+/// Draws the first field over a line, through all nodes.
 fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Drawing<'a> {
-    // iterates may leave the line
+    // nodes of an iterate may lie outside the line
     let line = run.corner("lower", 0).unwrap_or(0.0)..=run.corner("upper", 0).unwrap_or(1.0);
     let points = move |frame: &Frame| -> Vec<[f64; 2]> {
         let all = frame.x.iter().zip(&frame.fields[0].1).map(|(x, v)| [x[0], *v]);
@@ -133,7 +137,7 @@ fn of_line<'a>(run: &'a RunFiles, frames: &[Frame], field: &'a str) -> Drawing<'
     })
 }
 
-/// The mesh over the first field.
+/// Draws the mesh over the first field.
 fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Drawing<'a> {
     let around = |[l, h]: [f64; 2], v: f64| [l.min(v), h.max(v)];
     let none = [f64::INFINITY, f64::NEG_INFINITY];
@@ -163,14 +167,14 @@ fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Drawing
     })
 }
 
-/// The colours of all frames.
+/// The palette of all frames.
 struct Palette {
     colours: Vec<[u8; 3]>,
     found: HashMap<[u8; 3], u8>,
 }
 
 impl Palette {
-    /// Of curves: black and the first colour on white, in all steps between.
+    /// A palette for curves: black and the first colour of a plot, in all steps to white.
     fn of_curves() -> Self {
         let steps = |colour: [u8; 3]| {
             (0..STEPS).map(move |k| colour.map(|c| (255 - (255 - usize::from(c)) * k / (STEPS - 1)) as u8))
@@ -179,7 +183,7 @@ impl Palette {
         Self { colours: steps([0; 3]).chain(steps([r, g, b])).collect(), found: HashMap::new() }
     }
 
-    /// Of meshes over a colour map.
+    /// A palette for meshes over a colour map.
     fn of_maps() -> Self {
         let map = |k: usize, of: usize| colorous::VIRIDIS.eval_rational(k, of).as_array();
         let mut colours: Vec<[u8; 3]> = (0..PURE).map(|k| map(k, PURE)).collect();
@@ -192,7 +196,7 @@ impl Palette {
         Self { colours, found: HashMap::new() }
     }
 
-    /// The colour that is nearest.
+    /// The index of the nearest colour.
     fn nearest(&mut self, colour: [u8; 3]) -> u8 {
         let distance = |other: &[u8; 3]| -> i32 {
             other.iter().zip(colour).map(|(a, b)| (i32::from(*a) - i32::from(b)).pow(2)).sum()
@@ -206,7 +210,8 @@ impl Palette {
 mod tests {
     use super::*;
 
-    /// Every colour of the map, bare or under a mesh line, is met within a few levels; black, white and a front exactly.
+    /// Every colour of the map, bare or under a mesh line, is met within a few levels; black, white and a front
+    /// exactly.
     #[test]
     fn the_palette_meets_the_colours_of_the_drawings() {
         let mut palette = Palette::of_maps();

@@ -5,33 +5,33 @@ use crate::parallel::map;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
-/// What a run left in its directory.
+/// The files in a run directory.
 pub struct RunFiles {
     pub directory: PathBuf,
     /// `summary.json`, in the order of the file.
     pub summary: Map<String, Value>,
     /// `study.toml`.
     pub study_text: String,
-    /// The same, as far as it can be read.
+    /// `study.toml`, parsed as far as that is possible.
     pub study: toml::Table,
     /// `history.csv`, column by column.
     pub history: Vec<Column>,
-    /// Frames of the run, and of the one that it is compared with.
+    /// Frames of the run, and of the run of `[compare]`.
     pub series: [Series; 2],
-    /// Whether a run writes there now, and whether there is a checkpoint to go on from.
+    /// Whether a run is writing to the directory now, and whether there is a checkpoint from which it can go on.
     pub busy: bool,
     pub resumable: bool,
-    /// What was damaged or left out.
+    /// Files that were damaged or left out.
     pub notes: Vec<String>,
 }
 
-/// A column of `history.csv`; none where a row has no such value.
+/// A column of `history.csv`, with none in rows where it has no value.
 pub struct Column {
     pub name: String,
     pub values: Vec<Option<f64>>,
 }
 
-/// Frames in time that are not read yet.
+/// Frames of a run over time, which are read when needed.
 #[derive(Default)]
 pub struct Series {
     /// Times, and files relative to the run directory.
@@ -76,7 +76,7 @@ impl RunFiles {
         Ok(Self { directory: directory.into(), summary, study_text, study, history, series, busy, resumable, notes })
     }
 
-    /// A text of the summary.
+    /// A value of the summary that is a text.
     pub fn word(&self, key: &str) -> &str {
         self.summary.get(key).and_then(Value::as_str).unwrap_or("")
     }
@@ -98,18 +98,18 @@ impl RunFiles {
         self.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false)
     }
 
-    /// The mesh line that is the front, of a Stefan problem.
+    /// For a Stefan problem the index of the mesh line that is the front.
     pub fn front(&self) -> Option<usize> {
         let lower = || self.setting(&["grid", "cells"])?.get(1)?.as_integer();
         (self.word("kind") == "stefan").then(lower).flatten().and_then(|rows| usize::try_from(rows).ok())
     }
 
-    /// Whether `[output]` of the study asks for something.
+    /// Whether a switch in `[output]` of the study is on.
     pub fn asks_for(&self, what: &str) -> bool {
         self.setting(&["output", what]).and_then(toml::Value::as_bool).unwrap_or(false)
     }
 
-    /// The frames of a series at these places; what is damaged is left out and told of.
+    /// The frames of a series with these numbers. Damaged ones are left out, and named in the notes.
     pub fn frames(&mut self, series: usize, places: &[usize]) -> Vec<Frame> {
         let mut frames: Vec<Frame> = Vec::new();
         let files: Vec<&(f64, String)> = places.iter().map(|&place| &self.series[series].frames[place]).collect();
@@ -134,14 +134,14 @@ impl RunFiles {
 }
 
 impl Series {
-    /// Reads a `.pvd` file as runs of ours write it; nothing where there is none.
+    /// Reads a `.pvd` file as runs write it; empty where there is none.
     fn read(path: &Path) -> Self {
         let text = std::fs::read_to_string(path).unwrap_or_default();
         let entries = text.lines().filter(|line| line.starts_with("<DataSet "));
         let frames = entries.filter_map(|line| {
             let t: f64 = attribute(line, "timestep")?.parse().ok()?;
             let file = attribute(line, "file")?;
-            // only what lies in the directory itself
+            // only files in the directory itself are read
             let inside = Path::new(&file).components().all(|part| matches!(part, std::path::Component::Normal(_)));
             (t.is_finite() && inside).then_some((t, file))
         });
@@ -149,7 +149,7 @@ impl Series {
     }
 }
 
-/// Whole rows; a run that was killed may leave a part of one.
+/// Reads all whole rows: a run that was killed may leave part of one.
 fn history(path: &Path, notes: &mut Vec<String>) -> Vec<Column> {
     let Ok(mut reader) = csv::Reader::from_path(path) else { return Vec::new() };
     let Ok(heads) = reader.headers().cloned() else { return Vec::new() };

@@ -3,24 +3,24 @@ use flate2::read::ZlibDecoder;
 use std::io::Read;
 use std::path::Path;
 
-/// A frame of ours: a mesh and what is known at its nodes.
+/// A frame of a run: a mesh, and the fields on it.
 #[derive(Debug, Clone)]
 pub struct Frame {
     pub t: f64,
-    /// Along both axes; none along the second of a line.
+    /// Number of cells along both axes; 0 along the second axis of a line.
     pub cells: [usize; 2],
     /// Nodes, of shape cells + 1.
     pub x: Vec<[f64; 2]>,
     /// Values at the nodes, by name.
     pub fields: Vec<(String, Vec<f64>)>,
-    /// Values in the cells of a line, by name; those of other meshes follow from their nodes.
+    /// Values in the cells of a line, by name. For other meshes they are computed from the nodes.
     pub cell_fields: Vec<(String, Vec<f64>)>,
-    /// Between which nodes along each axis another subdomain begins.
+    /// The nodes along each axis at which another subdomain begins.
     pub cuts: [Vec<usize>; 2],
 }
 
 impl Frame {
-    /// Reads a `.vtu` file as runs of ours write it.
+    /// Reads a `.vtu` file as runs write it.
     pub fn read(path: &Path, t: f64) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
         let arrays: Vec<Array<'_>> = arrays(&text);
@@ -30,7 +30,7 @@ impl Frame {
         };
         let points = doubles(array("Points", "Points")?)?;
         let x: Vec<[f64; 2]> = points.chunks_exact(3).map(|p| [p[0], p[1]]).collect();
-        // the first cell names node (1, 0), which begins the second row; those of a line have a node each
+        // The first cell lists node (1, 0), the first one of the second row. Cells of a line have a node each.
         let row = integers::<8>(array("Cells", "connectivity")?, 2)?.get(1).copied().unwrap_or(0);
         let corners = integers::<8>(array("Cells", "offsets")?, 1)?.first().copied().unwrap_or(0);
         let fits = if corners == 2 { row == 1 } else { row > 1 };
@@ -53,12 +53,12 @@ impl Frame {
             return Err("it holds a value that is not finite".into());
         }
         let count = cells[0] * cells[1].max(1);
-        // an unknown may have that name
+        // an unknown may have the name of a field
         let numbers = |name: &str| {
             let found = array("CellData", name).or_else(|_| array("CellData", &format!("{name} of cells")));
             found.and_then(|array| integers::<4>(array, count)).ok()
         };
-        // pieces of a line may overlap
+        // subdomains of a line may overlap
         let overlap = numbers("overlap").filter(|more| more.len() == count).unwrap_or_else(|| vec![0; count]);
         let cuts = match numbers("subdomain").filter(|of| of.len() == count) {
             Some(subdomains) => cuts(cells, &subdomains.into_iter().zip(overlap).collect::<Vec<_>>()),
@@ -67,7 +67,7 @@ impl Frame {
         Ok(Self { t, cells, x, fields, cell_fields, cuts })
     }
 
-    /// Whether both are of one series.
+    /// Whether both frames belong to one series: the same cells and fields.
     pub fn fits(&self, other: &Self) -> bool {
         let names = |frame: &Self| {
             frame.fields.iter().chain(&frame.cell_fields).map(|(name, _)| name.clone()).collect::<Vec<_>>()
@@ -76,7 +76,8 @@ impl Frame {
     }
 }
 
-/// Where the subdomain changes along the first row and the first column; 0 where it does around a periodic axis.
+/// Indices along the first row and the first column at which the subdomain changes; 0 for a change across a periodic
+/// axis.
 fn cuts<T: PartialEq>([n, m]: [usize; 2], subdomains: &[T]) -> [Vec<usize>; 2] {
     let changes = |count: usize, stride: usize| {
         (0..count).filter(|&k| subdomains[k * stride] != subdomains[(k + count - 1) % count * stride]).collect()
@@ -84,7 +85,7 @@ fn cuts<T: PartialEq>([n, m]: [usize; 2], subdomains: &[T]) -> [Vec<usize>; 2] {
     [changes(n, m.max(1)), changes(m, 1)]
 }
 
-/// An array as it stands in a file.
+/// An array of a file, not yet decoded.
 struct Array<'a> {
     section: &'a str,
     name: String,
@@ -94,7 +95,7 @@ struct Array<'a> {
     text: &'a str,
 }
 
-/// The arrays of a file that a run of ours wrote: each a line, between the lines of its section.
+/// The arrays of a file that a run wrote, in which each stands on a line of its own.
 fn arrays(text: &str) -> Vec<Array<'_>> {
     let mut section = "";
     let mut arrays = Vec::new();
@@ -130,7 +131,7 @@ fn integers<const N: usize>(array: &Array<'_>, count: usize) -> Result<Vec<usize
     Ok(bytes(array, N * count)?.chunks_exact(N).map(number).collect())
 }
 
-/// One block behind a header of four numbers, up to so many bytes of it.
+/// Decodes a block after a header of four numbers, up to a number of bytes.
 fn bytes(array: &Array<'_>, most: usize) -> Result<Vec<u8>, String> {
     const HEADER: usize = 44;
     let damaged = |what: &str| format!("its array {:?} is damaged ({what})", array.name);

@@ -1,4 +1,5 @@
-//! The report of a run, from its directory alone: `report.html` with a viewer of the moving mesh, plots, the animation.
+//! The report of a run, from its directory alone: `report.html` with a viewer of the moving mesh, plots, and an
+//! animation.
 
 mod animation;
 mod files;
@@ -21,21 +22,21 @@ pub struct Built {
     pub path: PathBuf,
     /// Its size.
     pub bytes: usize,
-    /// What was damaged or left out.
+    /// Files that were damaged or left out.
     pub notes: Vec<String>,
 }
 
-/// (Re)builds `report.html` and the plots over time, with the picture of the mesh where there is none, and `animation.gif`
-/// where the study asks for it.
+/// (Re)builds `report.html` and the plots over time, with the picture of the mesh where there is none, and
+/// `animation.gif` where the study asks for it.
 ///
-/// The run may be finished, interrupted or still going on. What is damaged is left out and told of.
+/// The run may be finished, interrupted or still going on. Damaged files are left out, and named.
 ///
 /// # Errors
-/// [`Error::NotARun`](crate::Error::NotARun) for any other directory; [`Error::Unreadable`](crate::Error::Unreadable) or
-/// [`Error::Unwritable`](crate::Error::Unwritable).
+/// [`Error::NotARun`](crate::Error::NotARun) for any other directory; [`Error::Unreadable`](crate::Error::Unreadable)
+/// or [`Error::Unwritable`](crate::Error::Unwritable).
 pub fn build(directory: &Path) -> Result<Built> {
     let mut run = RunFiles::read(directory)?;
-    // a run that goes on, or was killed, has not drawn it; one that goes on draws it at its end
+    // A run that was killed has not drawn its mesh; one that is still going on draws it at its end.
     if !run.busy {
         animation::still(&mut run)?;
     }
@@ -45,7 +46,7 @@ pub fn build(directory: &Path) -> Result<Built> {
 fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {
     let plots = plots::of(&run);
     let pictures = || {
-        // one is drawn while the disk takes the one before
+        // one file is drawn while another is written
         std::thread::scope(|scope| {
             let mut canvas = Canvas::default();
             let drawn = plots.iter().map(|(name, figure)| {

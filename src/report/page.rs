@@ -6,13 +6,17 @@ use minijinja::Environment;
 use serde::Serialize;
 use serde_json::Value;
 
+/// Files of `assets/report` that make up the page.
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
 const STYLE: &str = include_str!("../../assets/report/style.css");
 const SCRIPT: &str = concat!(
     include_str!("../../assets/report/parts.js"),
     include_str!("../../assets/report/paint.js"),
+    include_str!("../../assets/report/stage.js"),
     include_str!("../../assets/report/viewer.js"),
+    include_str!("../../assets/report/mesh.js"),
     include_str!("../../assets/report/line.js"),
+    include_str!("../../assets/report/start.js"),
 );
 /// Pictures above this are left to the directory.
 const LARGE: u64 = 1 << 20;

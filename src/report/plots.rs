@@ -8,9 +8,9 @@ struct Group {
     title: &'static str,
     label: &'static str,
     scale: Scale,
-    /// Of studies of a line, or of the others.
+    /// Whether it belongs to studies of a line, or to the others.
     line: bool,
-    /// Columns, with what the legend says.
+    /// The columns, each with its text in the legend.
     columns: &'static [(&'static str, &'static str)],
 }
 
@@ -100,10 +100,10 @@ const GROUPS: [Group; 10] = [
     },
 ];
 
-/// A start below this share of what follows is rounding.
+/// A first value below this share of the second one is rounding, and is left out.
 const ROUNDING: f64 = 1e-6;
 
-/// Plots of a history over time, as far as it has something to show.
+/// Plots of a history over time, without those that would show nothing.
 pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
     let column = |name: &str| run.history.iter().find(|column| column.name == name);
     let Some(t) = column("t") else { return Vec::new() };
@@ -114,7 +114,7 @@ pub fn of(run: &RunFiles) -> Vec<(&'static str, Figure)> {
             .filter_map(|(name, words)| Some(curve(words, t, column(name)?, group.scale)))
             .filter(|curve| curve.points.len() > 1)
             .collect();
-        // steps that never change are in the study
+        // constant time steps need no plot: they are in the study
         let changes = |curve: &Curve| curve.points.iter().any(|p| (p[1] / curve.points[0][1] - 1.0).abs() > 1e-6);
         let worth = group.line == line && !curves.is_empty() && (group.name != "steps" || curves.iter().any(changes));
         worth.then(|| {
@@ -138,7 +138,7 @@ fn curve(name: &str, t: &Column, column: &Column, scale: Scale) -> Curve {
         .filter_map(|(t, v)| Some([(*t)?, (*v)?]))
         .filter(|p| placed(p[1]))
         .collect();
-    // the start is given: its error is rounding, which would stretch the axis over all powers of ten
+    // the start is given, so that its error is rounding: it would stretch a logarithmic axis over all powers of ten
     if let [first, second, ..] = points[..]
         && scale == Scale::Logarithmic
         && first[1] < ROUNDING * second[1]

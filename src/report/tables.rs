@@ -1,33 +1,33 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// A table of the page, of a summary of any kind.
+/// A table of the page, made from the summary of any kind of study.
 #[derive(Debug, Serialize)]
 pub struct Table {
     pub title: String,
     pub head: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// What its words mean.
+    /// Words of the table, with their meanings.
     pub words: Vec<[&'static str; 2]>,
 }
 
-/// Seconds of a part.
+/// Seconds that a part of a run took.
 #[derive(Debug, Serialize)]
 pub struct Part {
     pub name: String,
     pub seconds: String,
-    /// Of the whole, in percent.
+    /// Share of the whole run, in percent.
     pub percent: f64,
 }
 
-/// Keys of a summary that are shown otherwise.
+/// Keys of a summary that are shown elsewhere on the page.
 const ELSEWHERE: [&str; 8] = ["schema", "study", "kind", "version", "status", "seconds", "warnings", "mesh"];
-/// More rows than this keep the order of the file: one report a row.
+/// Above this number of records each report is a row, in the order of the file; up to it each quantity is.
 const MANY: usize = 8;
-/// Rows of a long table at its beginning, and at its end.
+/// Number of rows shown at the beginning, and at the end, of a longer table.
 const SHOWN: usize = 250;
 
-/// Names of what a summary holds, by the end of its path, with what they mean where that is not plain.
+/// Names of the entries of a summary, by the end of their paths, with their meanings where these are not plain.
 const NAMES: [(&str, &str, &str); 58] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
@@ -101,23 +101,23 @@ const NAMES: [(&str, &str, &str); 58] = [
     ("iterations_to_tolerance", "iterations to the tolerance", ""),
 ];
 
-/// Everything of a summary that makes a table.
+/// All tables of a summary.
 pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
     let mut tables = Vec::new();
     let mut loose = Vec::new();
     for (key, value) in summary.iter().filter(|(key, _)| !ELSEWHERE.contains(&key.as_str())) {
         match value {
-            // a failure is told at the top
+            // failures are shown at the top of the page
             Value::Object(object) if object.contains_key("message") => {}
             Value::Array(records) if records.iter().any(Value::is_object) => {
                 let last = key == "iterations" && summary.contains_key("iterations_per_step");
                 tables.push(of_records(if last { "iterations of the last step" } else { key }, records));
             }
             Value::Array(records) if records.is_empty() => {}
-            // of a contraction that nobody knows
+            // a contraction of which nothing is known is left out
             Value::Object(rate) if key == "rate" && rate.iter().all(|(key, v)| key == "stride" || v.is_null()) => {}
             Value::Object(_) if ["work", "parallel", "safety"].contains(&key.as_str()) => {
-                // what stayed at nought was not needed
+                // counters that stayed 0 are left out
                 loose.extend(flat(value, key).into_iter().filter(|(_, v)| v.as_f64() != Some(0.0)));
             }
             Value::Object(_) => {
@@ -127,7 +127,7 @@ pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
                 tables.push(Table { title: title(key), head: Vec::new(), rows, words });
             }
             Value::Null => {}
-            // of the last step
+            // that of the last step is left out if there are those of all steps
             _ if key == "iterations_to_tolerance" && summary.contains_key("iterations_per_step") => {}
             _ => loose.push((key.clone(), value.clone())),
         }
@@ -139,7 +139,7 @@ pub fn of(summary: &Map<String, Value>) -> Vec<Table> {
     tables
 }
 
-/// Few records stand side by side, a quantity a row; many below each other.
+/// A table of records: few stand side by side, with a quantity in each row; many stand below each other.
 fn of_records(key: &str, records: &[Value]) -> Table {
     let flat: Vec<Vec<(String, Value)>> = records.iter().map(|record| flat(record, "")).collect();
     let mut paths: Vec<&String> = Vec::new();
@@ -148,7 +148,7 @@ fn of_records(key: &str, records: &[Value]) -> Table {
             paths.push(path);
         }
     }
-    // what no record knows is no row
+    // quantities that no record has are left out
     let said = |path: &str, value: &Value| !(value.is_null() || path.starts_with("interface.") && *value == 0);
     paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && said(path, value)));
     let at = |record: &[(String, Value)], path: &String| {
@@ -158,7 +158,7 @@ fn of_records(key: &str, records: &[Value]) -> Table {
     let (head, rows) = if records.len() > MANY {
         let row = |record: &Vec<(String, Value)>| paths.iter().map(|path| at(record, path)).collect::<Vec<_>>();
         let mut rows: Vec<Vec<String>> = flat.iter().take(SHOWN).map(row).collect();
-        // of very many the first and the last
+        // of very many rows the first and the last are shown
         let rest = &flat[rows.len()..];
         if rest.len() > SHOWN {
             rows.push(paths.iter().map(|_| "…".into()).collect());
@@ -174,7 +174,7 @@ fn of_records(key: &str, records: &[Value]) -> Table {
     Table { title: title(key), head, rows, words }
 }
 
-/// Where the time went, longest first.
+/// Seconds of the parts of a run, longest first.
 pub fn seconds(summary: &Map<String, Value>) -> (Option<String>, Vec<Part>) {
     let Some(Value::Object(seconds)) = summary.get("seconds") else { return (None, Vec::new()) };
     let wall = seconds.get("wall").and_then(Value::as_f64).unwrap_or(0.0);

@@ -6,35 +6,36 @@ use flate2::{Compression, write::ZlibEncoder};
 use serde_json::{Value, json};
 use std::io::Write;
 
-/// What the viewer on the page shows.
+/// The data of the viewer on the page.
 pub struct Viewer {
     /// Its data, as JSON that cannot end a script element.
     pub data: String,
-    /// Whether it is of a line.
+    /// Whether it shows a line.
     pub line: bool,
-    /// Whether there is more than one frame, and what numbers them.
+    /// Whether there is more than one frame, and what the frames are numbered by.
     pub moves: bool,
     pub clock: &'static str,
-    /// What is not shown, if something is not.
+    /// A note on what is not shown.
     pub thinned: Option<String>,
 }
 
 /// Bytes that the frames may take, so that the page stays below 5 MB.
 const BUDGET: usize = 4_300_000;
-/// Of the budget that a guess uses, and how often one is made.
+/// Share of the budget that a guess of the number of frames aims at.
 const ROOM: f64 = 0.96;
+/// Largest number of guesses of the number of frames that fit.
 const GUESSES: usize = 3;
-/// Levels of a quantised value, in three bytes.
+/// Number of levels of a quantised value, less one: it takes three bytes.
 const LEVELS: f64 = (1 << 24) as f64 - 1.0;
-/// base64 over bytes.
+/// Length of a base64 text over that of its bytes.
 const TEXT: f64 = 4.0 / 3.0;
 
 impl Viewer {
-    /// The frames of a run, as many as fit; none where it has no frames.
+    /// The frames of a run, as many as fit into the budget; none where it has no frames.
     pub fn of(run: &mut RunFiles) -> Option<Self> {
         let counts = [0, 1].map(|series| run.series[series].frames.len());
         let first = (0..counts[0]).find_map(|place| run.frames(0, &[place]).pop())?;
-        // bytes of a frame as if nothing could be compressed
+        // bytes of a frame without compression
         let arrays = (2 + first.fields.len() + first.cell_fields.len()) * if counts[1] > 0 { 2 } else { 1 };
         let size = |stride: usize| {
             let nodes: usize = first.cells.iter().map(|n| n.div_ceil(stride) + 1).product();
@@ -44,7 +45,7 @@ impl Viewer {
         let stride = (1..).find(|&stride| size(stride) * least <= BUDGET as f64).unwrap_or(1);
         let share = BUDGET as f64 / (size(stride) * counts[0].max(counts[1]) as f64);
         let mut packed = Packed::of(run, counts, share, stride)?;
-        // it could be compressed: how well tells how many more fit, about
+        // the compression reached so far tells about how many more frames fit
         let mut guess = ROOM * share * BUDGET as f64 / packed.bytes() as f64;
         for _ in 0..GUESSES {
             if share >= 1.0 || guess < 1.2 * share {

@@ -6,12 +6,13 @@ pub const LOWER: usize = 0;
 /// The phase above the front, cold: number 0 of the equations.
 pub const UPPER: usize = 1;
 
-/// A phase thinner than this share of its column vanishes.
+/// A phase counts as vanished where it is thinner than this share of the distance between the walls: its rows could
+/// then no longer be told apart.
 const VANISHED: f64 = 2e-3;
-/// A steeper front is no graph any more.
+/// Largest slope |dh/dx| of a front that is a graph over x; steeper ones are about to turn over.
 const STEEP: f64 = 10.0;
 
-/// Equally spaced columns between two walls; rows of both phases, closer near the front
+/// Equally spaced columns between two walls, with rows in both phases that are closer near the front
 ///
 /// ```text
 /// below:  y = b + (h − b)(1 − (1 − s)^p)      above:  y = h + (c − h) s^p      s = j / rows
@@ -21,7 +22,7 @@ pub struct Columns {
     x: Vec<f64>,
     walls: [Vec<f64>; 2],
     rows: [usize; 2],
-    /// Share of the way from the lower end of each phase to the upper one, row by row.
+    /// For each row of a phase, its share of the way from the lower to the upper end of the phase.
     shares: [Vec<f64>; 2],
 }
 
@@ -43,7 +44,7 @@ impl Columns {
         }
         let n = cells[0];
         let middle = 0.5 * (x[0] + x[1]);
-        // mirrored to the last bit about the middle
+        // symmetric about the middle to the last bit
         let half = 0.5 * (x[1] - x[0]);
         let x: Vec<f64> = (0..=n).map(|i| middle + half * ((2 * i) as f64 - n as f64) / n as f64).collect();
         let shares = [LOWER, UPPER].map(|phase| {
@@ -64,12 +65,12 @@ impl Columns {
         &self.x
     }
 
-    /// Distance of the columns.
+    /// Distance between neighbouring columns.
     pub fn spacing(&self) -> f64 {
         (self.x[self.x.len() - 1] - self.x[0]) / (self.x.len() - 1) as f64
     }
 
-    /// Cells across a phase.
+    /// Number of cells across a phase.
     pub fn rows(&self, phase: usize) -> usize {
         self.rows[phase]
     }
@@ -98,7 +99,7 @@ impl Columns {
         y
     }
 
-    /// The mesh of a phase; with a mirrored column beyond each side where `mirrored`.
+    /// The mesh of a phase; with `mirrored`, one more column beyond each side.
     pub(super) fn mesh(&self, phase: usize, y: &[f64], mirrored: bool) -> Result<Mesh<2>> {
         let (n, m) = (self.x.len(), self.rows[phase] + 1);
         let h = self.spacing();
@@ -139,7 +140,8 @@ impl Columns {
         (0..self.x.len()).flat_map(column).copied().collect()
     }
 
-    /// Refuses a front that is not between the walls, leaves too little of a phase, or is no graph.
+    /// Refuses a front that leaves the space between the walls, leaves too little of a phase, or is too steep to be a
+    /// graph.
     ///
     /// # Errors
     /// [`Failure::NonFinite`], [`Failure::FrontOutside`], [`Failure::VanishingPhase`] or [`Failure::NotAGraph`].

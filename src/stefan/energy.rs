@@ -1,4 +1,4 @@
-//! What flows in, against what is there.
+//! The balance of energy: what flows in, compared with the change of what is there.
 
 use super::columns::{Columns, LOWER, UPPER};
 use super::heat::{end_slope, slope};
@@ -30,12 +30,12 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// |ΔE − ∫F dt| / |ΔE|; none before anything changed.
+    /// |ΔE − ∫F dt| / |ΔE|; none before the energy has changed.
     pub fn imbalance(&self) -> Option<f64> {
         self.miss(self.inflow)
     }
 
-    /// The same with the fluxes by differences.
+    /// The same with the fluxes by one-sided differences.
     pub fn imbalance_by_differences(&self) -> Option<f64> {
         self.miss(self.inflow_by_differences)
     }
@@ -55,7 +55,8 @@ pub(super) struct Phase<'a> {
     pub u: &'a [f64],
 }
 
-/// What two-point Gauss quadrature meets in a cell: its share of the area, values of a bilinear function and its gradient.
+/// A point of two-point Gauss quadrature in a cell: its share of the area, and values and gradients there of the
+/// bilinear functions of the corners.
 struct Point {
     area: f64,
     value: [f64; 4],
@@ -67,7 +68,8 @@ impl Phase<'_> {
         self.columns.rows(self.phase) + 1
     }
 
-    /// Calls `f(corners, first row, point)` for all quadrature points; corners are (i, j), (i+1, j), (i, j+1), (i+1, j+1).
+    /// Calls `f(corners, first row, point)` for all quadrature points; corners are (i, j), (i+1, j), (i, j+1), (i+1,
+    /// j+1).
     fn integrate(&self, mut f: impl FnMut([usize; 4], &Point)) {
         let (m, dx) = (self.nodes(), self.columns.spacing());
         let gauss = [0.5 - 0.5 / 3.0_f64.sqrt(), 0.5 + 0.5 / 3.0_f64.sqrt()];
@@ -82,7 +84,7 @@ impl Phase<'_> {
                     let by_r = [-(1.0 - s), -s, 1.0 - s, s];
                     let sum = |w: [f64; 4]| (0..4).map(|c| w[c] * y[c]).sum::<f64>();
                     let (y_s, y_r) = (sum(by_s), sum(by_r));
-                    // columns are vertical: x_s = dx, x_r = 0
+                    // columns are vertical, so that x_s = dx and x_r = 0
                     let gradient = std::array::from_fn(|c| [(by_s[c] - by_r[c] * y_s / y_r) / dx, by_r[c] / y_r]);
                     f(corners, &Point { area: 0.25 * dx * y_r, value, gradient });
                 }
@@ -127,7 +129,7 @@ impl Phase<'_> {
         sum
     }
 
-    /// Flux in through the wall, by differences.
+    /// Flux in through the wall, by one-sided differences.
     pub fn wall_flux(&self, diffusivity: f64) -> f64 {
         let (m, dx, n) = (self.nodes(), self.columns.spacing(), self.columns.x().len());
         let [_, wall] = self.columns.ends(self.phase);
@@ -144,7 +146,7 @@ impl Phase<'_> {
         (0..n).map(|i| flux(i) * if i == 0 || i + 1 == n { 0.5 * dx } else { dx }).sum()
     }
 
-    /// Flux in through both sides, by differences: all of it, and ∫D ∂_n u (1 − Φ).
+    /// Fluxes in through both sides by one-sided differences: the whole flux, and ∫D ∂_n u (1 − Φ).
     pub fn side_fluxes(&self, diffusivity: f64) -> [f64; 2] {
         let (m, dx, n) = (self.nodes(), self.columns.spacing(), self.columns.x().len());
         let mut sums = [0.0; 2];
@@ -165,7 +167,7 @@ impl Phase<'_> {
                         w[0] * self.u[k - 1] + w[1] * self.u[k] + w[2] * self.u[k + 1]
                     }
                 };
-                // along the row toward the inside, less what the rising row takes of ∂u/∂y
+                // the derivative along the row, corrected by ∂u/∂y for the slope of the row
                 -diffusivity * (along(self.u) - u_y * along(self.y))
             };
             for j in 0..m - 1 {

@@ -9,8 +9,8 @@ use std::f64::consts::PI;
 /// line source:  u₁ = Q/(4πD₁) (E₁(r²/4D₁t) − E₁(λ²/D₁))                u₀ = T₀ (1 − E₁(r²/4D₀t) / E₁(λ²/D₀))
 /// ```
 ///
-/// with the front at s or r = 2λ√t. s is the distance from a wall that rises to the right by an angle; r that from the
-/// source. λ solves the condition on the front.
+/// with the front at s = 2λ√t or r = 2λ√t. s is the distance from a wall that rises to the right by an angle, r the
+/// distance from the source; λ follows from the condition on the front.
 ///
 /// # Example
 /// ```
@@ -25,9 +25,9 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {
     shape: Shape,
-    /// Of the cold phase, far away.
+    /// Temperature of the cold phase, far away.
     far: f64,
-    /// Of the warm phase, then of the cold one.
+    /// Diffusivities of the warm and of the cold phase.
     diffusivity: [f64; 2],
     lambda: f64,
 }
@@ -47,8 +47,8 @@ enum Shape {
 }
 
 impl Similarity {
-    /// Neumann's solution: temperatures at the wall and far away, diffusivities below and above the front, mobility, tilt
-    /// in degrees, offset of the wall.
+    /// Neumann's solution: temperatures at the wall and far away, diffusivities below and above the front, mobility,
+    /// tilt in degrees, offset of the wall.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless the wall is warm, the other end not, and the tilt below 60 degrees.
@@ -73,8 +73,8 @@ impl Similarity {
         Ok(Self { shape: Shape::Planar { wall, tilt: [sin, cos], offset }, far, diffusivity, lambda })
     }
 
-    /// Melting around a line: heat given off per length and time, temperature far away, diffusivities below and above the
-    /// front, mobility, place of the line.
+    /// Melting around a line: heat given off per length and time, temperature far away, diffusivities below and above
+    /// the front, mobility, place of the line.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless the strength is positive and the temperature far away not.
@@ -101,7 +101,7 @@ impl Similarity {
         Ok(Self { shape: Shape::LineSource { strength, centre }, far, diffusivity, lambda })
     }
 
-    /// Where it is singular, if anywhere: the line of a source.
+    /// The point where the solution is singular, if there is one: a line source.
     pub fn source(&self) -> Option<[f64; 2]> {
         match self.shape {
             Shape::Planar { .. } => None,
@@ -119,7 +119,7 @@ impl Similarity {
         (distance / (2.0 * self.lambda)).powi(2)
     }
 
-    /// Height of the front; NaN where it is not above x.
+    /// Height of the front at x; NaN where there is no front above x.
     pub fn height(&self, x: f64, t: f64) -> f64 {
         let s = 2.0 * self.lambda * t.sqrt();
         match self.shape {
@@ -139,7 +139,7 @@ impl Similarity {
                 match s <= front {
                     true => wall * (1.0 - erf(over(warm)) / erf(self.lambda / warm.sqrt())),
                     false => {
-                        // both vanish far away, their ratio does not
+                        // both vanish far away, but their ratio does not
                         let [a, b] = [over(ice), self.lambda / ice.sqrt()];
                         self.far * (1.0 - (b * b - a * a).exp() * scaled_erfc(a) / scaled_erfc(b))
                     }
@@ -174,7 +174,7 @@ fn cold(far: f64) -> Result<()> {
     }
 }
 
-/// The zero of a function that is negative near 0 and grows through it: 0 or infinite where that is out of reach.
+/// The root of a function that is negative near 0 and increases; 0 or infinity where it is out of the range of numbers.
 fn root(f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (1e-12, 1.0);
     if f(low) > 0.0 {
@@ -193,7 +193,7 @@ fn root(f: impl Fn(f64) -> f64) -> f64 {
     high
 }
 
-/// λ, or the setting that makes the front too fast or too slow.
+/// λ, or an error for the setting that makes the front too fast or too slow.
 fn within_reach(lambda: f64, [warm, cold]: [&'static str; 2], [heat, far]: [f64; 2]) -> Result<f64> {
     if lambda == 0.0 {
         return Err(Error::invalid(cold, far, "gives a front that hardly moves; bring it nearer to 0"));
@@ -204,7 +204,7 @@ fn within_reach(lambda: f64, [warm, cold]: [&'static str; 2], [heat, far]: [f64;
     Ok(lambda)
 }
 
-/// e^(z²) erfc z for z ≥ 0, where erfc itself vanishes too.
+/// e^(z²) erfc z for z ≥ 0, which stays finite where erfc underflows.
 fn scaled_erfc(z: f64) -> f64 {
     if z < 20.0 { (z * z).exp() * erfc(z) } else { (1.0 - 0.5 / (z * z)) / (z * PI.sqrt()) }
 }
@@ -214,7 +214,7 @@ fn e1(z: f64) -> f64 {
     (-z).exp() * scaled_e1(z)
 }
 
-/// e^z E₁(z): a series up to 1, a continued fraction beyond.
+/// e^z E₁(z), by a series up to z = 1 and a continued fraction beyond.
 fn scaled_e1(z: f64) -> f64 {
     const EULER: f64 = 0.577_215_664_901_532_9;
     if z <= 1.0 {

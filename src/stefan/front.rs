@@ -1,4 +1,4 @@
-//! How the front moves.
+//! Motion of the front.
 
 use super::columns::{Columns, LOWER, UPPER};
 use super::heat::end_slope;
@@ -7,14 +7,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// How the front is moved.
+/// How the front is moved in a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Column by column, as a graph.
+    /// Column by column, as a graph over x.
     #[default]
     Graph,
-    /// Its segments shift along their normals, their ends meet in the middle, and columns cut the result.
+    /// Segments are shifted along their normals, their ends meet in the middle, and columns cut the result. As
+    /// published; less accurate.
     Segments,
 }
 
@@ -33,7 +34,7 @@ impl Default for Filter {
 }
 
 impl Filter {
-    /// Refuses weights that are not symmetric and positive, or that turn a sawtooth around.
+    /// Refuses weights that are not symmetric and positive, or that reverse the sign of a sawtooth.
     ///
     /// # Errors
     /// [`Error::Invalid`].
@@ -46,12 +47,12 @@ impl Filter {
         Err(Error::invalid("filter", format!("{:?}", [a, b, c]), rule))
     }
 
-    /// Its weights on the node and on both neighbours together.
+    /// Its weights on the node itself, and on both neighbours together.
     fn weights(&self) -> [f64; 2] {
         self.0.map_or([1.0, 0.0], |[a, b, _]| [b / (b + 2.0 * a), 2.0 * a / (b + 2.0 * a)])
     }
 
-    /// Smooths values; those at the ends are mirrored, or left alone.
+    /// Smooths values. With `mirrored` those at the ends see their mirror images, else they stay.
     pub(super) fn apply(&self, values: &[f64], mirrored: bool) -> Vec<f64> {
         let [own, other] = self.weights();
         let last = values.len() - 1;
@@ -68,7 +69,7 @@ impl Filter {
         (0..=last).map(smooth).collect()
     }
 
-    /// How much longer steps may be than without it: π / max θ F(θ).
+    /// The factor by which the filter lengthens the longest stable step: π / max θ F(θ).
     pub fn relief(&self) -> f64 {
         const SAMPLES: usize = 2000;
         let [own, other] = self.weights();
@@ -131,7 +132,7 @@ pub(super) fn check_warm_below(
     Ok(())
 }
 
-/// The longest step for which the sawtooth of the explicit front does not grow
+/// The longest step for which a sawtooth of the explicit front does not grow
 ///
 /// ```text
 /// Δt ≤ 2 hx / (π L max(|D₀ ∂u₀/∂y| + |D₁ ∂u₁/∂y|)) × relief of the filter
@@ -155,7 +156,7 @@ pub(super) fn graph(h: &[f64], tilt: &[f64], jump: &[f64], factor: f64) -> Vec<f
     (0..h.len()).map(|i| h[i] + factor * (1.0 + tilt[i] * tilt[i]) * jump[i]).collect()
 }
 
-/// The same by segments that shift along their normals
+/// The front after a step by segments that shift along their normals
 ///
 /// ```text
 /// d_i = Δt L ⟦D ∂_ν u⟧ ν_i,   vertices shift by the mean of their two segments

@@ -7,21 +7,21 @@ use crate::laplacian::{Laplacian, unchecked};
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 
-/// What a phase goes through in a step.
+/// The data of one phase in a step.
 pub(super) struct HeatStep<'a> {
     pub columns: &'a Columns,
     pub phase: usize,
     pub diffusivity: f64,
     pub dt: f64,
-    /// Heights of the nodes at the end.
+    /// Heights of the nodes at the end of the step.
     pub y: &'a [f64],
-    /// Their velocities; none where the values were carried to the new places before.
+    /// Velocities of the nodes; none where the values have been carried to the new places before the step.
     pub velocity: Option<&'a [f64]>,
     /// Values at the start.
     pub u: &'a [f64],
-    /// Values on walls, front and Dirichlet sides at the end; elsewhere a guess.
+    /// At the end of the step: given values on walls, front and Dirichlet sides; a guess elsewhere.
     pub sides: &'a [f64],
-    /// No flux through the sides; else their values are given.
+    /// Whether nothing flows through the sides; otherwise their values are given.
     pub mirrored: bool,
 }
 
@@ -77,8 +77,8 @@ impl HeatStep<'_> {
                         pairs.into_iter().for_each(|(a, b)| fold((b, a), &mut row));
                     }
                 }
-                // by its own size: rows near a front that is finely graded are larger by orders of magnitude, and what
-                // rounding leaves of them would be allowed of all others
+                // Relative to the row itself: rows near a finely graded front are larger by orders of magnitude, and a
+                // common tolerance would be set by the rounding of these.
                 let own_size = row[0].abs().max(1.0);
                 let row = row.map(|a| a / own_size);
                 largest = row.iter().fold(largest, |m, a| m.max(a.abs()));
@@ -93,7 +93,7 @@ impl HeatStep<'_> {
             x.iter_mut().zip(&self.sides[i * nodes..]).for_each(|(x, side)| x[0] = *side);
         }
         let size = self.sides.iter().chain(self.u).copied().fold(0.0, larger);
-        // what round-off allows nine terms a row
+        // the round-off of a sum of nine terms
         solver.solve(&matrix, &b, &mut x, [2e-14 * largest * size.max(f64::MIN_POSITIVE)])?;
         let mut u = self.sides.to_vec();
         for (p, x) in x.chunks_exact(width).enumerate().skip(1).take(count) {
@@ -113,11 +113,11 @@ impl HeatStep<'_> {
     }
 }
 
-/// Values of a column carried to other heights by straight lines; its front node moves to the new front at once, and nodes
-/// that the front has passed are dropped.
+/// Interpolates the values of a column linearly at other heights. The front node takes the new place of the front at
+/// once, and nodes that the front has passed are dropped.
 pub(super) fn carry(y: &[f64], u: &[f64], front: usize, new: &[f64], to: &mut [f64]) {
     let last = y.len() - 1;
-    // from the wall to the front
+    // row numbers counted from the wall to the front
     let toward = |j: usize| if front == last { j } else { last - j };
     let up = if front == last { 1.0 } else { -1.0 };
     let h = new[front];

@@ -1,4 +1,4 @@
-//! The front at the end of a step from the temperatures at the end of it: Newton's method.
+//! The implicit front: it moves by the temperatures at the end of the step, which Newton's method finds.
 
 use super::columns::{Columns, LOWER, UPPER};
 use super::front::Filter;
@@ -6,15 +6,15 @@ use crate::error::Failure;
 use faer::linalg::solvers::Solve;
 use std::f64::consts::PI;
 
-/// How the jump answers to the front
+/// The approximate derivative of the jump of the heat flux by the height of the front
 ///
 /// ```text
 /// δJ = −Σ_i |D_i ∂u_i/∂y| √(k² + 1/(D_i Δt)) δh   for each wave number k
 /// ```
 ///
-/// A front that is a little higher takes the temperature −∂u/∂y δh to where it stood, and within a step of implicit Euler
-/// that dies away over 1/√(k² + 1/(DΔt)). Depths of phases are taken to be larger than that. A fixed point without this
-/// would have half the explicit step limit.
+/// If the front rises by δh, its old place gets the temperature −∂u/∂y δh, which in an implicit Euler step decays over
+/// the distance 1/√(k² + 1/(DΔt)). Phases are assumed to be thicker than that. A fixed-point iteration without this
+/// derivative would converge only up to half the explicit step limit.
 pub(super) struct Response {
     /// √(k² + 1/(D_i Δt)) as a matrix over the columns, for each phase.
     roots: [Vec<f64>; 2],
@@ -25,9 +25,9 @@ impl Response {
     pub fn new(columns: &Columns, diffusivity: [f64; 2], dt: f64) -> Self {
         let n = columns.x().len();
         let last = (n - 1) as f64;
-        // cosine waves, mirrored at both ends, orthogonal with half weights there
+        // cosine waves, which are even at both ends and orthogonal with half weights there
         let half = |i: usize| if i == 0 || i == n - 1 { 0.5 } else { 1.0 };
-        // of the angle π·m·i/last only the remainder counts
+        // of the angle π·m·i/last only the remainder matters
         let wave: Vec<f64> = (0..2 * (n - 1)).map(|k| (PI * k as f64 / last).cos()).collect();
         let roots = [LOWER, UPPER].map(|phase| {
             let root: Vec<f64> = (0..n)
@@ -45,7 +45,7 @@ impl Response {
         Self { roots, n }
     }
 
-    /// The correction of the front that takes away its residual r = h − hⁿ − Δt L (1 + h_x²) F[J].
+    /// The correction of the front that removes its residual r = h − hⁿ − Δt L (1 + h_x²) F[J].
     pub fn correct(
         &self,
         slopes: [&[f64]; 2],

@@ -11,42 +11,42 @@ use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How temperatures get to the new mesh.
+/// How temperatures are transferred to the new mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Transfer {
-    /// By a term −w ∂u/∂y in the heat equation on the new mesh.
+    /// By a term −w ∂u/∂y in the heat equation on the new mesh, w being the velocity of the nodes.
     #[default]
     Ale,
-    /// By straight lines along the columns, before the step.
+    /// By linear interpolation along the columns before the step. Less accurate.
     Interpolate,
 }
 
-/// From which temperatures the front moves.
+/// The temperatures whose flux moves the front.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Stepping {
-    /// Those at the start of the step; steps are limited.
+    /// Those at the start of the step, whose length is then limited by stability.
     #[default]
     Explicit,
-    /// Those at its end, by Newton's method.
+    /// Those at the end of the step, found by Newton's method, without a limit.
     Implicit,
 }
 
-/// What holds on the sides.
+/// Conditions on the left and the right side.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Sides {
-    /// Nothing flows through; mesh and temperatures are mirrored.
+    /// No flux: mesh and temperatures are mirrored.
     #[default]
     Neumann,
-    /// Temperatures and the height of the front are those of the exact solution.
+    /// Temperatures and the height of the front are given by the exact solution.
     Exact,
 }
 
-/// Values that a problem gives.
+/// The data of a problem.
 pub trait Problem: Sync {
-    /// Temperature on a wall, and on sides that are given.
+    /// Temperature on a wall, and on sides with given values.
     fn boundary(&self, phase: usize, x: [f64; 2], t: f64) -> f64;
 
     /// Temperature at the start.
@@ -55,37 +55,37 @@ pub trait Problem: Sync {
     /// Height of the front at the start.
     fn initial_front(&self, x: f64) -> f64;
 
-    /// Height of the front on sides that are given, and everywhere where it is known.
+    /// Height of the exact front, on sides with given values and wherever it is known.
     fn exact_front(&self, x: f64, t: f64) -> Option<f64>;
 
-    /// Temperature where it is known.
+    /// The exact temperature where it is known.
     fn exact(&self, x: [f64; 2], t: f64) -> Option<f64>;
 }
 
-/// A front between two phases, and how it is stepped.
+/// A front between two phases, with the scheme that advances it.
 #[derive(Debug)]
 pub struct Front {
     /// Columns and walls.
     pub columns: Columns,
-    /// D below and above the front.
+    /// Diffusivities D of the lower and the upper phase.
     pub diffusivity: [f64; 2],
     /// L, the inverse of the latent heat.
     pub mobility: f64,
     /// How the front is moved.
     pub method: Method,
-    /// How temperatures get to the new mesh.
+    /// How temperatures are transferred to the new mesh.
     pub transfer: Transfer,
-    /// Smoothing of the front's heights over neighbouring columns of the grid, after every step.
+    /// Smoothing of the front's velocity over three neighbouring columns.
     pub filter: Filter,
-    /// From which temperatures the front moves.
+    /// The temperatures whose flux moves the front.
     pub stepping: Stepping,
-    /// What holds on the sides.
+    /// Conditions on the left and the right side.
     pub sides: Sides,
     /// The discrete Laplacian, of nine points.
     pub laplacian: Laplacian,
-    /// Of both phases.
+    /// Linear solvers of both phases.
     solvers: [Robust<1>; 2],
-    /// Of the last step.
+    /// Time step and response of the last step.
     response: Option<(f64, Response)>,
 }
 
@@ -95,7 +95,7 @@ impl std::fmt::Debug for Response {
     }
 }
 
-/// A front with the temperatures on both sides of it.
+/// A front with the temperatures of both phases.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrontState {
     /// Time.
@@ -110,13 +110,15 @@ pub struct FrontState {
     pub energy: Energy,
 }
 
-/// Newton's method ends where the front is met to this share of the box, times the largest temperature above 1.
+/// Newton's method has converged once the residual of the front is below this share of the height of the box, or of
+/// that times the largest temperature if it is above 1.
 const NEWTON: f64 = 1e-11;
-/// What may have no value at the start, by phase.
+/// Names, for messages, of the initial temperatures by phase.
 pub(crate) const INITIAL: [&str; 2] =
     ["the initial temperature of the lower phase", "the initial temperature of the upper phase"];
-/// What rounding leaves of a height, as a share of it.
+/// Round-off of a height, as a share of it.
 const ROUNDING: f64 = 1e-14;
+/// Newton steps after which a time step is given up.
 const NEWTON_ITERATIONS: usize = 40;
 
 impl Front {
@@ -242,7 +244,7 @@ impl Front {
         Ok(work)
     }
 
-    /// The front after a step from `from`, moved by the jump that belongs to `at`.
+    /// The front after a step from `from`, moved by the jump of the heat flux that belongs to the front `at`.
     fn moved(
         &self,
         problem: &dyn Problem,
@@ -269,7 +271,7 @@ impl Front {
         Ok(h)
     }
 
-    /// Temperatures at time `t`, the front being at `h` then.
+    /// Temperatures at time `t`, when the front is at `h`.
     fn conduct(&mut self, problem: &dyn Problem, state: &FrontState, h: &[f64], t: f64) -> Result<[Vec<f64>; 2]> {
         let dt = t - state.t;
         let (old, new) = (self.heights(&state.front), self.heights(h));
@@ -328,7 +330,7 @@ impl Front {
         Ok(out)
     }
 
-    /// Front and temperatures at time `t` that fit each other.
+    /// Front and temperatures at time `t` that are consistent with each other.
     #[allow(clippy::type_complexity)]
     fn newton(
         &mut self,
@@ -345,13 +347,13 @@ impl Front {
         };
         let box_height =
             self.columns.wall(UPPER).iter().zip(self.columns.wall(LOWER)).fold(0.0_f64, |m, (c, b)| m.max(c - b));
-        // jumps carry the round-off of the temperatures
+        // the jump has the round-off of the temperatures
         let size = state.u.iter().flatten().copied().fold(1.0, larger);
-        // and heights that of their distance to the origin
+        // and heights have that of their distance from the origin
         let heights = LOWER..=UPPER;
         let farthest = heights.flat_map(|phase| self.columns.wall(phase)).copied().fold(0.0, larger);
         let tolerance = NEWTON * box_height * size + ROUNDING * farthest;
-        // the front as it stands is in the box whatever the step; where sides are given it follows them
+        // the old front lies in the box, which a long explicit step might leave; where sides are given it follows them
         let mut h = state.front.clone();
         if !self.mirrored() {
             let guess = self.moved(problem, &state.front, &state.front, slopes, state.t, 0.0)?;

@@ -2,7 +2,8 @@
 
     python tests/python/kills.py [KILLS] [SEED]
 
-prints for each study how many kills it took, how many of these left a checkpoint, and how many runs they were spread over.
+prints for each study how many kills it took, how many of these left a checkpoint, and how many runs they were spread
+over.
 """
 
 import csv
@@ -21,10 +22,16 @@ TIMES = ["time.end=0.6", "time.report=[0.4,0.6]"]
 WALKS = 'mesh.generator={kind="stochastic",subdomains=[4,4],seed=7}'
 STUDIES = {
     "case B, automatic steps": ("burgers", ["grid.cells=[40,40]", "pde.viscosity=0.005", *TIMES]),
-    "case B, residual walks, automatic steps": ("burgers", ["grid.cells=[40,40]", "pde.viscosity=0.005", WALKS, *TIMES]),
+    "case B, residual walks, automatic steps": (
+        "burgers",
+        ["grid.cells=[40,40]", "pde.viscosity=0.005", WALKS, *TIMES],
+    ),
     "case B, residual walks, compared": ("burgers-b-stochastic", ["time.end=0.4", "time.report=[0.3,0.4]"]),
     "Stefan, explicit": ("stefan-slides", ["time.end=0.5", "time.report=[0.25,0.5]"]),
-    "Stefan, implicit, automatic steps": ("stefan-slides", ["time.end=0.5", "time.report=[0.5]", "front.stepping=implicit", "time.step=auto"]),
+    "Stefan, implicit, automatic steps": (
+        "stefan-slides",
+        ["time.end=0.5", "time.report=[0.5]", "front.stepping=implicit", "time.step=auto"],
+    ),
 }
 
 
@@ -89,7 +96,10 @@ def main(kills=200, seed=1):
     for title, (name, settings) in STUDIES.items():
         with tempfile.TemporaryDirectory() as place:
             counts = kill_often(name, settings, -(-kills // len(STUDIES)), chance, Path(place))
-        print(f"{title:42} {counts[0]:4} kills, {counts[1]:4} with a checkpoint, in {counts[2]:3} runs: the same bits", flush=True)
+        print(
+            f"{title:42} {counts[0]:4} kills, {counts[1]:4} with a checkpoint, in {counts[2]:3} runs: the same bits",
+            flush=True,
+        )
         total = [a + b for a, b in zip(total, counts)]
     print(f"{'all':42} {total[0]:4} kills, {total[1]:4} with a checkpoint, in {total[2]:3} runs: the same bits")
 

@@ -19,7 +19,14 @@ def run(tmp_path_factory):
     """A short run of case B on 24 × 16 cells, with frames at steps 0, 10, 20 and 25."""
     out = tmp_path_factory.mktemp("run") / "out"
     settings = [f"grid.cells={list(CELLS)}", "time.end=0.275", "time.report=[0.275]", "output.frames.every=10"]
-    command = [ROOT / "target/release/driftmesh", "run", ROOT / "studies/burgers-b-stochastic.toml", "--quiet", "--out", out]
+    command = [
+        ROOT / "target/release/driftmesh",
+        "run",
+        ROOT / "studies/burgers-b-stochastic.toml",
+        "--quiet",
+        "--out",
+        out,
+    ]
     subprocess.run(command + [part for setting in settings for part in ("--set", setting)], check=True)
     return out
 

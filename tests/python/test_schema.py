@@ -25,7 +25,9 @@ def test_every_study_is_valid(validator, path):
     study = tomllib.loads(path.read_text("utf-8"))
     assert [error.message for error in validator.iter_errors(study)] == []
     # as the program writes it, too
-    resolved = subprocess.run([ROOT / "target/release/driftmesh", "check", path], capture_output=True, check=True, text=True)
+    resolved = subprocess.run(
+        [ROOT / "target/release/driftmesh", "check", path], capture_output=True, check=True, text=True
+    )
     assert [error.message for error in validator.iter_errors(tomllib.loads(resolved.stdout))] == []
 
 

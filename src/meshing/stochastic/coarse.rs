@@ -8,17 +8,20 @@ use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use crate::parallel;
 use crate::work::Work;
 
-/// The part of a correction that coarser lattices can see
+/// The part of a correction that a coarser lattice can represent
 ///
 /// ```text
 /// M_H c_H = R r on the whole coarse lattice,   c ≈ P (c_H + q (c_H − P c_2H)),   q = (H² − h²) / ((2H)² − H²)
 /// ```
 ///
-/// R weighs fine values by ρ and the hat function of a coarse node, P is the cubic through four coarse nodes along each
-/// axis. M_H is the mesh equation itself on the coarse lattice with the mean density. Residuals of the mesh equation
-/// add up to zero when weighted by ρ, or what the sides leave: without the weight a mesh on periodic axes would be
-/// shifted. Its error grows like H², and a second lattice of twice the spacing says how much it is: Richardson's
-/// extrapolation to the spacing h of the fine lattice, for which the right-hand sides need to be gathered only once.
+/// R averages fine values with ρ and the hat function of a coarse node as weights. P interpolates by the cubic through
+/// four coarse nodes along each axis. M_H is the mesh equation itself on the coarse lattice, with the mean density. The
+/// weight ρ matters on periodic axes: only weighted by it do residuals of the mesh equation sum to zero, and without it
+/// the mesh would be shifted.
+///
+/// The error grows like H², and a second lattice of twice the spacing measures it. Richardson's extrapolation then
+/// leads to the spacing h of the fine lattice. The right-hand sides of the second lattice follow from those of the
+/// first, so that nothing more needs to be gathered.
 #[derive(Debug, Clone)]
 pub(super) struct Coarse {
     near: Level,
@@ -27,7 +30,7 @@ pub(super) struct Coarse {
     gain: f64,
 }
 
-/// A coarse lattice, and the ways between it and the next finer one.
+/// A coarse lattice, with the transfers to and from the next finer one.
 #[derive(Debug, Clone)]
 struct Level {
     lattice: Lattice<2>,
@@ -35,21 +38,21 @@ struct Level {
     up: Transfer,
     matrix: LatticeMatrix<2, 5>,
     plane: Robust<2>,
-    /// Of the next finer lattice, and here.
+    /// The density on the next finer lattice, and on this one.
     densities: [Vec<[f64; 1]>; 2],
 }
 
-/// Fewest cells of a coarse axis: the cubic has four nodes.
+/// Fewest cells along an axis of a coarse lattice: the interpolating cubic needs four nodes.
 pub(super) const FEWEST_CELLS: usize = 4;
-/// Cells of an axis with fewer of which both lattices may miss the same layer, and agree.
+/// With fewer cells along an axis both coarse lattices may miss the same layer, so that their difference tells nothing.
 const ENOUGH_CELLS: usize = 16;
-/// Residual at which coarse lattices and strips count as solved, as a share of the largest that they start with. With
-/// much more, what is left of it is round-off blown up: ten times the density would give another mesh.
+/// Coarse lattices and strips are solved until their residual is this share of its largest initial value. With a much
+/// larger one, rounding would decide where iterations end: ten times the same density could give another mesh.
 pub(super) const SOLVED: f64 = 1e-7;
 
 impl Coarse {
-    /// Lattices with one cell for `ratio` and for twice as many cells of the fine one along each axis; none where no
-    /// axis has that many.
+    /// Two lattices, of which one cell stands for `ratio` and for twice as many cells of the fine lattice along each
+    /// axis; none where no axis has that many cells.
     pub fn new(fine: &Lattice<2>, ratio: usize) -> Option<Self> {
         let near = Level::new(fine, ratio)?;
         let far = Level::new(&near.lattice, 2)?;
@@ -59,24 +62,25 @@ impl Coarse {
         Some(Self { near, far, gain })
     }
 
-    /// True where the coarser lattice is fine enough for the difference between both to say something of their errors.
+    /// Whether the coarser lattice is fine enough for the difference between both to measure their errors.
     pub fn knows_its_error(&self) -> bool {
         self.far.lattice.cells().iter().all(|&n| n >= ENOUGH_CELLS)
     }
 
-    /// Numbers that are gathered for the coarse right-hand side, one a coarse node for each coordinate.
+    /// Number of values gathered for the coarse right-hand side: one for each coarse node and coordinate.
     pub fn len(&self) -> usize {
         Patch::whole(&self.near.lattice).len()
     }
 
-    /// Sets up the equation of a step.
+    /// Sets up the mesh equation of a step on both lattices.
     pub fn prepare(&mut self, problem: &Problem<'_>) -> Result<(), Failure> {
         self.near.prepare(problem, problem.rho.as_chunks::<1>().0)?;
         self.far.prepare(problem, &self.near.densities[1])
     }
 
-    /// The correction at all fine nodes for a residual there, zero on bounded sides, and what the extrapolation
-    /// changed as a share of it, root mean squares both. `size` is the largest coordinate along each axis.
+    /// The correction at all fine nodes for a residual there, zero on bounded sides; and the root mean square of what
+    /// the extrapolation changed, as a share of that of the correction. `size` is the largest coordinate along each
+    /// axis.
     pub fn correction(&mut self, residual: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, f64, Work), Failure> {
         let near = self.near.restrict(residual);
         let far = self.far.restrict(&near);
@@ -109,14 +113,15 @@ impl Level {
         Some(Self { lattice, down, up, matrix, plane: Robust::default(), densities: Default::default() })
     }
 
-    /// Sets up the equation with the mean of a density on the next finer lattice.
+    /// Sets up the mesh equation with the mean of a density on the next finer lattice.
     fn prepare(&mut self, problem: &Problem<'_>, fine: &[[f64; 1]]) -> Result<(), Failure> {
         self.densities = [fine.to_vec(), self.down.apply(fine)];
         let rho = self.densities[1].as_flattened();
         let mut equation = *problem.equation;
         let mut operator = equation.operator(&self.lattice, rho, problem.dt)?;
         if operator.negative_weight().is_some() {
-            // too steep for the coarse cells in this form, never in the other one of the same equation
+            // the density is too steep for the coarse cells in the gradient form, but never in the conservative form of
+            // the same equation
             equation.form = Form::Conservative;
             operator = equation.operator(&self.lattice, rho, problem.dt)?;
         }
@@ -124,7 +129,7 @@ impl Level {
         Ok(())
     }
 
-    /// Means of values on the next finer lattice, weighted by the density.
+    /// Means of values on the next finer lattice, with the density as weight.
     fn restrict(&self, values: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let [fine, here] = &self.densities;
         let weighted: Vec<[f64; 2]> = values.iter().zip(fine).map(|(v, [rho])| v.map(|v| rho * v)).collect();
@@ -144,15 +149,15 @@ impl Level {
     }
 }
 
-/// Where a value along an axis comes from: nodes and weights.
+/// The nodes along an axis, with their weights, that a value is made of.
 type Sources = Vec<(usize, f64)>;
 
-/// A linear map between two lattices that acts along one axis after the other.
+/// A linear map between two lattices that is a product of maps along each axis.
 #[derive(Debug, Clone)]
 struct Transfer {
-    /// For each node along each axis of the lattice it maps to.
+    /// For each axis, and each node along it on the lattice of the result.
     rows: [Vec<Sources>; 2],
-    /// Nodes along the second axis of the lattice it maps from.
+    /// Number of nodes along the second axis of the lattice it maps from.
     width: usize,
 }
 
@@ -184,7 +189,7 @@ impl Transfer {
     }
 }
 
-/// For each coarse node the mean over the fine nodes nearer than a coarse cell, weighted by its hat function.
+/// Restriction: for each coarse node, the fine nodes nearer than one coarse cell, with its hat function as weight.
 fn hats(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
     let (cells, nodes, periodic) = (fine.cells()[d], fine.nodes()[d], fine.periodic()[d]);
     let ratio = cells as f64 / coarse.cells()[d] as f64;
@@ -200,7 +205,7 @@ fn hats(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
     (0..coarse.nodes()[d]).map(|i| row(i as f64 * ratio)).collect()
 }
 
-/// For each fine node the cubic through the four nearest coarse nodes, fewer where there are fewer.
+/// Interpolation: for each fine node the cubic through the four nearest coarse nodes, or through as many as there are.
 fn cubics(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
     let (nodes, periodic) = (coarse.nodes()[d], coarse.periodic()[d]);
     let ratio = fine.cells()[d] as f64 / coarse.cells()[d] as f64;

@@ -4,32 +4,32 @@ use crate::geometry::Mesh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Estimates a sample of each cut and interpolates the rest
+/// Estimates a sample of the nodes of each cut, and interpolates the others
 ///
-/// What is interpolated, by the cubic through the four nearest samples, is the correction to the estimator's own guess
-/// (the old mesh, or its sweeps), which is small and smooth where the mesh itself is neither. Crossings of cuts always
-/// belong to the sample; values on bounded sides are known and cost nothing.
+/// It interpolates, by the cubic through the four nearest samples, the correction to the estimator's own guess (the old
+/// mesh, or its sweeps). The correction is small and smooth where the mesh itself is neither. Crossings of cuts always
+/// belong to the sample, and nodes on bounded sides are known anyway.
 ///
 /// # Source
 /// Section 3.6 of Bihlo, Haynes and Walsh (2015).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interpolation {
-    /// Nodes of each cut, crossings not counted.
+    /// Number of nodes of each cut that are estimated, not counting crossings.
     pub sample: usize,
-    /// Where they are.
+    /// How the estimated nodes are placed along a cut.
     #[serde(default)]
     pub placement: Placement,
 }
 
-/// Where the nodes of a sample are.
+/// Placement of the estimated nodes along a cut.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Placement {
-    /// Between two neighbours lies the same ∫ρ dξ along the cut.
+    /// With the same ∫ρ dξ along the cut between neighbours.
     #[default]
     Density,
-    /// Evenly.
+    /// Evenly spaced.
     Uniform,
 }
 
@@ -45,7 +45,7 @@ impl Interpolation {
         Ok(())
     }
 
-    /// The nodes to estimate, in order.
+    /// The nodes to estimate, in ascending order.
     pub(super) fn sample(&self, decomposition: &Decomposition, rho: &[f64]) -> Vec<usize> {
         let lines = decomposition.lines();
         let mut points: Vec<usize> = crossings(&lines);
@@ -59,14 +59,14 @@ impl Interpolation {
         points
     }
 
-    /// The sample of one line of nodes.
+    /// The estimated nodes of one line of nodes.
     fn place(&self, inner: &[usize], rho: &[f64]) -> Vec<usize> {
         let (n, wanted) = (inner.len(), self.sample);
         if wanted >= n {
             return inner.to_vec();
         }
         let weight = |k: usize| if self.placement == Placement::Density { rho[k] } else { 1.0 };
-        // ∫ρ up to the middle of each node's share
+        // ∫ρ up to the middle of the interval that each node stands for
         let total: f64 = inner.iter().map(|&k| weight(k)).sum();
         let mut next = 0;
         let mut sum = 0.0;
@@ -93,7 +93,7 @@ fn crossings(lines: &[Cut]) -> Vec<usize> {
     first.into_iter().filter(|k| second.contains(k)).collect()
 }
 
-/// Fills all cuts of `x`, which holds estimates at `points` and `guess` everywhere else.
+/// Interpolates on all cuts of `x`, which holds estimates at `points` and `guess` elsewhere.
 pub(super) fn fill(
     decomposition: &Decomposition,
     mesh: &Mesh<2>,
@@ -121,7 +121,7 @@ pub(super) fn fill(
     }
 }
 
-/// The polynomial through up to four samples around a place, two on either side where there are.
+/// The value at a place of the polynomial through the nearest samples: up to four, two on either side if there are any.
 fn through_nearest(samples: &[(f64, [f64; 2])], at: f64) -> [f64; 2] {
     let above = samples.partition_point(|(i, _)| *i < at);
     let first = above.saturating_sub(2).min(samples.len().saturating_sub(4));

@@ -7,30 +7,31 @@ use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Random walks on the lattice, unbiased for the discrete step
+/// Random walks on the lattice, which estimate the discrete step without bias
 ///
-/// A row of the mesh operator, divided by its diagonal, is a jump to each neighbour with a probability and a stop with
-/// what is left:
+/// A row of the mesh operator, divided by its diagonal, gives the probability of a jump to each neighbour; with the
+/// rest the walk stops:
 ///
 /// ```text
 /// jump to e with w_e / (1 + Σw),   stop with 1 / (1 + Σw);   x_i = E[xⁿ where the walk stops, xⁿ⁺¹ on a side]
 /// ```
 ///
-/// Neither a time step nor an interpolation is left to make an error, only the noise of N walks. It needs weights ≥ 0,
-/// that is |b|h ≤ 2; `monitor.gradient = "safe"` always has them.
+/// There is no error of a time step or an interpolation, only the noise of N walks. The weights must be ≥ 0, that is
+/// |b|h ≤ 2, which `monitor.gradient = "safe"` ensures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridWalk {
     /// Number N of walks that start at each interface point.
     pub walks: usize,
-    /// Walks pay the motion over the step instead of the position: the residual walk without sweeps.
+    /// Estimates the motion over the step instead of the position: a walk collects the residual of the old mesh where
+    /// it stops.
     #[serde(default)]
     pub increment: bool,
 }
 
-/// More than this of anything takes longer than anyone waits.
+/// Largest number of walks from a point.
 const MAX_WALKS: usize = 1 << 31;
-/// Jumps in one step beyond which walks are refused: hours.
+/// Jumps of all walks in one step beyond which they are refused: they would take hours.
 const MAX_JUMPS: f64 = 1e11;
 pub(super) fn check_walks(walks: usize) -> Result<()> {
     match walks {
@@ -50,7 +51,7 @@ impl GridWalk {
     }
 }
 
-/// Refuses walks that nobody lives to see stop.
+/// Refuses walks that would take hours.
 fn check_jumps(problem: &Problem<'_>, walks: usize, points: usize) -> Result<(), Failure> {
     let jumps = mean_jumps(problem);
     if walks as f64 * points as f64 * jumps <= MAX_JUMPS {
@@ -60,7 +61,8 @@ fn check_jumps(problem: &Problem<'_>, walks: usize, points: usize) -> Result<(),
     Err(Failure::LongWalks { stiffness: a.max(b), jumps, walks, points })
 }
 
-/// Lower end of the spectrum of the step, over its diagonal: the slowest mode has half a wave across a bounded axis.
+/// Lower end of the spectrum of the step's matrix, divided by its diagonal. The slowest mode has half a wave across a
+/// bounded axis.
 pub(super) fn lowest(problem: &Problem<'_>) -> f64 {
     let (lattice, a) = (problem.mesh.lattice(), problem.stiffness());
     let slowest: f64 = (0..2)
@@ -70,7 +72,7 @@ pub(super) fn lowest(problem: &Problem<'_>) -> f64 {
     (1.0 + slowest) / (1.0 + 2.0 * a[0] + 2.0 * a[1])
 }
 
-/// Jumps of a walk, about.
+/// Approximate mean number of jumps of a walk.
 pub(super) fn mean_jumps(problem: &Problem<'_>) -> f64 {
     1.0 / lowest(problem)
 }
@@ -101,7 +103,7 @@ impl Estimator for GridWalk {
     }
 }
 
-/// xⁿ − M x at a node for x = xⁿ between the new sides; zero on them.
+/// The residual xⁿ − M x at a node, for the old mesh between the new sides; zero on them.
 fn motion(problem: &Problem<'_>, node: usize, jump: [[f64; 2]; 2]) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for_each_neighbour(problem, node, |neighbour, turns, weight| {
@@ -112,8 +114,8 @@ fn motion(problem: &Problem<'_>, node: usize, jump: [[f64; 2]; 2]) -> [f64; 2] {
     sum
 }
 
-/// Calls `f(neighbour, turns around periodic axes on the way, weight)` for the neighbours of a node off the sides; for
-/// a node on one never.
+/// Calls `f(neighbour, turns around periodic axes on the way, weight)` for the neighbours of a node. For a node on a
+/// bounded side it does nothing.
 pub(super) fn for_each_neighbour(problem: &Problem<'_>, node: usize, mut f: impl FnMut(usize, [f64; 2], f64)) {
     let lattice = problem.mesh.lattice();
     if lattice.on_side(node) {
@@ -131,32 +133,32 @@ pub(super) fn for_each_neighbour(problem: &Problem<'_>, node: usize, mut f: impl
     }
 }
 
-/// Where no walk stopped at anything to pay, that says nothing of what others would have been paid.
+/// Removes the standard error of 0 where no walk met a residual: others might have.
 pub(super) fn forget_certainty(estimates: &mut [Estimate]) {
     if estimates.iter().all(|estimate| estimate.standard_error == [0.0; 2]) {
         estimates.iter_mut().for_each(|estimate| estimate.standard_error = [f64::NAN; 2]);
     }
 }
 
-/// Walks on the lattice of a problem.
+/// Random walks on the lattice of a problem.
 pub(super) struct Walks<'a> {
     problem: &'a Problem<'a>,
     nodes: [usize; 2],
     periodic: [bool; 2],
 }
 
-/// Where a walk stopped.
+/// The node at which a walk stopped.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stop {
     pub node: usize,
-    /// Turns around periodic axes on the way.
+    /// Turns around each periodic axis on the way there.
     pub turns: [i32; 2],
 }
 
 impl<'a> Walks<'a> {
     /// # Errors
-    /// [`Failure::SteepDensity`] where the weights are no probabilities, [`Failure::LongWalks`] where so many walks
-    /// from so many points would take too long.
+    /// [`Failure::SteepDensity`] where the weights are no probabilities; [`Failure::LongWalks`] where `walks` walks
+    /// from each of `points` points would take too long.
     pub fn new(problem: &'a Problem<'a>, walks: usize, points: usize) -> Result<Self, Failure> {
         check_jumps(problem, walks, points)?;
         problem.operator.check_weights(problem.mesh)?;
@@ -164,8 +166,7 @@ impl<'a> Walks<'a> {
         Ok(Self { problem, nodes: lattice.nodes(), periodic: lattice.periodic() })
     }
 
-    /// For each point the mean over walks of what `pay(number of the point, stop)` says, and the number of jumps and
-    /// stops.
+    /// For each point the mean over its walks of `pay(number of the point, stop)`, and the number of jumps and stops.
     pub fn mean(
         &self,
         points: &[usize],
@@ -186,7 +187,7 @@ impl<'a> Walks<'a> {
         (found.into_iter().map(|(estimate, _)| estimate).collect(), steps)
     }
 
-    /// One walk; a random word of 32 bits is a place on the sum of the weights and the one that stops.
+    /// One walk. A random word of 32 bits selects a neighbour, or a stop, by the cumulated weights.
     fn walk(&self, start: usize, path: usize, steps: &mut usize) -> Stop {
         const SCALE: f64 = 1.0 / 4_294_967_296.0;
         let Self { problem, nodes, periodic } = self;
@@ -222,7 +223,7 @@ impl<'a> Walks<'a> {
     }
 }
 
-/// Running sums of samples that are small.
+/// Running sums of small samples, for mean and variance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Samples {
     count: f64,
@@ -244,14 +245,14 @@ impl Samples {
         }
     }
 
-    /// Their mean, from a base.
+    /// Their mean, added to a base, with its standard error.
     pub fn estimate(self, base: [f64; 2]) -> Estimate {
         let n = self.count;
         let mean = self.sums.map(|sum| sum / n);
         let variance = [0, 1].map(|c| ((self.squares[c] / n - mean[c] * mean[c]).max(0.0)) / (n - 1.0));
         Estimate {
             x: [0, 1].map(|c| base[c] + mean[c]),
-            // one sample says nothing of its spread: 0/0
+            // a single sample has no spread: NaN
             standard_error: if n > 1.0 { variance.map(f64::sqrt) } else { [f64::NAN; 2] },
         }
     }

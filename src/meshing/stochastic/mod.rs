@@ -1,4 +1,5 @@
-//! Stochastic domain decomposition: the values between the subdomains are estimated, then each is solved alone.
+//! Stochastic domain decomposition: the nodes between the subdomains are estimated, then each subdomain is solved
+//! alone.
 
 mod coarse;
 mod interpolation;
@@ -36,12 +37,13 @@ use std::time::Instant;
 
 /// Stochastic domain decomposition
 ///
-/// The new mesh at every node between the S_ξ × S_η subdomains is estimated, each node by itself: by random walks, or
-/// by strips around the cuts. With these values each subdomain is one solve of its own. Estimators that look at strips
-/// read them from the neighbours in one exchange a step, more only in steps that are long for the mesh, and gather the
-/// right-hand sides of a coarse lattice where they have one; how much that is, is counted.
+/// The new positions of the nodes between the S_ξ × S_η subdomains are estimated one by one, by random walks or by
+/// strips around the cuts. With these positions given, each subdomain is an independent solve. Estimators that use
+/// strips read them from the neighbours in one exchange in each step, in more exchanges only if the step is long for
+/// the mesh; with a coarse lattice they also gather its right-hand sides. [`Interface`] counts what they read and
+/// gather.
 ///
-/// The estimator is one of [`EstimatorKind`], as a study names it, or any [`Estimator`] of one's own.
+/// The estimator is one of [`EstimatorKind`], as studies name them, or any [`Estimator`] of your own.
 ///
 /// # Source
 /// Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation* (2015).
@@ -49,28 +51,28 @@ use std::time::Instant;
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Stochastic", bound = "E: JsonSchema + Default + Serialize")]
 pub struct Stochastic<E = EstimatorKind> {
-    /// Along each axis.
+    /// Number of subdomains along each axis.
     #[serde(deserialize_with = "pair")]
     pub subdomains: [usize; 2],
-    /// Of all random numbers, 0 … 2⁶³ − 1.
+    /// Seed of all random numbers, 0 … 2⁶³ − 1.
     #[serde(default)]
     pub seed: u64,
-    /// How values on the interfaces are estimated.
+    /// How the nodes between subdomains are estimated.
     #[serde(default)]
     pub estimator: E,
-    /// Estimates only a sample of each interface; all of its nodes where this is left out.
+    /// Estimates only some nodes of each interface and interpolates the others; by default every node is estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interface: Option<Interpolation>,
     #[serde(skip)]
     line: Robust<1>,
     #[serde(skip)]
     parts: Option<Parts>,
-    /// Steps done: with the seed, the key of all random numbers.
+    /// Number of steps done. Together with the seed it is the key of the random numbers.
     #[serde(skip)]
     steps: u32,
 }
 
-/// The subdomains of a lattice with the memory of their solvers.
+/// The subdomains of a lattice, with the memory of their solvers.
 #[derive(Debug, Clone)]
 struct Parts {
     lattice: Lattice<2>,
@@ -80,12 +82,12 @@ struct Parts {
     strips: Strips,
 }
 
-/// One mesh step, as an estimator sees it.
+/// One step of the mesh equation, as an estimator gets it.
 #[derive(Debug)]
 pub struct Problem<'a> {
     /// The mesh equation.
     pub equation: &'a Mmpde,
-    /// The same as a linear system.
+    /// The same equation as a linear system.
     pub operator: &'a MeshOperator<2>,
     /// The mesh at the start of the step.
     pub mesh: &'a Mesh<2>,
@@ -93,17 +95,17 @@ pub struct Problem<'a> {
     pub rho: &'a [f64],
     /// Length of the step.
     pub dt: f64,
-    /// New positions of the nodes on bounded sides; old ones elsewhere.
+    /// New positions of nodes on bounded sides, and old ones elsewhere.
     pub new: &'a [[f64; 2]],
-    /// Of all random numbers.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Steps done before: with the seed, the key of the random numbers of this one.
+    /// Number of steps done before. Together with the seed it is the key of this step's random numbers.
     pub step: u32,
     random: Philox,
 }
 
 impl<'a> Problem<'a> {
-    /// A mesh step whose random numbers belong to a seed and a step number.
+    /// A step whose random numbers belong to a seed and a step number.
     #[allow(clippy::too_many_arguments)] // what a step is made of
     pub fn new(
         equation: &'a Mmpde,
@@ -127,38 +129,38 @@ impl<'a> Problem<'a> {
 /// The new position of one node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Mean over the samples, if there are any.
+    /// Mean over the samples; for a deterministic estimator its only value.
     pub x: [f64; 2],
-    /// Its standard error; NaN where there was one sample only, or none.
+    /// Standard error of the mean; NaN without samples or with only one.
     pub standard_error: [f64; 2],
 }
 
-/// What an estimator found.
+/// The result of an estimator.
 #[derive(Debug, Clone, Default)]
 pub struct Estimates {
-    /// One a point asked for.
+    /// One estimate for each point asked for.
     pub points: Vec<Estimate>,
-    /// Positions near the new ones at all nodes, exact on bounded sides: where solves and interpolations start from.
+    /// Approximate new positions of all nodes, exact on bounded sides, from which solves and interpolations start.
     pub guess: Vec<[f64; 2]>,
-    /// What it cost.
+    /// The work of the estimator.
     pub work: Work,
-    /// Relaxation sweeps in strips.
+    /// Relaxation sweeps in the strips.
     pub sweeps: usize,
-    /// Samples from each point; none of a deterministic estimator, and where strips alone are better.
+    /// Samples from each point; 0 for deterministic estimators, and where strips alone are better.
     pub walks: usize,
     /// Exchanges of strips between neighbours.
     pub exchanges: usize,
-    /// Walks that ended beyond the nearer half of a strip, where another subdomain pays.
+    /// Walks that ended beyond the nearer half of a strip, so that their value came from another subdomain.
     pub handed_on: usize,
 }
 
 impl Estimates {
-    /// Means over `walks` samples, with a guess for all nodes.
+    /// Means over `walks` samples, and a guess for all nodes.
     fn sampled(points: Vec<Estimate>, guess: Vec<[f64; 2]>, walks: usize) -> Self {
         Self { points, guess, work: Work::default(), sweeps: 0, walks, exchanges: 0, handed_on: 0 }
     }
 
-    /// What strips say by themselves.
+    /// The result of strips without walks.
     fn of_strips(found: &Corrected, points: &[usize]) -> Self {
         let moved = |k: usize| [0, 1].map(|c| found.base[k][c] + found.correction[k][c]);
         let guess: Vec<[f64; 2]> = (0..found.base.len()).map(moved).collect();
@@ -168,11 +170,11 @@ impl Estimates {
     }
 }
 
-/// A way to compute the solution of a mesh step at single nodes.
+/// A method to compute the solution of a mesh step at single nodes.
 ///
 /// # Example
-/// An estimator that solves the whole domain and hands out what is asked for: the subdomains of [`Stochastic`] then make the
-/// mesh of [`Whole`](crate::meshing::Whole).
+/// An estimator that solves the whole domain and returns the points asked for. The subdomains of [`Stochastic`] then
+/// make the mesh of [`Whole`](crate::meshing::Whole).
 ///
 /// ```
 /// use driftmesh::geometry::{Lattice, Mesh};
@@ -207,8 +209,8 @@ pub trait Estimator: Send + Sync {
         Ok(())
     }
 
-    /// The new positions of `points`, each by itself. `strips` are those around the cuts on which the points lie, with
-    /// what is kept of them from step to step.
+    /// The new positions of `points`, each by itself. `strips` are the subdomains extended beyond the cuts on which the
+    /// points lie, with memory that lasts from step to step.
     ///
     /// # Errors
     /// [`Failure::SteepDensity`] where the operator's weights are no probabilities.
@@ -218,7 +220,8 @@ pub trait Estimator: Send + Sync {
 kinds! {
     /// `mesh.generator.estimator` of a study.
     EstimatorKind {
-        "residual-walk" = ResidualWalk: "strips around the interfaces, then random walks on the lattice for what they leave",
+        "residual-walk" = ResidualWalk: "strips around the interfaces, then random walks on the lattice for what they \
+                                         leave",
         "strip" = Strip: "every subdomain solved once with a strip of its neighbours, after a coarse lattice; no walks",
         "grid-walk" = GridWalk: "random walks on the lattice, unbiased for the discrete equation",
         "monte-carlo" = MonteCarlo: "as published: Euler-Maruyama paths with a Brownian-bridge exit test",
@@ -242,7 +245,7 @@ impl Estimator for EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// The estimator itself.
+    /// The estimator as a trait object.
     pub fn estimator(&self) -> &dyn Estimator {
         match self {
             Self::ResidualWalk(walk) => walk,
@@ -254,7 +257,7 @@ impl EstimatorKind {
 }
 
 impl<E: Estimator> Stochastic<E> {
-    /// Subdomains whose interfaces an estimator provides.
+    /// Subdomains, with an estimator for the nodes between them.
     pub fn new(subdomains: [usize; 2], seed: u64, estimator: E) -> Self {
         Self { subdomains, seed, estimator, interface: None, line: Robust::default(), parts: None, steps: 0 }
     }
@@ -337,7 +340,7 @@ impl<E: Estimator> MeshGenerator for Stochastic<E> {
     }
 }
 
-/// What is known of the estimates together; a failure where their noise is as large as an edge of the mesh.
+/// Figures of all estimates together; a failure where their noise is as large as an edge of the mesh.
 fn summary(
     mesh: &Mesh<2>,
     points: usize,

@@ -9,19 +9,20 @@ use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Diffusion paths in the continuous computational domain, as published
+/// Paths of the stochastic differential equation in the continuous computational domain, as published
 ///
 /// ```text
 /// Φ ← Φ + b(Φ) Δs + √(2Δs) W,   Δs = Δt/(τM),   M times from Φ = ξ;   x(ξ) = E[xⁿ(Φ)]
 /// ```
 ///
-/// with b interpolated bilinearly and xⁿ bicubically. Near a bounded side, paths leave between two points with the
-/// probability exp(−d₀d₁/Δs) of a Brownian bridge, d their distances from it; a path that left pays the position on the
-/// side where and when it did, linear in time between old and new side. Whether a path leaves is drawn; with any of the
-/// variance reductions it is weighed instead, that is each path pays the mean over what could have been drawn.
+/// with b interpolated bilinearly and xⁿ bicubically. Near a bounded side a path leaves between two points with the
+/// probability exp(−d₀d₁/Δs) of a Brownian bridge, where d₀ and d₁ are their distances from the side. It then takes the
+/// position on the side where and when it left, linear in time between the old and the new side. Whether a path leaves
+/// is drawn at random. With any variance reduction it is weighted instead: each path takes the mean over what could
+/// have been drawn.
 ///
-/// Its target is the time-continuous step, not the implicit Euler one that the subdomains solve: a bias of first order
-/// in Δs remains, and the noise of N paths.
+/// Paths approximate the step with exact integration in time, whereas the subdomains solve an implicit Euler step. A
+/// bias of first order in Δs remains, besides the noise of N paths.
 ///
 /// # Source
 /// (3.1)–(3.3) of Bihlo, Haynes and Walsh (2015); Jansons and Lythe (2003) for the exit test.
@@ -32,27 +33,28 @@ pub struct MonteCarlo {
     pub paths: usize,
     /// Number M of Euler–Maruyama steps of a path within a time step.
     pub substeps: usize,
-    /// Every second path takes the increments of the one before with opposite sign.
+    /// Every second path takes the increments of the one before with the opposite sign.
     #[serde(default)]
     pub antithetic: bool,
-    /// Increments from a Sobol sequence in the order of a Brownian bridge, in up to four independent scramblings whose
-    /// means tell the standard error.
+    /// Takes the increments from a Sobol sequence, in the order of a Brownian bridge. Up to four independent
+    /// scramblings give means whose spread is the standard error.
     #[serde(default)]
     pub sobol: bool,
     /// Subtracts the martingale Σ ∇xⁿ(Φ)·√(2Δs) W, whose mean is zero.
     #[serde(default)]
     pub control_variate: bool,
-    /// All points share their random numbers: errors of neighbours are alike and bend the mesh less.
+    /// All points use the same random numbers: neighbours then have similar errors, which bend the mesh less.
     #[serde(default)]
     pub common: bool,
 }
 
+/// Largest number of paths, of paths from a Sobol sequence, and of substeps.
 const MAX_PATHS: usize = 1 << 31;
 const MAX_SOBOL_PATHS: usize = 1 << 16;
 const MAX_SUBSTEPS: usize = 100_000;
-/// Independent scramblings of a Sobol sequence.
+/// Number of independent scramblings of the Sobol sequence.
 const SCRAMBLINGS: usize = 4;
-/// Blocks of random words from here on decide exits; those before are for increments.
+/// Blocks of random words from this number on decide exits; those before are for increments.
 const EXITS: u32 = 1 << 31;
 
 impl MonteCarlo {
@@ -108,7 +110,7 @@ impl Estimator for MonteCarlo {
 }
 
 impl MonteCarlo {
-    /// The estimate at one node, and the number of path steps it took.
+    /// The estimate at one node, and the number of path steps that it took.
     #[inline(always)]
     fn point(&self, problem: &Problem<'_>, domain: &Domain, bridge: &Bridge, k: usize) -> (Estimate, usize) {
         let node = if self.common { u32::MAX } else { k as u32 };
@@ -155,7 +157,7 @@ impl MonteCarlo {
         (estimate, steps)
     }
 
-    /// Independent standard normal increments: each block of four words serves two steps.
+    /// Independent standard normal increments. Each block of four random words gives those of two steps.
     #[inline(always)]
     fn increments(
         &self,
@@ -181,10 +183,11 @@ impl MonteCarlo {
     }
 }
 
-/// A path of M steps built from its end, then its middle, then the middles of the halves …, so that the first and best
-/// dimensions of a sequence decide where the path goes.
+/// The order in which a path of M steps is built: its end, its middle, the middles of the halves, and so on. The first
+/// dimensions of a Sobol sequence, which are its best, then decide the large-scale shape of the path.
 struct Bridge {
-    /// Places to be set, in order: which, from which two, and the weights of both and of the normal number.
+    /// Points of the path in that order: its index, the two points it lies between, and the weights of both and of the
+    /// normal number.
     knots: Vec<Knot>,
 }
 
@@ -212,12 +215,12 @@ impl Bridge {
         Self { knots }
     }
 
-    /// Increments of paths of a scrambled Sobol sequence.
+    /// Increments of paths from a scrambled Sobol sequence.
     #[inline(always)]
     fn increments(&self, seed: u32, paths: [u32; LANES], out: &mut [[Lanes; 2]]) {
         let mut places = vec![[[0.0; LANES]; 2]; self.knots.len() + 1];
         for (number, knot) in self.knots.iter().enumerate() {
-            // a single-precision number stands for the 2⁻²³ above it: take the middle
+            // a number in single precision stands for an interval of 2⁻²³ above it, of which the middle is taken
             let [a, b] = [0, 1].map(|axis| {
                 paths.map(|path| {
                     let point = sobol_burley::sample(path & 0xFFFF, 2 * number as u32 + axis, seed);

@@ -6,41 +6,41 @@ use crate::meshing::Form;
 use crate::numerics::difference::{Gradient, derivative};
 use crate::random::uniform;
 
-/// Paths that are computed side by side.
+/// Number of paths that are computed side by side.
 pub(super) const LANES: usize = 8;
 
-/// A number for each of them.
+/// One number for each of these paths.
 pub(super) type Lanes = [f64; LANES];
 
-/// What paths move in, in units of the lattice spacing.
+/// The fields in which paths move, in units of the lattice spacing.
 pub(super) struct Domain {
     grid: Grid,
-    /// b Δs.
+    /// The drift b Δs.
     drift: Bilinear<2>,
-    /// √(2Δs).
+    /// The standard deviation √(2Δs) of an increment along each axis.
     spread: [f64; 2],
-    /// 1/Δs along each axis: for products of two distances.
+    /// 1/Δs along each axis, which multiplies a product of two distances.
     sharpness: [f64; 2],
     /// ∇_ξ of both coordinates: x along ξ, x along η, y along ξ, y along η.
     slopes: Bilinear<4>,
     old: Surface,
     new: Surface,
-    /// How far old and new side are apart in time, in substeps.
+    /// Substeps in the time step, over which a side moves from old to new.
     substeps: f64,
-    /// Subtract the martingale.
+    /// Whether to subtract the martingale of the control variate.
     control: bool,
-    /// Weigh exits instead of drawing them.
+    /// Whether to weight exits instead of drawing them.
     weigh: bool,
-    /// Beyond this exponent a bridge does not leave.
+    /// Exponent of a Brownian bridge above which it counts as not leaving.
     far: f64,
-    /// The distance from a side that makes it so.
+    /// The distance from a side beyond which the exponent is always above `far`.
     margin: [f64; 2],
 }
 
-/// Paths on their way.
+/// The state of paths on their way.
 struct Paths {
     at: [Lanes; 2],
-    /// The part of each that has not left.
+    /// The weight of each path that has not left yet.
     inside: Lanes,
     martingale: [Lanes; 2],
     paid: [Lanes; 2],
@@ -64,7 +64,7 @@ impl Domain {
             .map(|(a, b)| [a[0] / n[0], b[0] / n[1], a[1] / n[0], b[1] / n[1]])
             .collect();
         let weigh = settings.antithetic || settings.sobol || settings.control_variate;
-        // e⁻⁴⁰ = 4e-18 is no weight, and no drawn number is below 2⁻³³ = e⁻²²·⁹
+        // weighted, e⁻⁴⁰ = 4e-18 does not count; drawn, no random number is below 2⁻³³ = e⁻²²·⁹
         let far: f64 = if weigh { 40.0 } else { 23.0 };
         Self {
             grid: Grid::new(lattice),
@@ -82,8 +82,8 @@ impl Domain {
         }
     }
 
-    /// What the first `count` paths pay, and how many steps they took together; `words` of a step and side draw
-    /// their exits.
+    /// The sums that the first `count` paths collect, and the steps that they took together. `words` gives the random
+    /// words of a step and side that decide their exits.
     #[inline(always)]
     pub fn walk(
         &self,
@@ -128,7 +128,7 @@ impl Domain {
         (paths.paid, steps)
     }
 
-    /// Where all paths go from here; the control variate goes with them.
+    /// The next points of all paths, and their contributions to the control variate.
     #[inline(always)]
     fn advance(&self, paths: &mut Paths, w: &[Lanes; 2]) -> [Lanes; 2] {
         let (mut cell, mut share) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
@@ -159,10 +159,10 @@ impl Domain {
         [0, 1].map(|d| std::array::from_fn(|l| paths.at[d][l] + drift[d][l] + noise[d][l]))
     }
 
-    /// False where all paths stay so far from both sides of axis d that none can leave.
+    /// Whether any path is so near to a side of axis d that it may leave.
     #[inline(always)]
     fn near(&self, paths: &Paths, next: &[Lanes; 2], d: usize) -> bool {
-        // two distances of at least the margin make an exponent of at least `far`
+        // two distances of at least the margin have an exponent of at least `far`
         let (low, high) = (self.margin[d], self.grid.cells[d] - self.margin[d]);
         let mut near = false;
         for l in 0..LANES {
@@ -172,7 +172,7 @@ impl Domain {
         near
     }
 
-    /// Distances from both sides of axis d.
+    /// Distances from both sides across axis d.
     #[inline(always)]
     fn distances(&self, d: usize, x: f64) -> [f64; 2] {
         [x, self.grid.cells[d] - x]
@@ -189,7 +189,7 @@ impl Domain {
         out
     }
 
-    /// The part of each path that leaves: drawn, all or nothing, or weighed.
+    /// The weight of each path that leaves: all or nothing if drawn, a share if weighted.
     #[inline(always)]
     fn parts(&self, exponents: &Lanes, words: impl Fn() -> [[u32; LANES]; 4]) -> Lanes {
         let mut parts = [0.0; LANES];
@@ -206,7 +206,7 @@ impl Domain {
         parts
     }
 
-    /// Paths pay for the parts of them that meet a side on the way to `next`.
+    /// Adds, for the weights that leave on the way to `next`, the position on the side.
     #[inline(always)]
     fn leave(&self, paths: &mut Paths, next: &[Lanes; 2], step: usize, d: usize, end: usize, parts: Lanes) {
         for l in 0..LANES {
@@ -220,7 +220,7 @@ impl Domain {
         }
     }
 
-    /// The position on one side of axis d where and when a path meets it.
+    /// The position on a side across axis d, where and when a path meets it.
     #[inline(always)]
     fn exit(&self, [at, next]: [[f64; 2]; 2], d: usize, end: usize, step: usize) -> [f64; 2] {
         let [before, after] = [at, next].map(|x| self.distances(d, x[d])[end]);

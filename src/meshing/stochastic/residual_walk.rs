@@ -12,30 +12,30 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Random walks for what strips leave
+/// Random walks that estimate the error which strips leave
 ///
 /// ```text
 /// P = a correction of the mesh by every subdomain on itself and a strip of its neighbours,
 /// r = xⁿ − M P,   x_i = P_i + E[r where the walk stops]
 /// ```
 ///
-/// The walks are those of [`GridWalk`](super::GridWalk). P is a control variate whose target is known exactly: the
-/// estimate stays unbiased for any P, and its variance falls with the square of the residual. A walk pays what its own
-/// subdomain sees as long as that lies on it or in the nearer half of its strip; a walk that ends further away is
-/// handed on to the subdomain there, and pays what that one sees.
+/// The walks are those of [`GridWalk`](super::GridWalk). The correction P is a control variate with a known mean: the
+/// estimate has no bias for any P, and its variance falls with the square of the residual r. A walk takes the residual
+/// as its own subdomain sees it, as long as it stops in that subdomain or in the nearer half of its strip. If it stops
+/// farther away, the subdomain there provides the residual: the walk is handed on.
 ///
-/// With `sweeps = "auto"` the strips are those of [`Strip`](super::Strip), solved. Where walks would take more than 64
-/// jumps, Δt/(τh²) of about 16, they cost more than the strips and are no better, and none is done. With a number, P is
-/// so many sweeps of relaxation from xⁿ in strips twice as wide, which see as much as if they had gone over the whole
-/// lattice; strips are at most as wide as the narrowest subdomain.
+/// With `sweeps = "auto"` the strips are those of [`Strip`](super::Strip) and are solved. Where a walk would take more
+/// than 64 jumps, which is Δt/(τh²) of about 16, walks cost more than strips and are no better, and none are done. With
+/// a number, P is that many sweeps of relaxation from xⁿ in strips of twice as many nodes, which makes them equal to
+/// sweeps over the whole lattice; strips are at most as wide as the narrowest subdomain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ResidualWalk {
-    /// Sweeps of relaxation in place of the solves of strips, or "auto" for the solves.
+    /// Number of relaxation sweeps in the strips; "auto" solves the strips instead.
     pub sweeps: Auto<usize>,
     /// Number N of walks that start at each interface point.
     pub walks: usize,
-    /// Weights of the sweeps.
+    /// Relaxation method where `sweeps` is a number.
     pub smoother: Smoother,
 }
 
@@ -45,8 +45,9 @@ impl Default for ResidualWalk {
     }
 }
 
+/// Largest number of sweeps that may be set.
 const MAX_SWEEPS: usize = 1_000_000;
-/// Jumps of a walk beyond which strips alone are as good for less.
+/// Mean number of jumps of a walk above which strips alone are as accurate and cost less.
 const WORTH_WALKING: f64 = 64.0;
 
 impl ResidualWalk {
@@ -63,7 +64,7 @@ impl ResidualWalk {
         }
     }
 
-    /// Strips, the correction in them, and how often.
+    /// The strips, how they are corrected, and the number of exchanges.
     fn strips(&self, problem: &Problem<'_>, strips: &Strips) -> (Reach, Local, Option<usize>) {
         match self.sweeps {
             Auto::Auto => (Reach::of(problem, strips.decomposition()), Local::Solve { share: SOLVED }, None),
@@ -83,7 +84,7 @@ impl Estimator for ResidualWalk {
 
     fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure> {
         let alone = self.sweeps == Auto::Auto && mean_jumps(problem) > WORTH_WALKING;
-        // walks that nobody waits for are refused before anything is done
+        // walks that would take too long are refused before anything is computed
         let walks = (!alone).then(|| Walks::new(problem, self.walks, points.len())).transpose()?;
         let (reach, local, exchanges) = self.strips(problem, strips);
         let found = strips.correct(problem, reach, local, exchanges)?;
@@ -98,7 +99,7 @@ impl Estimator for ResidualWalk {
     }
 }
 
-/// Adds to estimates what walks from the points are paid.
+/// Adds to estimates the mean residual that walks from the points collect.
 fn pay_residual(
     problem: &Problem<'_>,
     walks: &Walks<'_>,
@@ -112,7 +113,7 @@ fn pay_residual(
     let handed_on = AtomicUsize::new(0);
     let (mut paid, path_steps) = walks.mean(points, count, |p, Stop { node, .. }| {
         let own = |node: usize| owners[p].and_then(|part| strips.seen(part, node));
-        // a side belongs to nobody, and pays nothing
+        // a node on a bounded side is owned by no subdomain, and its residual is zero
         if own(node).is_none() && strips.owner(node).is_some_and(|owner| owners[p] != Some(owner)) {
             handed_on.fetch_add(1, Ordering::Relaxed);
         }
@@ -128,7 +129,7 @@ fn pay_residual(
     estimates.work += Work { path_steps, ..Work::default() };
 }
 
-/// What a correction leaves of the residual at a node, r − M c as r_i − c_i + Σ w_e (c_e − c_i); zero on bounded sides.
+/// The residual that a correction leaves at a node, r − M c as r_i − c_i + Σ w_e (c_e − c_i); zero on bounded sides.
 fn left(problem: &Problem<'_>, found: &Corrected, node: usize, correction: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let c = correction(node);
     let mut left = [0, 1].map(|k| found.residual[node][k] - c[k]);

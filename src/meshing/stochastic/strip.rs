@@ -9,32 +9,34 @@ use crate::setting::Auto;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Every subdomain is solved with a strip of its neighbours, once: the deterministic opponent of the walks
+/// Every subdomain is solved once with a strip of its neighbours: a deterministic alternative to random walks
 ///
-/// An overlapping Schwarz iteration stopped after its first sweep, which starts from a coarse lattice where the
-/// influence e^(−d/ℓ), ℓ = √(Δt/τ), of what lies a strip away is not small: see [`Strips`]. One exchange with the
-/// neighbours and one gathering of the coarse right-hand sides make a step. Its error has a sign, which walks would
-/// take away.
+/// This is an overlapping Schwarz iteration that stops after its first sweep. The influence of nodes beyond a strip of
+/// width d is e^(−d/ℓ) with ℓ = √(Δt/τ); where this is not small, a coarse lattice gives the start: see [`Strips`]. A
+/// step takes one exchange with the neighbours and one gathering of the coarse right-hand sides. Its error is
+/// systematic, whereas that of walks averages out.
 ///
-/// Left to the program: as many nodes as leave an influence of a thousandth, where ten are enough without a coarse
-/// lattice; else a coarse lattice with one cell for 2 × 2 and strips of eight nodes. Where subdomains are narrower than
-/// that, strips reach over more than one. What the coarse lattice says of its own error tells about what is left: where
-/// that may be more than a hundredth of the shortest edge of the mesh, further exchanges follow.
+/// With "auto" strips are so wide that the influence beyond them is below a thousandth, if ten nodes are enough for
+/// that; else there is a coarse lattice with one cell for 2 × 2, and strips of eight nodes. Strips may reach over
+/// several narrow subdomains. The coarse lattice estimates its own error: as long as more than a hundredth of the
+/// shortest edge of the mesh may be left, further exchanges follow.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Strip {
-    /// Nodes of the neighbours that a subdomain sees beyond each cut, from 1 to the cells of the narrowest subdomain.
+    /// Nodes beyond each cut that a subdomain solves for with its own, from 1 to the number of cells of the narrowest
+    /// subdomain.
     pub width: Auto<usize>,
-    /// Cells along each axis to one of the coarse lattice; 1 for no coarse lattice.
+    /// Cells along each axis that make one cell of the coarse lattice; 1 for no coarse lattice.
     pub coarse: Auto<usize>,
-    /// Exchanges in a step.
+    /// Exchanges between neighbours in a step; "auto" adds some to the first while it is not enough.
     pub exchanges: Auto<usize>,
 }
 
+/// Largest number of exchanges that may be set.
 const MAX_EXCHANGES: usize = 1000;
 
 impl Strip {
-    /// One exchange of strips of so many nodes, without a coarse lattice.
+    /// One exchange of strips of a given width, without a coarse lattice.
     pub fn plain(width: usize) -> Self {
         Self { width: Auto::Value(width), coarse: Auto::Value(1), exchanges: Auto::Value(1) }
     }
@@ -54,7 +56,8 @@ impl Strip {
             )),
             Self { width: Auto::Value(width), .. } if width > narrowest => {
                 let rule = format!(
-                    "must be at most the {narrowest} cells of the narrowest subdomain; lower it, or give fewer subdomains"
+                    "must be at most the {narrowest} cells of the narrowest subdomain; lower it, or give fewer \
+                     subdomains"
                 );
                 Err(Error::invalid("width", width, rule))
             }
@@ -75,7 +78,7 @@ impl Strip {
         }
     }
 
-    /// What is given, and the rest as it fits.
+    /// The settings that are given, with the others chosen for the step.
     fn reach(&self, problem: &Problem<'_>, decomposition: &Decomposition) -> Reach {
         let by_itself = Reach::of(problem, decomposition);
         let width = match (self.width, self.coarse) {

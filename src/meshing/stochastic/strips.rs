@@ -9,91 +9,94 @@ use crate::numerics::larger;
 use crate::parallel;
 use crate::work::Work;
 
-/// Subdomains that see a strip of their neighbours, with the memory of their solvers
+/// Subdomains extended by a strip of their neighbours, with the memory of their solvers
 ///
-/// In one exchange every subdomain reads mesh and density in a strip of `width` nodes around it, corrects the mesh on
-/// itself and the strip, each by itself, and keeps what it answers for. The influence of a node at distance d falls
-/// like
+/// In one exchange every subdomain reads mesh and density in a strip of `width` nodes around it, solves for a
+/// correction of the mesh on itself and the strip, and keeps the nodes that it owns. For a constant density the
+/// influence of a node at distance d falls like
 ///
 /// ```text
 /// e^(−θ d/h),   cosh θ = 1 + h²/(2 ℓ²),   ℓ = √(Δt/τ)
 /// ```
 ///
-/// for a density that does not vary, d/ℓ in the limit of small h; where it varies, times √(max ρ/min ρ) or so. What
-/// reaches further, a coarse lattice brings first: the strips then need a few nodes only, whatever ℓ is.
+/// which is e^(−d/ℓ) in the limit of small h. For another density a factor of about √(max ρ/min ρ) comes in. What has a
+/// longer range is computed first on a coarse lattice, so that strips need only a few nodes for any ℓ.
 #[derive(Debug, Clone)]
 pub struct Strips {
     decomposition: Decomposition,
     reach: Reach,
     parts: Vec<Part>,
-    /// For each node the number of the part that answers for it; beyond the last on bounded sides.
+    /// For each node the number of the part that owns it; a number larger than any part on bounded sides.
     owner: Vec<u32>,
     coarse: Option<Coarse>,
-    /// The whole lattice, where a step cannot be told apart from one of it.
+    /// The whole lattice as one part, for long steps on periodic axes, where neither strips nor coarse lattices hold
+    /// the mesh.
     whole: Option<Part>,
 }
 
-/// How far strips see, and what they start from.
+/// The width of strips, and what they start from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Reach {
-    /// Nodes of the neighbours beyond each cut.
+    /// Nodes beyond each cut.
     pub width: usize,
-    /// Cells to one of the coarse lattice; 1 for none, 0 where the lattice itself is solved whole.
+    /// Cells along each axis that make one cell of the coarse lattice; 1 for no coarse lattice, 0 where the lattice
+    /// itself is solved whole.
     pub coarse: usize,
 }
 
-/// What an exchange started from, and what it found.
+/// The state before an exchange, and its result.
 pub(super) struct Corrected {
-    /// Positions before it, at all nodes.
+    /// Positions of all nodes before the exchange.
     pub base: Vec<[f64; 2]>,
-    /// Their residual xⁿ − M x.
+    /// The residual xⁿ − M x of these positions.
     pub residual: Vec<[f64; 2]>,
-    /// The correction of each node by the part that answers for it.
+    /// The correction of each node, by the part that owns it.
     pub correction: Vec<[f64; 2]>,
     pub exchanges: usize,
     pub work: Work,
-    /// What may be left of the error at interface points, about.
+    /// Estimate of the error that is left at interface points.
     left: f64,
 }
 
-/// Influence of what lies beyond a strip without a coarse lattice: width follows from it.
+/// Without a coarse lattice strips are so wide that nodes beyond them have at most this influence.
 pub(super) const BEYOND: f64 = 1e-3;
-/// Widest strip that is taken without a coarse lattice; what that costs more than the lattice grows with the width.
+/// Widest strip without a coarse lattice. With a wider one the extra unknowns cost more than the lattice.
 const WIDE: usize = 10;
-/// Width of a strip and ratio of the coarse lattice where ℓ asks for more.
+/// Width of strips with a coarse lattice, and its ratio.
 const FEW: Reach = Reach { width: 8, coarse: 2 };
-/// What a coarse lattice leaves of a correction where it cannot tell, and what is left by strips narrower than two
-/// coarse cells, between which the guess is rough.
+/// Share of a correction that a coarse lattice is assumed to miss where its error cannot be estimated, and where strips
+/// are narrower than two coarse cells, between which the interpolation is rough.
 const LEFT_IN_DOUBT: f64 = 0.1;
-/// Error that exchanges leave, as a share of the shortest edge of the mesh.
+/// Exchanges are repeated while more than this may be left, as a share of the shortest edge of the mesh.
 const LEFT: f64 = 1e-2;
-/// Exchanges in a step: more gain nothing where these have not.
+/// Largest number of exchanges in a step, unless a number is set: if these have not been enough, more are of no use.
 const MOST_EXCHANGES: usize = 100;
 
-/// θ along each axis: what is one node further away matters e^−θ times as much.
+/// θ along each axis: the influence of a node falls by e^−θ with every node of distance.
 pub(super) fn decay(problem: &Problem<'_>) -> [f64; 2] {
     problem.stiffness().map(|a| (1.0 + 0.5 / a).acosh())
 }
 
 impl Reach {
-    /// Strips so wide that what lies beyond matters by [`BEYOND`] at most, or a few nodes and a coarse lattice.
+    /// Strips so wide that nodes beyond have at most the influence [`BEYOND`], or else narrow ones and a coarse
+    /// lattice.
     pub fn of(problem: &Problem<'_>, decomposition: &Decomposition) -> Self {
         let width = Self::alone(problem, decomposition);
         let lattice = decomposition.lattice();
         let time = problem.dt / problem.equation.relaxation.over(problem.dt);
         if lattice.periodic() == [true; 2] && time >= 1.0 {
-            // nothing holds a mesh on periodic axes but where it was, which matters by 1/(1 + ℓ²) only: any rough error
-            // shifts it, and neither strips nor coarse lattices see that
+            // On periodic axes a mesh is held only by the term in xⁿ, of relative size 1/(1 + ℓ²). Any error that
+            // varies slowly shifts it, and neither strips nor coarse lattices see such an error.
             return Self { width: 1, coarse: 0 };
         }
         if width > WIDE { FEW } else { Self { width, coarse: 1 } }
     }
 
-    /// Nodes of a strip for which what lies beyond matters by [`BEYOND`] at most.
+    /// Width of a strip beyond which nodes have at most the influence [`BEYOND`].
     pub fn alone(problem: &Problem<'_>, decomposition: &Decomposition) -> usize {
         let decay = decay(problem);
         let divided = (0..2).filter(|&d| decomposition.is_divided(d));
-        // casts of floats saturate
+        // casts of large floats saturate
         divided.map(|d| (-BEYOND.ln() / decay[d]).ceil() as usize).fold(1, usize::max)
     }
 }
@@ -106,25 +109,25 @@ impl Strips {
         Self { decomposition, reach, parts: Vec::new(), owner, coarse: None, whole: None }
     }
 
-    /// The subdomains.
+    /// The division into subdomains.
     pub(super) fn decomposition(&self) -> &Decomposition {
         &self.decomposition
     }
 
-    /// Nodes that the subdomain with the most to read reads from its neighbours in one exchange.
+    /// Nodes that a subdomain reads from its neighbours in one exchange; the largest number over the subdomains.
     pub fn read(&self) -> usize {
         let lattice = self.decomposition.lattice();
         self.parts.iter().map(|part| part.read(lattice)).max().unwrap_or(0)
     }
 
-    /// Unknowns of the lattice that is solved whole, whose right-hand sides are gathered in an exchange; 0 where there
-    /// is none.
+    /// Unknowns of the lattice whose right-hand sides are gathered in each exchange, the coarse one or the whole; 0
+    /// without one.
     pub fn gathered(&self) -> usize {
         let whole = self.whole.as_ref().map_or(0, |whole| whole.patch.len());
         self.coarse.as_ref().map_or(whole, Coarse::len)
     }
 
-    /// What depends on the lattice and the reach alone: kept from step to step.
+    /// Makes what depends on the lattice and the reach alone, for this and later steps.
     fn prepare(&mut self, reach: Reach) {
         if self.reach == reach && !self.parts.is_empty() {
             return;
@@ -142,8 +145,8 @@ impl Strips {
         self.reach = reach;
     }
 
-    /// As many exchanges as are asked for; without a number one, and more only while the last correction says that more
-    /// than a hundredth of the shortest edge may be left.
+    /// Does the given number of exchanges. Without a number it does one, and further ones while the last correction
+    /// suggests that more than a hundredth of the shortest edge may be left.
     pub(super) fn correct(
         &mut self,
         problem: &Problem<'_>,
@@ -174,13 +177,13 @@ impl Strips {
             found.exchanges += 1;
             let change = found.correction.as_flattened().iter().fold(0.0, |m, &c| larger(m, c));
             if found.exchanges > 1 {
-                // later exchanges gain less than the first: what is left is what they see worst
+                // later exchanges gain less than the first, so the last change itself is the estimate of what is left
                 found.left = change;
             }
             let done = match exchanges {
                 Some(n) => found.exchanges >= n,
                 None => {
-                    // what is not finite has not shrunk either
+                    // NaN counts as not shrinking
                     let shrinks = change < before;
                     found.left <= limit || !shrinks || found.exchanges == MOST_EXCHANGES
                 }
@@ -192,16 +195,16 @@ impl Strips {
         }
     }
 
-    /// Influence of what lies beyond the strips, about.
+    /// Estimate of the influence of nodes beyond the strips.
     fn beyond(&self, problem: &Problem<'_>) -> f64 {
         let decay = decay(problem);
         let divided = (0..2).filter(|&d| self.decomposition.is_divided(d));
         divided.map(|d| (-decay[d] * self.reach.width as f64).exp()).fold(0.0, f64::max)
     }
 
-    /// What the coarse lattice is off by, as a share of the largest correction, about: the extrapolation changed the
-    /// share s, the term in H², and the next one goes with its square: ten times that was seen on case B from 81² to
-    /// 321² nodes.
+    /// Estimate of the coarse lattice's error, as a share of the largest correction. The extrapolation removes the term
+    /// in H², which changed the correction by a share s, and the next term is of the size of s². On case B, from 81² to
+    /// 321² nodes, the error was 10 s²; a factor of 30 keeps a margin.
     fn left_by_coarse(&self, s: f64) -> f64 {
         let narrow = self.reach.width < 2 * self.reach.coarse;
         let doubtful = narrow || !self.coarse.as_ref().is_some_and(Coarse::knows_its_error);
@@ -239,18 +242,18 @@ impl Strips {
         Ok(())
     }
 
-    /// True where nothing moves but for round-off.
+    /// Whether all parts are at rest up to round-off.
     pub(super) fn rest(&self) -> bool {
         self.parts.iter().all(|part| part.rests)
     }
 
-    /// The part that answers for a node.
+    /// The part that owns a node.
     pub(super) fn owner(&self, node: usize) -> Option<usize> {
         self.owner.get(node).map(|&part| part as usize).filter(|&part| part < self.parts.len())
     }
 
-    /// The correction of a node as a part sees it: its own on itself and the nearer half of its strip, beyond which its
-    /// strip does not see enough; none there.
+    /// The correction of a node as a part computed it; none outside the part and the nearer half of its strip, beyond
+    /// which the strip sees too little.
     pub(super) fn seen(&self, part: usize, node: usize) -> Option<[f64; 2]> {
         let part = &self.parts[part];
         let margin = self.reach.width - 1 - self.reach.width / 2;

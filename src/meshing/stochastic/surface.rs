@@ -1,18 +1,18 @@
 use crate::geometry::Lattice;
 
-/// Where a point lies in a lattice, in units of its spacing.
+/// The place of a point in a lattice, in units of its spacing.
 pub(super) struct Place {
-    /// Around periodic axes.
+    /// Turns around periodic axes.
     pub turns: [f64; 2],
     /// The first node of the cell.
     pub cell: [usize; 2],
-    /// From there on, 0 … 1.
+    /// The distance from there along each axis, 0 … 1.
     pub share: [f64; 2],
 }
 
-/// The cells of a lattice.
+/// The cells of a lattice, and the cell that a point lies in.
 ///
-/// Found without the conversions and roundings that x86-64 does one by one.
+/// It avoids conversions between floats and integers and roundings, which x86-64 does one at a time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
     pub cells: [f64; 2],
@@ -21,10 +21,10 @@ pub(super) struct Grid {
     inverse: [f64; 2],
 }
 
-/// The sum of a number and 1.5·2⁵² has the nearest whole number in its last bits.
+/// Adding 1.5·2⁵² to a number rounds it to a whole number, which stands in the last bits of the sum.
 const SHIFT: f64 = 6_755_399_441_055_744.0;
 
-/// The nearest whole number of one below 2⁵¹.
+/// The nearest whole number, for |x| below 2⁵¹.
 #[inline(always)]
 fn nearest(x: f64) -> f64 {
     (x + SHIFT) - SHIFT
@@ -42,13 +42,13 @@ impl Grid {
         Self { cells, periodic: lattice.periodic(), inverse: cells.map(f64::recip) }
     }
 
-    /// Turns around axis d.
+    /// Turns around axis d that bring a point into the box.
     #[inline(always)]
     pub fn turns(&self, d: usize, x: f64) -> f64 {
         if self.periodic[d] { nearest(x * self.inverse[d] - 0.5) } else { 0.0 }
     }
 
-    /// Number along axis d of the cell that holds a point; of the first or last one for a point beyond.
+    /// Index along axis d of the cell that holds a point; the first or the last one for a point outside.
     #[inline(always)]
     pub fn cell(&self, d: usize, x: f64) -> f64 {
         let (x, last) = (x - 0.5, self.cells[d] - 1.0);
@@ -65,8 +65,11 @@ impl Grid {
     }
 }
 
-/// Positions as a bicubic function of the lattice coordinates: the cubic through the two nodes on either side
+/// Positions as a bicubic function of the lattice coordinates: along each axis the cubic through two nodes on either
+/// side
 ///
+/// It stores one more line of nodes around the lattice, with images on periodic axes and extrapolated positions beyond
+/// bounded sides.
 /// Stored with one more line of nodes around: images on periodic axes, extrapolated ones beyond bounded sides.
 pub(super) struct Surface {
     values: Vec<[f64; 2]>,
@@ -94,7 +97,7 @@ impl Surface {
         let mut extrapolate = |out: usize, step: isize, lines: usize| {
             let at = |m: isize| values[out.wrapping_add_signed(m * step)];
             values[out] = std::array::from_fn(|c| match lines {
-                // three nodes carry a parabola, four a cubic
+                // extrapolated by a parabola through three nodes, or a cubic through four
                 5 => 3.0 * at(1)[c] - 3.0 * at(2)[c] + at(3)[c],
                 _ => 4.0 * at(1)[c] - 6.0 * at(2)[c] + 4.0 * at(3)[c] - at(4)[c],
             });
@@ -128,16 +131,16 @@ impl Surface {
     }
 }
 
-/// Weights of nodes −1, 0, 1, 2 in the cubic through them.
+/// Weights of nodes −1, 0, 1 and 2 in the cubic through them.
 #[inline(always)]
 fn cubic(s: f64) -> [f64; 4] {
     let (before, after, beyond) = (s + 1.0, s - 1.0, s - 2.0);
     [-s * after * beyond / 6.0, 0.5 * before * after * beyond, -0.5 * before * s * beyond, before * s * after / 6.0]
 }
 
-/// A bilinear function on each cell of a lattice, continuous across them: c₀ + c₁ r + s (c₂ + c₃ r)
+/// A bilinear function on each cell of a lattice, continuous across cells: c₀ + c₁ r + s (c₂ + c₃ r)
 ///
-/// The coefficients of a cell lie together, which makes the one look-up short.
+/// The coefficients of a cell are stored together, so that a look-up reads a single place in memory.
 pub(super) struct Bilinear<const K: usize> {
     cells: Vec<[[f64; K]; 4]>,
     width: f64,
@@ -157,7 +160,7 @@ impl<const K: usize> Bilinear<K> {
         Self { cells: (0..n * m).map(cell).collect(), width: m as f64 }
     }
 
-    /// The position in memory of a cell.
+    /// The index in memory of a cell.
     #[inline(always)]
     pub fn position(&self, cell: [f64; 2]) -> usize {
         index(cell[0] * self.width + cell[1])

@@ -8,13 +8,15 @@ use crate::parallel;
 /// x ← x + (R + Y)⁻¹ 2R (R + X)⁻¹ (v − A x),   A = X + Y,   R = R_1, …, R_J
 /// ```
 ///
-/// X and Y are the parts of the star along each axis with half of the identity each. Sweep j damps best the modes for
-/// which X and Y are near R_j, and the R_j divide the spectrum [λ, κλ] geometrically, row by row: the number J of sweeps
-/// in a cycle grows like ln κ, and a sweep leaves a quarter to a third of the error. Each sweep solves the tridiagonal
-/// systems along all lines of the lattice, axis by axis, eliminated once for all cycles and right-hand sides. In one
-/// dimension a single sweep is the inverse itself. Corners and couplings around periodic axes are left to the residual.
+/// X and Y are the parts of the star along each axis, with half of the identity each. Sweep j damps those modes best
+/// for which X and Y are near R_j. The R_j divide the spectrum [λ, κλ] geometrically, with λ and κ row by row: the
+/// number J of sweeps in a cycle grows like ln κ, and a sweep leaves a quarter to a third of the error. A sweep solves
+/// the tridiagonal systems along all lines of the lattice, axis by axis; these are eliminated once for all cycles and
+/// right-hand sides. In one dimension a single sweep is the inverse itself. Corners of a nine-point stencil and
+/// couplings around periodic axes are left to the residual.
 ///
-/// Made for one and two axes: with three, the same product of factors multiplies some modes by 3. More axes do not compile.
+/// For one and two axes only: with three, the same product of factors amplifies some modes by 3, and the code does not
+/// compile.
 ///
 /// # Source
 /// Wachspress, *The ADI Model Problem*, Springer (2013).
@@ -33,8 +35,9 @@ struct Factor {
     after: f64,
 }
 
-/// Part of the spectrum that one sweep takes care of, as the ratio of its ends.
+/// Ratio of the ends of the part of the spectrum that one sweep damps: a cycle has ln κ / ln 4 sweeps, rounded up.
 const RATIO: f64 = 4.0;
+/// Largest number of sweeps in a cycle, which covers κ = 4¹⁰ = 1e6.
 const MAX_SWEEPS: f64 = 10.0;
 
 impl Adi {
@@ -42,7 +45,7 @@ impl Adi {
     pub fn factorise<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> bool {
         const { assert!(D <= 2, "alternating directions converge for one and two axes only") };
         let strides = a.patch.padded_strides();
-        // what a row sums to, about 1, is shared between the axes: the lower end of the spectrum of X and Y
+        // The row sum, about 1, is divided equally between the axes: it is the lower end of the spectrum of X and Y.
         let parts = |row: &[f64; S]| {
             let share = row[..=2 * D].iter().sum::<f64>() / D as f64;
             let own: [f64; D] = std::array::from_fn(|d| share - (row[1 + 2 * d] + row[2 + 2 * d]));
@@ -83,7 +86,7 @@ impl Adi {
         self.sweeps
     }
 
-    /// Sets x to one cycle for v from x = 0, its ring ready for a product with the matrix.
+    /// Sets x to the result of one cycle for v from x = 0. The ring of x is then ready for a product with the matrix.
     pub fn cycle<const D: usize, const S: usize, const K: usize>(
         &self,
         a: &LatticeMatrix<D, S>,
@@ -113,7 +116,7 @@ fn solve<const D: usize, const K: usize>(patch: &Patch<D>, factors: &[Vec<Factor
     for (axis, factors) in factors.iter().enumerate() {
         let (n, s) = (patch.size[axis], strides[axis]);
         if s == 1 {
-            // each line waits for itself, so several go side by side
+            // each line depends on its own last value, so four are eliminated side by side
             let four = 4 * (n + 2);
             let (fours, rest) = v.split_at_mut(v.len() / four * four);
             let whole = fours.len();
@@ -156,7 +159,7 @@ fn along<const L: usize, const K: usize>(v: &mut [[f64; K]], f: &[Factor], n: us
     }
 }
 
-/// Lines across the rows of a plane, all columns of the group at once; factors are `s` apart from row to row.
+/// Lines across the rows of a plane, all columns of a group at once; factors lie `s` apart from row to row.
 fn across<const K: usize>(rows: &mut [&mut [[f64; K]]], f: &[Factor], s: usize, first: usize) {
     let n = rows.len() - 2;
     for i in 1..=n {

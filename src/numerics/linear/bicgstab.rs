@@ -6,8 +6,8 @@ use crate::work::Work;
 /// Alternating-direction cycles, and BiCGSTAB preconditioned by them where they are slow, for all right-hand sides at
 /// once
 ///
-/// A mesh equation takes a few cycles, whose sweeps grow with the logarithm of Δt/h² (`make bench` counts them). Corners,
-/// strong convection and periodic axes call for the Krylov method. An iteration is a sweep.
+/// A mesh equation takes a few cycles, whose number of sweeps grows with the logarithm of Δt/h² (`make bench` counts
+/// them). Corners, strong convection and periodic axes need the Krylov method. The iterations counted are sweeps.
 ///
 /// For lattices of one and two axes; alternating directions of three diverge, and do not compile:
 ///
@@ -34,7 +34,7 @@ pub struct Bicgstab<const K: usize> {
     scratch: Vec<[f64; K]>,
 }
 
-/// A cycle that leaves more than this of the residual calls for the Krylov method.
+/// BiCGSTAB takes over once a cycle leaves more than this share of the residual.
 const SLOW: f64 = 0.1;
 
 impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for Bicgstab<K> {
@@ -57,7 +57,7 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
             return Err(stalled(a.rows.len(), sizes, tolerance, 0));
         }
         let mut products = 0;
-        // Where the star is all there is, the cycles alone converge.
+        // for a bounded star without convection the cycles alone converge
         loop {
             products += adi.sweeps();
             adi.cycle(a, r, hat, scratch);

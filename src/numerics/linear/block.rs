@@ -5,8 +5,8 @@ use crate::work::Work;
 
 /// BiCGSTAB preconditioned by the inverted blocks of the diagonal, for B coupled unknowns a node
 ///
-/// Made for steps that carry a wave over a few cells, where those blocks dominate. An iteration is a product with the
-/// matrix.
+/// For implicit steps in which a wave crosses few cells, so that these blocks dominate. The iterations counted are
+/// products with the matrix.
 ///
 /// # Source
 /// van der Vorst, *Bi-CGSTAB: a fast and smoothly converging variant of Bi-CG* (1992).
@@ -55,7 +55,7 @@ impl<const D: usize, const S: usize, const B: usize> LinearSolver<D, S, B, [[f64
     }
 }
 
-/// The inverse by Gauss and Jordan with row pivots; not finite where there is none.
+/// The inverse by Gauss–Jordan elimination with row pivots; its entries are not finite where there is none.
 pub(super) fn invert<const B: usize>(mut a: [[f64; B]; B]) -> [[f64; B]; B] {
     let mut inverse: [[f64; B]; B] = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
     for k in 0..B {

@@ -3,28 +3,31 @@ use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalle
 use crate::error::Failure;
 use crate::work::Work;
 
-/// BiCGSTAB preconditioned by incomplete elimination, for B coupled unknowns a node on the nine points of two dimensions
+/// BiCGSTAB preconditioned by incomplete elimination, for B coupled unknowns a node on the nine points of two
+/// dimensions
 ///
-/// ILU(0), lines of the lattice one after the other; couplings around periodic axes are left to the iteration. Made for
-/// implicit steps of convection and diffusion, whose matrices are neither symmetric nor dominated by their star. An
-/// iteration is a product with the matrix.
+/// ILU(0), line by line of the lattice; couplings around periodic axes are left to the iteration. For implicit steps of
+/// convection and diffusion, whose matrices are neither symmetric nor dominated by their star. The iterations counted
+/// are products with the matrix.
 ///
 /// # Source
-/// Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed. (2003), section 10.3; van der Vorst, *Bi-CGSTAB* (1992).
+/// Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed. (2003), section 10.3; van der Vorst, *Bi-CGSTAB*
+/// (1992).
 #[derive(Debug, Clone, Default)]
 pub struct IluBicgstab<const B: usize> {
-    /// At each place of a padded vector: the inverse of the pivot, then the entries of both factors, those above over the
-    /// pivot; zero on the ring.
+    /// At each place of a padded vector: the inverse of the pivot, then the entries of both factors, the upper ones
+    /// divided by the pivot. Zero on the ring.
     rows: Vec<[[[f64; B]; B]; 9]>,
     krylov: Krylov<B>,
 }
 
-/// The points below a node, in the order of elimination, and those above it; the neighbour along the line is the last,
-/// since it is the one to be waited for.
+/// The points below a node in the order of elimination, and those above it. The neighbour along the line comes last:
+/// its value is the newest, and the computation would wait for it.
 const BELOW: [usize; 4] = [5, 1, 6, 3];
 const ABOVE: [usize; 4] = [7, 2, 8, 4];
 
-/// For a point below and a point above that one: which point of the row both together lead to, if it is there.
+/// For a point below and a point above that one: the point of the row to which both steps together lead, if it is in
+/// the stencil.
 const MEETS: [[Option<usize>; 4]; 4] = {
     let points = BlockMatrix::<2, 9, 1>::POINTS;
     let mut meets = [[None; 4]; 4];
@@ -69,7 +72,7 @@ impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for IluBicgstab<B> {
     }
 }
 
-/// Incomplete elimination. False where a pivot has no inverse.
+/// Incomplete elimination; false where a pivot has no inverse.
 fn eliminate<const B: usize>(a: &BlockMatrix<2, 9, B>, factors: &mut Vec<[[[f64; B]; B]; 9]>) -> bool {
     factors.clear();
     factors.resize(a.patch.padded_len(), [[[0.0; B]; B]; 9]);
@@ -100,7 +103,7 @@ fn eliminate<const B: usize>(a: &BlockMatrix<2, 9, B>, factors: &mut Vec<[[[f64;
     sound
 }
 
-/// Sets x to (L U)⁻¹ v, its ring ready for a product with the matrix.
+/// Sets x to (L U)⁻¹ v, with its ring ready for a product with the matrix.
 fn precondition<const B: usize>(
     a: &BlockMatrix<2, 9, B>,
     factors: &[[[[f64; B]; B]; 9]],
@@ -108,7 +111,7 @@ fn precondition<const B: usize>(
     x: &mut [[f64; B]],
 ) {
     let (offsets, n) = (a.offsets(), a.patch.pencil_len());
-    // images of periodic axes are no unknowns of their own
+    // images of periodic axes are not solved for: they start as zero
     x.fill([0.0; B]);
     for start in a.patch.pencils() {
         for k in start..start + n {

@@ -2,13 +2,15 @@ use super::{Entry, LatticeMatrix, larger, solved, stalled};
 use crate::error::Failure;
 use crate::parallel;
 
-/// The iteration of BiCGSTAB and its vectors, for any matrix and preconditioner.
+/// BiCGSTAB and its vectors, for any matrix and preconditioner.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Krylov<const K: usize> {
     space: [Vec<[f64; K]>; 6],
 }
 
+/// Iterations (products with the matrix, or sweeps of the preconditioner) after which a system counts as not solved.
 const MAX_PRODUCTS: usize = 2000;
+/// Largest number of restarts from the true residual, each of which gains what rounding of the recursive one has lost.
 const RESTARTS: usize = 4;
 
 impl<const K: usize> Krylov<K> {
@@ -22,8 +24,8 @@ impl<const K: usize> Krylov<K> {
         (r, hat)
     }
 
-    /// Solves from the guess in `x`, after [`prepare`](Self::prepare). `precondition` sets its second argument, ring
-    /// included, and counts as `cost` iterations.
+    /// Solves from the guess in `x`, after [`prepare`](Self::prepare). `precondition` sets its second argument with its
+    /// ring, and counts as `cost` iterations.
     pub fn solve<const D: usize, const S: usize, E: Entry<K>>(
         &mut self,
         a: &LatticeMatrix<D, S, E>,
@@ -37,7 +39,7 @@ impl<const K: usize> Krylov<K> {
         let dot = |a: &[[f64; K]], b: &[[f64; K]]| join::<K, E>(dot(a, b));
         let mut products = 0;
         let mut sizes = a.residual(b, x, r);
-        // The recursive residual drifts from the true one by round-off; a restart from the true one closes the gap.
+        // the recursive residual drifts from the true one by round-off; a restart begins from the true one
         for _restart in 0..RESTARTS {
             if solved(sizes, tolerance) {
                 return Ok(products);
@@ -78,7 +80,7 @@ impl<const K: usize> Krylov<K> {
     }
 }
 
-/// The scalar products of systems from those of their components.
+/// The scalar products of whole systems, from those of their components.
 fn join<const K: usize, E: Entry<K>>(products: [f64; K]) -> [f64; K] {
     std::array::from_fn(|c| {
         let first = c - c % E::COUPLED;
@@ -86,19 +88,19 @@ fn join<const K: usize, E: Entry<K>>(products: [f64; K]) -> [f64; K] {
     })
 }
 
-/// x ← x + s v, ring included: the images of wrapping axes move along, other rings of `v` are zero.
+/// x ← x + s v with the ring: images of wrapping axes change too, elsewhere the ring of `v` is zero.
 pub(super) fn add<const K: usize>(x: &mut [[f64; K]], s: [f64; K], v: &[[f64; K]]) {
     for (x, v) in x.iter_mut().zip(v) {
         (0..K).for_each(|c| x[c] += s[c] * v[c]);
     }
 }
 
-/// Quotients; zero for a right-hand side that is solved already, which then stands still.
+/// Quotients; 0 for a right-hand side that is already solved, whose vectors then no longer change.
 pub(super) fn divide<const K: usize>(active: [bool; K], a: [f64; K], b: [f64; K]) -> [f64; K] {
     std::array::from_fn(|c| if active[c] && b[c] != 0.0 { a[c] / b[c] } else { 0.0 })
 }
 
-/// v ← f(component, v, a, b), and the largest magnitudes of the result. Rings stay zero where all three are.
+/// v ← f(component, v, a, b); returns the largest magnitudes of the result. Rings stay zero where all three are.
 fn update<const K: usize>(
     v: &mut [[f64; K]],
     a: &[[f64; K]],
@@ -115,7 +117,7 @@ fn update<const K: usize>(
     sizes
 }
 
-/// Scalar products in a fixed order; rings are zero and add nothing.
+/// Scalar products, summed in a fixed order. Rings are zero and add nothing.
 pub(super) fn dot<const K: usize>(a: &[[f64; K]], b: &[[f64; K]]) -> [f64; K] {
     parallel::sum(a.len(), |range| {
         // four running sums hide the latency of the addition

@@ -6,10 +6,10 @@ use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMat, Triplet};
 
-/// Sparse LU by faer: the oracle of the tests, and the last resort where an iteration stalls
+/// Sparse LU by faer: the reference of the tests, and the fallback where an iteration stalls
 ///
-/// The symbolic factorisation is kept while the patch stays the same. Runs on one thread, so that its bits do not
-/// depend on their number.
+/// The symbolic factorisation is reused as long as the patch stays the same. It runs on one thread, so that its bits do
+/// not depend on the number of threads.
 #[derive(Clone, Default)]
 pub struct SparseLu {
     symbolic: Option<(Vec<usize>, SymbolicLu<usize>)>,
@@ -37,7 +37,7 @@ impl SparseLu {
     }
 }
 
-/// The matrix on the unknowns alone; entries for the ring are dropped, since corrections vanish there.
+/// The matrix of the unknowns alone. Entries for the ring are dropped, since corrections vanish there.
 fn assemble<const D: usize, const S: usize, const K: usize, E: Entry<K>>(
     a: &LatticeMatrix<D, S, E>,
 ) -> Option<SparseColMat<usize, f64>> {
@@ -80,9 +80,9 @@ impl<const D: usize, const S: usize, const K: usize, E: Entry<K>> LinearSolver<D
             return Ok(solved_in::<K, E>(0));
         }
         if let Some(lu) = self.factorise(a) {
-            // one pass solves; more refine what round-off left
+            // the first pass solves, the others refine the solution by its residual
             for _pass in 0..3 {
-                // values of one system below each other, systems side by side
+                // the values of one system stand below each other, systems side by side
                 let at = |i: usize, c: usize| (i * E::COUPLED + c % E::COUPLED, c / E::COUPLED);
                 let mut unknowns = faer::Mat::<f64>::zeros(a.rows.len() * E::COUPLED, K / E::COUPLED);
                 let places = || a.patch.pencils().flat_map(|start| start..start + n).enumerate();

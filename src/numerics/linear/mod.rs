@@ -1,8 +1,8 @@
 //! Linear systems on a patch of the lattice.
 //!
-//! A [`LatticeMatrix`] couples every unknown of a [`Patch`] to its nearest neighbours. [`LinearSolver`] is the seam:
-//! [`Bicgstab`] is the fast way, [`BlockBicgstab`] that of several unknowns a node, [`SparseLu`] the oracle and the last
-//! resort, [`Fallback`] one after the other.
+//! A [`LatticeMatrix`] couples every unknown of a [`Patch`] to its nearest neighbours. The trait [`LinearSolver`] has
+//! these implementations: [`Bicgstab`] is the fast one, [`BlockBicgstab`] is for several unknowns at a node,
+//! [`SparseLu`] is the reference and the last resort, and [`Fallback`] tries one solver after another.
 
 mod adi;
 mod bicgstab;
@@ -36,7 +36,7 @@ use crate::work::Work;
 /// Each row holds S coefficients. The first 2D + 1 belong to the star: the node, then its neighbours below and above
 /// along each axis in turn. In two dimensions S = 9 adds the corners (−,−), (−,+), (+,−), (+,+).
 ///
-/// Rows are scaled such that the identity of `I − Δt A` is there with weight one; solvers rely on it.
+/// Rows are scaled such that the identity in `I − Δt A` has weight one; solvers rely on it.
 ///
 /// An [`Entry`] is a number, or a block that couples the unknowns of a node ([`BlockMatrix`]).
 #[derive(Debug, Clone)]
@@ -47,15 +47,15 @@ pub struct LatticeMatrix<const D: usize, const S: usize, E = f64> {
     pub rows: Vec<[E; S]>,
 }
 
-/// A matrix that couples B unknowns a node, row by row of each block the equations of the node.
+/// A matrix that couples B unknowns at a node. The rows of each block are the equations of the node.
 pub type BlockMatrix<const D: usize, const S: usize, const B: usize> = LatticeMatrix<D, S, [[f64; B]; B]>;
 
-/// What a matrix holds for a pair of nodes, and how it acts on the K values of one
+/// The entry of a matrix for a pair of nodes, and how it acts on the K values at one of them
 ///
-/// A number acts on all of them alike: they belong to K systems that share the matrix. A block mixes them: they are K
-/// unknowns of one system.
+/// A number acts on each of the K values: they belong to K systems that share the matrix. A block mixes them: they are
+/// the K unknowns of one system.
 pub trait Entry<const K: usize>: Copy + Send + Sync {
-    /// How many of the K values belong to one system.
+    /// Number of the K values that belong to one system.
     const COUPLED: usize;
 
     /// Adds the product with the values of a node to `sum`.
@@ -106,7 +106,7 @@ impl<const D: usize, const S: usize, const B: usize> BlockMatrix<D, S, B> {
 }
 
 impl<const D: usize, const S: usize, E> LatticeMatrix<D, S, E> {
-    /// Steps to the S points of the stencil, in units of nodes along each axis.
+    /// Offsets of the S points of the stencil from the node, in units of nodes along each axis.
     pub const POINTS: [[isize; D]; S] = {
         assert!(S == 2 * D + 1 || (D == 2 && S == 9), "a star, or the nine points of two dimensions");
         let mut points = [[0; D]; S];
@@ -126,7 +126,7 @@ impl<const D: usize, const S: usize, E> LatticeMatrix<D, S, E> {
         points
     };
 
-    /// Steps to the S points in a padded vector.
+    /// Offsets of the S points of the stencil in a padded vector.
     pub fn offsets(&self) -> [isize; S] {
         let strides = self.patch.padded_strides();
         Self::POINTS.map(|p| (0..D).map(|d| p[d] * strides[d] as isize).sum())
@@ -176,8 +176,8 @@ impl<const D: usize, const S: usize, E> LatticeMatrix<D, S, E> {
         self.apply(x, out, |_, k, ax| std::array::from_fn(|c| v[k][c] - ax[c]));
     }
 
-    /// `out` = b − A x on the unknowns of padded vectors, `b` one value an unknown and the ring of `out` zero; returns
-    /// the largest |b − A x| of each right-hand side, NaN where there is one.
+    /// `out` = b − A x on the unknowns of padded vectors; `b` has one value for each unknown, and the ring of `out` is
+    /// zero. Returns the largest |b − A x| of each right-hand side, NaN where there is one.
     pub fn residual<const K: usize>(&self, b: &[[f64; K]], x: &[[f64; K]], out: &mut [[f64; K]]) -> [f64; K]
     where
         E: Entry<K>,
@@ -205,10 +205,11 @@ fn stalled<const K: usize>(unknowns: usize, sizes: [f64; K], tolerance: [f64; K]
 
 /// Solves A x = b for K right-hand sides that share one matrix, or for K unknowns a node where the entries are blocks
 ///
-/// `b` has one value an unknown. `x` is padded: on entry its ring holds the known values and its unknowns the guess; on
-/// success its unknowns hold the solution, and the images of wrapping axes have moved along. The largest residual of
-/// right-hand side or equation c is then at most `tolerance[c]`, in the unit of b, checked on the solution itself.
-/// Returns the work: the systems solved and the iterations of all of them together, none of a direct method.
+/// `b` has one value for each unknown. `x` is padded. On entry its ring holds the known values and its unknowns the
+/// guess; on success its unknowns hold the solution, and images of wrapping axes have changed with it. The largest
+/// residual of right-hand side or equation c, computed from the solution itself, is then at most `tolerance[c]`, in the
+/// unit of b. Returns the work: the number of systems solved and the iterations of all of them together, 0 for a direct
+/// method.
 ///
 /// # Errors
 /// [`Failure::LinearStalled`] with the residual reached; `x` then holds no solution.
@@ -223,22 +224,22 @@ pub trait LinearSolver<const D: usize, const S: usize, const K: usize, E = f64>:
     ) -> Result<Work, Failure>;
 }
 
-/// The work of a solve for K values a node that took so many iterations.
+/// The work of a solve for K values at each node, with its number of iterations.
 fn solved_in<const K: usize, E: Entry<K>>(linear_iterations: usize) -> Work {
     Work { linear_solves: K / E::COUPLED, linear_iterations, ..Work::default() }
 }
 
-/// One solver, and another for the systems on which the first fails. The work tells how many these were, and why.
+/// One solver, and a second one for the systems on which the first fails. The work counts these, by their cause.
 #[derive(Debug, Clone, Default)]
 pub struct Fallback<First, Then>(First, Then);
 
-/// What the library uses: fast where it converges, direct where it does not.
+/// The usual solver of this library: fast where it converges, direct elimination where it does not.
 pub type Robust<const K: usize> = Fallback<Bicgstab<K>, SparseLu>;
 
-/// [`Robust`] for B unknowns a node that convection and diffusion couple to all nine points around it.
+/// [`Robust`] for B unknowns at a node that convection and diffusion couple to all nine points around it.
 pub type RobustTransport<const B: usize> = Fallback<IluBicgstab<B>, SparseLu>;
 
-/// [`Robust`] for B coupled unknowns a node.
+/// [`Robust`] for B coupled unknowns at a node.
 pub type RobustBlock<const B: usize> = Fallback<BlockBicgstab<B>, SparseLu>;
 
 impl<const D: usize, const S: usize, const K: usize, E, First, Then> LinearSolver<D, S, K, E> for Fallback<First, Then>
@@ -261,7 +262,7 @@ where
         x.copy_from_slice(&guess);
         let mut work = self.1.solve(a, b, x, tolerance)?;
         match gave_up {
-            // an iteration that begins does at least one
+            // a first solver that could begin has done at least one iteration
             Failure::LinearStalled { iterations: 0, .. } => work.direct_unstarted += work.linear_solves,
             Failure::LinearStalled { iterations, .. } => {
                 work.direct_stalled += work.linear_solves;

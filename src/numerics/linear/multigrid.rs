@@ -10,16 +10,18 @@ use crate::numerics::larger;
 /// xᵀ A x = Σ_i W_i x_i² + Σ_edges a (x_i − x_k)²,   rings being 0 or images
 /// ```
 ///
-/// Along an axis every second node is kept, and x is linear between them. Of the network of the kept nodes, each edge has
-/// half the mean of the conductances of the two that it replaces, and what lies between goes half to each side. That is the
-/// Galerkin product where x varies along the axis alone and more than it elsewhere, so that the cycle has a spectrum in
-/// (0, 1] for any network. Lattices of any number of nodes are halved: the last edge is then as long as before.
+/// Along an axis every second node is kept, and x is linear between them. In the network of the kept nodes, an edge has
+/// half the mean of the conductances of the two edges that it replaces, and mass and edges on a node that is not kept
+/// go half to each neighbour. This network is the Galerkin product where x varies along that axis alone, and has larger
+/// energy elsewhere, so that the cycle has its spectrum in (0, 1] for any network. The number of nodes need not be
+/// even: the last edge then keeps its length.
 ///
-/// Only axes along which the network couples most are halved at a time: nodes are relaxed in two colours, which damps
-/// what changes along those. Each cycle costs a fixed number of operations a node.
+/// Only the axes along which the network couples most are halved at a time. Nodes are relaxed in two colours, which
+/// damps what changes along those axes. A cycle costs a fixed number of operations for each node.
 ///
 /// # Source
-/// Trottenberg, Oosterlee, Schüller, *Multigrid*, Academic Press (2001), 5.1 (halving along single axes) and 2.5 (cycles).
+/// Trottenberg, Oosterlee, Schüller, *Multigrid*, Academic Press (2001), 5.1 (halving along single axes) and 2.5
+/// (cycles).
 #[derive(Debug, Clone)]
 pub(super) struct Multigrid<const D: usize, const K: usize> {
     /// From the finest to the coarsest.
@@ -32,16 +34,17 @@ impl<const D: usize, const K: usize> Default for Multigrid<D, K> {
     }
 }
 
-/// A network, and what a cycle computes on it. Arrays are padded vectors of its patch.
+/// The network of one level, and the vectors of a cycle on it. Arrays are padded vectors of its patch.
 #[derive(Debug, Clone)]
 struct Level<const D: usize, const K: usize> {
     patch: Patch<D>,
     /// The axis along which the next level has half as many nodes; none on the coarsest.
     halved: Option<usize>,
-    /// How often nodes are relaxed before and after the next level. Where two axes are halved, nothing is in between.
+    /// Number of relaxation sweeps before and after the next level. Where two axes are halved in turn, there are none
+    /// in between.
     sweeps: usize,
     mass: Vec<f64>,
-    /// Along each axis the conductance of the edge to the neighbour below, one place beyond the last unknown, too.
+    /// Along each axis the conductance of the edge to the neighbour below, also for the place beyond the last unknown.
     below: [Vec<f64>; D],
     /// 1/a_ii.
     inverse: Vec<f64>,
@@ -50,21 +53,23 @@ struct Level<const D: usize, const K: usize> {
     left: Vec<[f64; K]>,
 }
 
-/// Axes that couple less than this share of the strongest are not halved: relaxation damps what changes along those.
+/// Axes that couple less than this share of the strongest one are not halved: relaxation alone damps errors that change
+/// along those.
 const WEAK: f64 = 0.25;
-/// Where the edges of all nodes are less than this share of the diagonal, relaxation alone is enough.
+/// Relaxation alone is enough where at every node the edges make less than this share of the diagonal.
 const LOOSE: f64 = 0.5;
-/// Sweeps where no axis can be halved any more: a handful of nodes.
+/// Sweeps on the coarsest level, where no axis can be halved any more: a handful of nodes, which these all but solve.
 const SWEEPS_ON_THE_COARSEST: usize = 8;
 
 impl<const D: usize, const K: usize> Multigrid<D, K> {
-    /// Builds all levels below a symmetric star, reusing the memory. False where a diagonal is not positive.
+    /// Builds all levels below a symmetric star and reuses their memory. False where an entry of the diagonal is not
+    /// positive.
     pub fn build<const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> bool {
         if self.levels.first().is_none_or(|finest| finest.patch != a.patch) {
             self.levels = vec![Level::of(a.patch)];
         }
         self.levels[0].fill(a);
-        // axes that are still to be halved before nodes are relaxed again
+        // axes that remain to be halved before the next relaxation
         let mut axes = Vec::new();
         let mut l = 0;
         loop {
@@ -95,7 +100,7 @@ impl<const D: usize, const K: usize> Multigrid<D, K> {
         }
     }
 
-    /// z = M⁻¹ r, the rings of r zero or images.
+    /// z = M⁻¹ r, where the ring of r is zero or holds images.
     pub fn cycle(&mut self, r: &[[f64; K]], z: &mut [[f64; K]]) {
         self.levels[0].r.copy_from_slice(r);
         for l in 0..self.levels.len() {
@@ -163,7 +168,7 @@ impl<const D: usize, const K: usize> Level<D, K> {
         self.close();
     }
 
-    /// The network of every second node of a finer one along an axis.
+    /// The network of every second node of a finer one, along an axis.
     fn halve(&mut self, finer: &Self, axis: usize) {
         let halving = Halving::of(&finer.patch, axis);
         let add = |sum: &mut f64, share: f64, v: &f64| *sum += share * v;
@@ -177,7 +182,7 @@ impl<const D: usize, const K: usize> Level<D, K> {
         self.close();
     }
 
-    /// Sets the images of a network; a node that is its own neighbour has no edge there.
+    /// Copies the images of a network. On an axis of one node, which is its own neighbour, there is no edge.
     fn close(&mut self) {
         for d in 0..D {
             if self.patch.wraps[d] && self.patch.size[d] == 1 {
@@ -188,7 +193,7 @@ impl<const D: usize, const K: usize> Level<D, K> {
         self.patch.wrap(&mut self.mass);
     }
 
-    /// Sets the inverses of the diagonal. False where one is not positive.
+    /// Computes the inverse of the diagonal; false where an entry is not positive.
     fn invert(&mut self) -> bool {
         let strides = self.patch.padded_strides();
         let mut sound = true;
@@ -201,7 +206,8 @@ impl<const D: usize, const K: usize> Level<D, K> {
         sound
     }
 
-    /// The axes along which the network couples most, of those that can be halved; none where relaxation is enough.
+    /// The axes to be halved: those along which the network couples most and that can be halved; none where relaxation
+    /// is enough.
     fn strong_axes(&self) -> Vec<usize> {
         let loose = |k: usize| 1.0 - self.mass[k] * self.inverse[k];
         let loosest = self.patch.places().map(loose).fold(0.0, larger);
@@ -213,7 +219,8 @@ impl<const D: usize, const K: usize> Level<D, K> {
         strong.map(|(d, _)| d).collect()
     }
 
-    /// x from nothing: the first half of a sweep is then a division. Nodes of the second colour are set after it.
+    /// The first sweep from x = 0: nodes of the first colour take a division only, those of the second are relaxed
+    /// after them.
     fn begin(&mut self) {
         let n = self.patch.pencil_len();
         if self.has_odd_period() {
@@ -229,7 +236,7 @@ impl<const D: usize, const K: usize> Level<D, K> {
         self.relax(1);
     }
 
-    /// Solves for the nodes of one colour, given the others: x_i = (r_i + Σ a x_k)/a_ii.
+    /// Solves for the nodes of one colour, given those of the other: x_i = (r_i + Σ a x_k)/a_ii.
     fn relax(&mut self, colour: usize) {
         let n = self.patch.pencil_len();
         let Self { patch, below, inverse, x, r, .. } = self;
@@ -245,13 +252,13 @@ impl<const D: usize, const K: usize> Level<D, K> {
         patch.wrap(x);
     }
 
-    /// True where two nodes of one colour are neighbours: around an axis with an odd number of nodes. They see each other as
-    /// they were before.
+    /// True where neighbours may have the same colour, around an axis with an odd number of nodes. They then use each
+    /// other's old values.
     fn has_odd_period(&self) -> bool {
         (0..D).any(|d| self.patch.wraps[d] && self.patch.size[d] % 2 == 1)
     }
 
-    /// What a sweep leaves to do, r − A x: at nodes of the first colour, since it ended on those of the second.
+    /// The residual r − A x after a sweep. It is zero at nodes of the second colour, which were relaxed last.
     fn subtract(&mut self) {
         let n = self.patch.pencil_len();
         let odd = self.has_odd_period();
@@ -275,7 +282,8 @@ impl<const D: usize, const K: usize> Level<D, K> {
     }
 }
 
-/// What lies before a pencil of n unknowns that begins at `start`, the pencil with its ends, and what lies after.
+/// A vector in three parts: what lies before the pencil of n unknowns that begins at `start`, the pencil with its ends,
+/// and what lies after it.
 fn around<T>(x: &mut [T], start: usize, n: usize) -> (&[T], &mut [T], &[T]) {
     let (before, rest) = x.split_at_mut(start - 1);
     let (here, after) = rest.split_at_mut(n + 2);
@@ -285,7 +293,7 @@ fn around<T>(x: &mut [T], start: usize, n: usize) -> (&[T], &mut [T], &[T]) {
 /// A pencil of values, and the edges that lead there.
 type Neighbours<'a, const K: usize> = (&'a [[f64; K]], &'a [f64]);
 
-/// The neighbours of a pencil and the edges that lead there.
+/// The neighbours of a pencil, and the edges to them.
 struct Row<'a, const D: usize, const K: usize> {
     /// For each axis but the last: the pencils below and above, and the edges to them.
     across: [[Neighbours<'a, K>; 2]; D],
@@ -341,15 +349,16 @@ fn parity<const D: usize>(patch: &Patch<D>, p: usize) -> usize {
 struct Halving {
     axis: usize,
     wraps: bool,
-    /// Unknowns along the axis before and after.
+    /// Number of unknowns along the axis before and after halving.
     size: [usize; 2],
-    /// Padded lines of the axes before this one, and how far apart neighbours along this one are.
+    /// Number of padded lines along the axes before this one, and distance in memory between neighbours along this
+    /// axis.
     outer: usize,
     inner: usize,
 }
 
 impl Halving {
-    /// False where one node is left, or two between sides.
+    /// Whether there are nodes to leave out: at least two on a periodic axis, three between sides.
     fn possible<const D: usize>(patch: &Patch<D>, axis: usize) -> bool {
         patch.size[axis] > if patch.wraps[axis] { 1 } else { 2 }
     }
@@ -367,30 +376,30 @@ impl Halving {
         Patch { origin: [0; D], size, wraps: fine.wraps }
     }
 
-    /// The place before halving of the I-th place after, rings included.
+    /// The place on the fine level of the I-th place on the coarse one, rings included.
     fn kept(&self, i: usize) -> usize {
         (2 * i).min(self.size[0] + usize::from(!self.wraps))
     }
 
-    /// True where a node lies between the I-th place and the one below.
+    /// Whether a node was left out between the I-th place and the one below.
     fn skips(&self, i: usize) -> bool {
         self.kept(i) == self.kept(i - 1) + 2
     }
 
-    /// Ranges of the i-th line across the axis in the o-th block of an array with `n` unknowns along the axis.
+    /// The range of the i-th line across the axis, in the o-th block of an array with `n` unknowns along the axis.
     fn line(&self, o: usize, i: usize, n: usize) -> std::ops::Range<usize> {
         let start = (o * (n + 2) + i) * self.inner;
         start..start + self.inner
     }
 
-    /// Each kept node gets what is on it, and half of what is on each neighbour that is not kept.
+    /// Adds to each kept node its own fine value and half of that on each neighbour that was left out.
     fn restrict<T: Copy>(&self, fine: &[T], coarse: &mut [T], add: impl Fn(&mut T, f64, &T)) {
         let [n, m] = self.size;
         for (o, i) in (0..self.outer).flat_map(|o| (1..=m).map(move |i| (o, i))) {
             let kept = self.kept(i);
             let to = &mut coarse[self.line(o, i, m)];
             to.copy_from_slice(&fine[self.line(o, kept, n)]);
-            // above the last node of a periodic axis lies the first
+            // above the last node of a periodic axis lies the first one
             let above = if self.wraps && i == m { 1 } else { i + 1 };
             for (from, shares) in [(kept - 1, self.skips(i)), (kept + 1, self.skips(above))] {
                 if shares {
@@ -400,7 +409,7 @@ impl Halving {
         }
     }
 
-    /// Edges along the axis: two in a row conduct half of their mean.
+    /// The edges along the axis: two edges in a row become one with half of their mean conductance.
     fn join(&self, fine: &[f64], coarse: &mut [f64]) {
         let [n, m] = self.size;
         for (o, i) in (0..self.outer).flat_map(|o| (1..=m + usize::from(!self.wraps)).map(move |i| (o, i))) {
@@ -413,7 +422,8 @@ impl Halving {
         }
     }
 
-    /// Adds to each kept node its value, and to those between two the mean of both.
+    /// Interpolates linearly: adds to each kept node its coarse value, and to nodes in between the mean of both
+    /// neighbours.
     fn prolong<const K: usize>(&self, coarse: &[[f64; K]], fine: &mut [[f64; K]]) {
         let [n, m] = self.size;
         for (o, i) in (0..self.outer).flat_map(|o| (1..=m + 1).map(move |i| (o, i))) {
@@ -487,7 +497,13 @@ mod tests {
         /// The cycle is symmetric, and its spectrum lies in (0, 1]: v·Mv > 0, and Mv never overshoots, in any network.
         #[test]
         fn the_cycle_is_an_inner_product(
-            n in 1_usize..20, m in 1_usize..20, wx: bool, wy: bool, log_a in -3.0..6.0_f64, skew in -3.0..3.0_f64, seed: u64
+            n in 1_usize..20,
+            m in 1_usize..20,
+            wx: bool,
+            wy: bool,
+            log_a in -3.0..6.0_f64,
+            skew in -3.0..3.0_f64,
+            seed: u64,
         ) {
             let cell = |[i, j]: [usize; 2]| {
                 let mixed = (seed ^ (i * 1009 + j) as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
@@ -512,13 +528,14 @@ mod tests {
             a.multiply(&z, &mut az);
             for c in 0..2 {
                 let energy: f64 = a.patch.places().map(|k| z[k][c] * az[k][c]).sum();
-                prop_assert!(product(c, c) > 0.0 && energy <= (1.0 + 1e-9) * product(c, c), "{energy} {}", product(c, c));
+                let norm = product(c, c);
+                prop_assert!(norm > 0.0 && energy <= (1.0 + 1e-9) * norm, "{energy} {norm}");
             }
         }
     }
 
-    /// At most a third more iterations on 64 times as many nodes, bounded and periodic, of odd and even numbers, with any ratio of
-    /// couplings, where the coefficient is smooth.
+    /// At most a third more iterations on 64 times as many nodes, bounded and periodic, of odd and even numbers, with
+    /// any ratio of couplings, where the coefficient is smooth.
     #[test]
     fn iterations_do_not_grow_with_the_lattice() {
         for (wraps, ratio) in

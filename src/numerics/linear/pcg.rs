@@ -3,19 +3,20 @@ use super::multigrid::Multigrid;
 use super::{LatticeMatrix, larger, solved, stalled};
 use crate::error::Failure;
 
-/// Conjugate gradients for symmetric M-matrices on a star, preconditioned by multigrid where they are stiff, by modified
-/// incomplete elimination where they are not
+/// Conjugate gradients for symmetric M-matrices on a star, preconditioned by a V-cycle of multigrid for stiff matrices
+/// and by modified incomplete elimination for others
 ///
-/// A V-cycle takes six to nine iterations for any lattice and stiffness. Elimination takes about 3.4 (8a)^¼ for conductances a
-/// over the mass of a node, each of a third of the cost:
+/// With the V-cycle it takes six to nine iterations for any lattice and stiffness. With elimination it takes about 3.4
+/// (8a)^¼ iterations, where a is the ratio of conductances to the mass of a node; each costs a third of one with a
+/// V-cycle.
 ///
 /// ```text
 /// M = (L + E) E⁻¹ (E + Lᵀ),   e_i = a_ii − Σ_k a_ik (a_ik + Σ_j a_kj) / e_k,   k below i, j ≠ i above k
 /// ```
 ///
-/// that is MIC(0), lines of the lattice one after the other: what elimination would fill in is added to the diagonal, so
-/// that smooth errors are met at once. Couplings around periodic axes are left to the iteration. An iteration is a
-/// product with the matrix; all right-hand sides go together.
+/// This is MIC(0), line by line of the lattice: the fill-in that it drops is added to the diagonal, so that the
+/// preconditioner is exact for smooth errors. Couplings around periodic axes are left to the iteration. The iterations
+/// counted are products with the matrix; all right-hand sides are solved together.
 ///
 /// # Source
 /// Gustafsson, *A class of first order factorization methods*, BIT 18 (1978).
@@ -31,15 +32,17 @@ pub struct Pcg<const D: usize, const K: usize> {
 struct Factors {
     /// 1/e.
     pivots: Vec<f64>,
-    /// Couplings along each axis to the neighbour below and above, over e.
+    /// Couplings along each axis to the neighbour below and above, divided by e.
     couplings: Vec<[Vec<f64>; 2]>,
 }
 
+/// Iterations after which a system counts as not solved.
 const MAX_ITERATIONS: usize = 1000;
-/// What the edges of a node conduct over its mass, above which a V-cycle costs less than elimination.
+/// Ratio of the conductances of a node's edges to its mass above which a V-cycle costs less than elimination, as
+/// measured.
 const STIFF: f64 = 4e3;
 
-/// True where the mean over all nodes of what their edges conduct is so large.
+/// Whether this ratio, of the means over all nodes, is above [`STIFF`].
 fn is_stiff<const D: usize, const S: usize>(a: &LatticeMatrix<D, S>) -> bool {
     let (mut edges, mut mass) = (0.0, 0.0);
     for row in &a.rows {
@@ -58,11 +61,12 @@ impl<const D: usize, const K: usize> Default for Pcg<D, K> {
 impl<const D: usize, const K: usize> Pcg<D, K> {
     /// Solves A x = b for K right-hand sides
     ///
-    /// `x` is padded: its ring holds the known values, its unknowns the guess and then the solution. The residual of
-    /// each unknown, over its `weights`, is at most `tolerance[c]` in the end. Returns the number of iterations.
+    /// `x` is padded: its ring holds the known values, and its unknowns the guess and later the solution. In the end
+    /// the residual of each unknown, divided by its entry of `weights`, is at most `tolerance[c]`. Returns the number
+    /// of iterations.
     ///
     /// # Errors
-    /// [`Failure::LinearStalled`] where it is not reached, or the matrix is not positive definite.
+    /// [`Failure::LinearStalled`] where the tolerance is not reached, or the matrix is not positive definite.
     pub fn solve<const S: usize>(
         &mut self,
         a: &LatticeMatrix<D, S>,
@@ -133,7 +137,7 @@ impl<const D: usize, const K: usize> Pcg<D, K> {
 }
 
 impl Factors {
-    /// Eliminates. False where a pivot is not positive.
+    /// Computes the incomplete factors; false where a pivot is not positive.
     fn eliminate<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> bool {
         let (len, strides, n) = (a.patch.padded_len(), a.patch.padded_strides(), a.patch.pencil_len());
         let Self { pivots, couplings } = self;
@@ -149,7 +153,8 @@ impl Factors {
             for (row, k) in a.rows[p * n..(p + 1) * n].iter().zip(start..) {
                 let mut pivot = row[0];
                 for d in 0..D {
-                    // what the row below sends to all its neighbours above, over its pivot
+                    // the sum of the entries above the row below, over its pivot: what it adds to the diagonal as
+                    // fill-in
                     let sent: f64 = couplings.iter().map(|[_, above]| above[k - strides[d]]).sum();
                     pivot -= row[1 + 2 * d] * sent;
                 }
@@ -164,7 +169,8 @@ impl Factors {
         sound
     }
 
-    /// z = M⁻¹ r, the ring of z zero. The neighbour that was set last comes last, so that little waits for it.
+    /// z = M⁻¹ r, with the ring of z zero. The neighbour computed last is added last, so that the least work waits for
+    /// it.
     fn precondition<const D: usize, const S: usize, const K: usize>(
         &self,
         a: &LatticeMatrix<D, S>,

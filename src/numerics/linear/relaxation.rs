@@ -3,18 +3,19 @@ use crate::parallel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How sweeps of relaxation follow each other.
+/// The weights of successive relaxation sweeps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Smoother {
-    /// x ← x + .9 D⁻¹(b − A x): after k sweeps, errors that vary over √k nodes are gone.
+    /// Damped Jacobi, x ← x + .9 D⁻¹(b − A x). k sweeps damp errors that vary over less than about √k nodes.
     Jacobi,
-    /// The same steps with Chebyshev's weights for a given part of the spectrum: over k nodes.
+    /// Jacobi with Chebyshev's weights for a given part of the spectrum. k sweeps damp errors that vary over less than
+    /// about k nodes.
     #[default]
     Chebyshev,
 }
 
-/// Damping of Jacobi's method: just below 1, where the highest frequencies would stay.
+/// Damping factor of Jacobi's method. With 1 the highest frequencies, whose eigenvalue is near 2, would not be damped.
 const DAMPING: f64 = 0.9;
 
 /// A number of relaxation sweeps on A x = b, all right-hand sides at once

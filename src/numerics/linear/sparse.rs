@@ -8,8 +8,8 @@ const PASSES: usize = 4;
 
 /// A square sparse system of any pattern, solved by faer's sparse LU with refinement
 ///
-/// For rows that are no stencil of a patch: one-sided differences on sides, windows that are shifted near walls. Runs on
-/// one thread.
+/// For rows that are no stencil of a patch: one-sided differences on sides, windows that are shifted near walls. Runs
+/// on one thread.
 ///
 /// # Example
 /// ```
@@ -41,20 +41,20 @@ impl SparseSystem {
         Self { unknowns, ..Self::default() }
     }
 
-    /// Makes all entries zero, for another matrix; if it has the same pattern, its analysis is kept.
+    /// Sets all entries to zero for another matrix; the analysis is reused if that has the same pattern.
     pub fn clear(&mut self) {
         self.entries.clear();
     }
 
-    /// Adds to an entry.
+    /// Adds to an entry of the matrix.
     pub fn add(&mut self, row: usize, column: usize, a: f64) {
         self.entries.push((row, column, a));
     }
 
-    /// The solution of A x = b, with a residual of at most 1e-13 of |A||x| + |b|, row by row.
+    /// The solution of A x = b. In every row the residual is at most 1e-13 of |A||x| + |b|.
     ///
     /// # Errors
-    /// [`Failure::LinearStalled`] where that is not met: the matrix is singular, or nearly so.
+    /// [`Failure::LinearStalled`] where this bound is not met: the matrix is singular, or nearly so.
     pub fn solve(&mut self, b: &[f64]) -> Result<Vec<f64>, Failure> {
         const TOLERANCE: f64 = 1e-13;
         let n = self.unknowns;

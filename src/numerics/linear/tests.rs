@@ -43,8 +43,8 @@ proptest! {
     }
 }
 
-/// A block system as a step of waves makes it: diagonal blocks near [[1, 0, 0], [u, h, 0], [v, 0, h]], neighbours at most
-/// `a` in each entry.
+/// A block system as a step of waves makes it: diagonal blocks near [[1, 0, 0], [u, h, 0], [v, 0, h]], neighbours at
+/// most `a` in each entry.
 fn block_sample<const S: usize>(size: [usize; 2], wraps: [bool; 2], a: f64, seed: u64) -> BlockMatrix<2, S, 3> {
     let mut matrix = BlockMatrix::<2, S, 3>::zero_blocks(Patch { origin: [1, 1], size, wraps });
     let mut state = seed;
@@ -93,10 +93,17 @@ fn nine_points<const S: usize>(matrix: &BlockMatrix<2, S, 3>) -> Option<BlockMat
 }
 
 proptest! {
-    /// Conjugate gradients and the direct solver agree to 1e-9 on symmetric matrices whose couplings differ by up to 10⁴,
-    /// each unknown to its own tolerance.
+    /// Conjugate gradients and the direct solver agree to 1e-9 on symmetric matrices whose couplings differ by up to
+    /// 10⁴, each unknown to its own tolerance.
     #[test]
-    fn conjugate_gradients_agree(n in 2_usize..24, m in 2_usize..24, wx: bool, wy: bool, log_a in -2.0..2.0_f64, seed: u64) {
+    fn conjugate_gradients_agree(
+        n in 2_usize..24,
+        m in 2_usize..24,
+        wx: bool,
+        wy: bool,
+        log_a in -2.0..2.0_f64,
+        seed: u64,
+    ) {
         let mut matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1, 1], size: [n, m], wraps: [wx, wy] });
         let strength = |i: usize, j: usize, d: u64| {
             let mixed = (seed ^ (i * 1009 + j) as u64 ^ (d << 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
@@ -105,7 +112,8 @@ proptest! {
         let weights: Vec<f64> = (0..n * m).map(|k| 1.0 + (k % 7) as f64).collect();
         for (k, row) in matrix.rows.iter_mut().enumerate() {
             let (i, j) = (k / m, k % m);
-            // the coupling above a node is the one below its neighbour, also around the axis; on the last line without one
+            // the coupling above a node is the one below its neighbour, also around the axis; on the last line without
+            // one
             let below = |i: usize, wraps: bool, n: usize| if i > 0 { i } else if wraps { n } else { 0 };
             (row[1], row[2]) = (strength(below(i, wx, n), j, 0), strength(i + 1, j, 0));
             (row[3], row[4]) = (strength(i, below(j, wy, m), 1), strength(i, j + 1, 1));
@@ -166,8 +174,8 @@ fn a_singular_system_is_refused() {
     assert!(matches!(error, Failure::LinearStalled { unknowns: 16, .. }), "{error}");
 }
 
-/// Where the fast solver cannot start (no positive pivots), the direct one steps in, and the work says so: two right-hand
-/// sides that could not begin.
+/// Where the fast solver cannot start (no positive pivots), the direct one steps in, and the work says so: two
+/// right-hand sides that could not begin.
 #[test]
 fn the_fallback_solves_what_the_iteration_cannot() {
     let mut matrix = LatticeMatrix::<2, 5>::zero(Patch { origin: [1, 1], size: [5, 4], wraps: [false; 2] });
@@ -195,8 +203,8 @@ impl LinearSolver<2, 5, 1> for GivesUp {
     }
 }
 
-/// An iteration that stalls is told apart from one that cannot begin, its iterations are counted, and what it left of the
-/// guess is forgotten.
+/// An iteration that stalls is told apart from one that cannot begin, its iterations are counted, and what it left of
+/// the guess is forgotten.
 #[test]
 fn a_stalled_iteration_is_counted_with_its_reason() {
     let matrix = sample::<5>([5, 4], [false; 2], 1.0, 3);

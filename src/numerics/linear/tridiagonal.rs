@@ -4,8 +4,8 @@
 /// l_i x_{i−1} + d_i x_i + u_i x_{i+1} = r_i,   i = 0 … n−1,   l_0 = u_{n−1} = 0
 /// ```
 ///
-/// `rows[i]` is [l_i, d_i, u_i], `right[i]` is r_i; l_0 and u_{n−1} are not read. Stable where |d_i| ≥ |l_i| + |u_i|. A pivot
-/// that vanishes leaves values that are not finite.
+/// `rows[i]` is [l_i, d_i, u_i], `right[i]` is r_i; l_0 and u_{n−1} are not read. Stable where |d_i| ≥ |l_i| + |u_i|. A
+/// pivot that vanishes leaves values that are not finite.
 ///
 /// # Example
 /// ```

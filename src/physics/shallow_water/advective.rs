@@ -1,17 +1,17 @@
 use super::super::curvilinear::gradient;
 use super::{Block, Gravity, Scheme, Water};
 
-/// The advective form at nodes, by central differences.
+/// The advective form at the nodes, by central differences.
 pub(super) struct Advective<'a> {
     pub dt: f64,
     pub gravity: Gravity,
     pub strides: [usize; 2],
-    /// Positions at both ends of the step, padded.
+    /// Positions at the start and at the end of the step, padded.
     pub old: &'a [[f64; 2]],
     pub new: &'a [[f64; 2]],
 }
 
-/// Half of Δt R and what it is made of: the speed past the node, and the derivatives of (h, u, v).
+/// Half of Δt R at a node, with the velocity relative to the node and the derivatives of (h, u, v).
 struct Half {
     past: [f64; 2],
     slopes: [[f64; 2]; 3],

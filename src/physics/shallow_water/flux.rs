@@ -1,25 +1,26 @@
 use super::{Block, Gravity, Scheme, Water};
 use crate::geometry::DualCells;
 
-/// The flux form on dual cells, conserving face by face.
+/// The flux form on dual cells: finite volumes.
 pub(super) struct Flux<'a> {
     pub dt: f64,
     pub gravity: Gravity,
     pub old: &'a DualCells,
     pub new: &'a DualCells,
-    /// What each face sweeps from old to new, padded.
+    /// The area that each face sweeps in the step, padded.
     pub swept: Vec<[f64; 2]>,
 }
 
-/// What crosses a face in the direction of its normal in one half of the step, in terms of the means of its two nodes.
+/// The fluxes through a face in the direction of its normal, in one half of the step, in terms of the means at its two
+/// nodes.
 struct Face {
     normal: [f64; 2],
-    /// Area of water that passes: ½ (Δt ū·N − s).
+    /// The area of water that passes the face: ½ (Δt ū·N − s).
     passed: f64,
     h: f64,
     u: f64,
     v: f64,
-    /// Of the two nodes.
+    /// The depths at the two nodes.
     depths: [f64; 2],
 }
 
@@ -33,7 +34,8 @@ impl Flux<'_> {
         Face { normal, passed, h, u, v, depths: [a[0], b[0]] }
     }
 
-    /// Mass and momentum through the face above place k: h̄(ū·N) (1, ū) + ½g \overline{h²} N, less what the face sweeps.
+    /// Mass and momentum through the face above place k: h̄(ū·N) (1, ū) + ½g \overline{h²} N, minus what the moving
+    /// face sweeps.
     fn through(&self, cells: &DualCells, w: &[Water], k: usize, axis: usize) -> Water {
         let Face { normal, passed, h, u, v, depths: [a, b] } = self.face(cells, w, k, axis);
         let mass = h * passed;
@@ -41,7 +43,7 @@ impl Flux<'_> {
         [mass, mass * u + pressure * normal[0], mass * v + pressure * normal[1]]
     }
 
-    /// All that leaves the dual cell of place k in one half of the step.
+    /// The sum of the fluxes out of the dual cell of place k, in one half of the step.
     fn leaving(&self, cells: &DualCells, w: &[Water], k: usize) -> Water {
         let mut sum = [0.0; 3];
         for (axis, stride) in cells.patch().padded_strides().into_iter().enumerate() {
@@ -108,7 +110,8 @@ impl Scheme for Flux<'_> {
         row
     }
 
-    /// The update formula itself: what a face takes from one cell it gives to the other, however well Newton converged.
+    /// Evaluates the update formula once more: whatever one cell loses through a face the other one gains, so that mass
+    /// and momentum are conserved however well Newton's method converged.
     fn finish(&self, known: &Water, w: &[Water], i: usize, k: usize) -> Water {
         let leaving = self.leaving(self.new, w, k);
         let [h, hu, hv] = std::array::from_fn(|c| known[c] - leaving[c] / self.new.areas()[i]);

@@ -21,21 +21,23 @@ use serde::{Deserialize, Serialize};
 /// at the start   h = depth + (pile/2) (1 − tanh((r − radius)/width)),   u = 0,   r from the centre of the box
 /// ```
 ///
-/// Unknowns: the depth h > 0 and the velocity (u, v). Both axes must be periodic; r then reaches to the nearest image.
-/// Time is trapezoidal, solved by Newton's method with the true Jacobian; second order in space and time.
+/// The unknowns are the depth h > 0 and the velocity (u, v). Both axes must be periodic; r is the distance to the
+/// nearest image of the centre. The scheme is trapezoidal in time, solved by Newton's method with the exact Jacobian,
+/// and of second order in space and time.
 ///
-/// **Flux form.** Finite volumes on the [dual cells](DualCells) of areas A, over faces of normal N that sweep the area s:
+/// **Flux form.** Finite volumes on the [dual cells](DualCells) of areas A, with faces of normal N that sweep the area
+/// s:
 ///
 /// ```text
 /// A′ q′ − A q = − ½ Σ [Δt F(q, N) − s q̄] − ½ Σ [Δt F(q′, N′) − s q̄′],   q = (h, h u)
 /// F = h̄ (ū·N) (1, ū) + ½ g \overline{h²} (0, N),   q̄ = h̄ (1, ū),   bars: means of the two nodes of a face
 /// ```
 ///
-/// After Newton's method the formula itself is applied once more, so that mass and momentum are conserved to round-off
-/// whatever the tolerance. A state that is constant stays so on any mesh motion. F conserves energy on a mesh at rest.
+/// After Newton's method the formula is evaluated once more, so that mass and momentum are conserved to round-off for
+/// any tolerance. A constant state stays constant for any motion of the mesh. F conserves energy on a mesh at rest.
 ///
-/// **Advective form.** Central differences at nodes with the velocity ẋ of the mesh in both halves: R = (ẋ − u)·∇ … .
-/// It conserves nothing exactly.
+/// **Advective form.** Central differences at the nodes, with the velocity ẋ of the mesh in both halves of the step: R
+/// = (ẋ − u)·∇ … . It conserves nothing exactly.
 ///
 /// # Example
 /// ```
@@ -53,22 +55,23 @@ use serde::{Deserialize, Serialize};
 ///
 /// # Source
 /// Fjordholm, Mishra and Tadmor, *Well-balanced and energy stable schemes for the shallow water equations with
-/// discontinuous topography* (2011), for F. (4.2) of Bihlo, Haynes and Walsh (2015) for the advective form; the shape of
-/// their pile is not published.
+/// discontinuous topography* (2011), for F. (4.2) of Bihlo, Haynes and Walsh (2015) for the advective form; the shape
+/// of their pile is not published.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShallowWater {
-    /// What is differenced.
+    /// Form of the equations: `"flux"`, which conserves mass and momentum, or `"advective"`, as published.
     pub form: WaterForm,
-    /// g > 0.
+    /// Gravitational acceleration g, above 0.
     pub gravity: f64,
-    /// h far from the pile, above 0.
+    /// Depth of the water far from the pile, above 0.
     pub depth: f64,
-    /// Height of the pile over it; may be negative, but not as deep as the water.
+    /// Height of the pile above that depth. It may be negative, but some water must be left.
     pub pile: f64,
-    /// Radius of the pile at half its height, above 0.
+    /// Radius of the pile at half of its height, above 0.
     pub radius: f64,
-    /// Over which its edge falls by tanh(1) = .76 of half its height, above 0.
+    /// Width of the pile's edge, above 0: the distance over which it falls from half of its height by tanh(1) = .76 of
+    /// that.
     pub width: f64,
 }
 
@@ -76,10 +79,10 @@ pub struct ShallowWater {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum WaterForm {
-    /// In h and h u, conserving mass and momentum.
+    /// In h and h u. It conserves mass and momentum.
     #[default]
     Flux,
-    /// In h and u, as published.
+    /// In h and u, as published. It conserves nothing exactly.
     Advective,
 }
 
@@ -89,40 +92,42 @@ impl Default for ShallowWater {
     }
 }
 
-/// (h, u, v) or three equations of a node.
+/// (h, u, v) at a node, or its three equations.
 type Water = [f64; 3];
-/// Three equations differentiated by the (h, u, v) of one node.
+/// Derivatives of three equations by (h, u, v) at one node.
 type Block = [[f64; 3]; 3];
 type Gravity = f64;
 
-/// A form of the equations over one step: `known(start) = unknown(end)` at every node
+/// A discrete form of the equations over one step, written `known(start) = unknown(end)` at every node
 ///
 /// `w` holds (h, u, v), padded; `i` counts the nodes, `k` is the place of node i in `w`.
 trait Scheme: Sync {
-    /// Sizes of the equations of water of a depth and speed.
+    /// The sizes of the three equations for water of a given depth and speed, to which residuals are compared.
     fn scales(&self, depth: f64, speed: f64) -> Water;
-    /// Δt over the time in which a wave of speed one crosses node i.
+    /// The share of the cell of node i that a wave of speed one crosses in a step.
     fn courant(&self, i: usize, k: usize) -> f64;
-    /// The start of the step and its first half.
+    /// The part of the equations that depends on the start of the step.
     fn known(&self, w: &[Water], i: usize, k: usize) -> Water;
-    /// The end of the step less its second half.
+    /// The part of the equations that depends on the end of the step.
     fn unknown(&self, w: &[Water], i: usize, k: usize) -> Water;
-    /// Derivative of [`unknown`](Self::unknown) by the nodes of the star.
+    /// The derivatives of [`unknown`](Self::unknown) by the nodes of the star.
     fn jacobian(&self, w: &[Water], i: usize, k: usize) -> [Block; 5];
-    /// (h, u, v) of the node from the converged `w`.
+    /// (h, u, v) at the node, from the converged `w`.
     fn finish(&self, known: &Water, w: &[Water], i: usize, k: usize) -> Water;
 }
 
-/// Newton stops where all residuals are below this share of the size of their equation: near round-off, since what it
-/// leaves is advanced explicitly and may grow.
+/// Newton's method has converged once every residual is below this share of the size of its equation. It is near
+/// round-off, since the remaining error is advanced explicitly and may grow.
 const TOLERANCE: f64 = 1e-13;
+/// Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
 
 impl ShallowWater {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] unless all are finite, gravity, depth, radius and width positive, and the pile leaves water.
+    /// [`Error::Invalid`] unless all settings are finite, gravity, depth, radius and width are positive, and the pile
+    /// leaves water.
     pub fn check(&self) -> Result<()> {
         let positive =
             [("gravity", self.gravity), ("depth", self.depth), ("radius", self.radius), ("width", self.width)];
@@ -138,8 +143,8 @@ impl ShallowWater {
         Ok(())
     }
 
-    /// Solves one step of a scheme from the padded state `w`. The new values a node come with what stalled Newton's
-    /// method, if it did.
+    /// Solves one step of a scheme from the padded state `w`. Returns the new values at the nodes, and the failure of
+    /// Newton's method if it stalled.
     fn solve(&self, patch: Patch<2>, scheme: &impl Scheme, mut w: Vec<Water>) -> Result<Solved, Failure> {
         let n = patch.pencil_len();
         let places = |p: usize| (p * n..(p + 1) * n).zip(patch.pencil(p)..);
@@ -151,7 +156,7 @@ impl ShallowWater {
         let [depth, u, v] = [0, 1, 2].map(|c| w.iter().fold(0.0, |m, w| larger(m, w[c])));
         let speed = u + v + (self.gravity * depth).sqrt();
         let scales = scheme.scales(depth, speed);
-        // where a wave crosses many cells in a step, round-off alone leaves more than the tolerance
+        // where a wave crosses many cells in a step, round-off alone leaves residuals above the tolerance
         let courant = patch.places().enumerate().fold(0.0, |m, (i, k)| larger(m, speed * scheme.courant(i, k)));
         let wanted = TOLERANCE.max(8.0 * f64::EPSILON * (1.0 + courant));
         let mut known = vec![[0.0; 3]; patch.len()];
@@ -166,7 +171,7 @@ impl ShallowWater {
                 let unknown = scheme.unknown(&w, i, k);
                 std::array::from_fn(|c| known[i][c] - unknown[c])
             });
-            // as shares of the sizes of the equations
+            // relative to the sizes of the equations
             let sizes: Water = std::array::from_fn(|c| residual.iter().fold(0.0, |m, r| larger(m, r[c])) / scales[c]);
             let largest = sizes.into_iter().fold(0.0, larger);
             if largest <= wanted {
@@ -180,7 +185,7 @@ impl ShallowWater {
                 rows.iter_mut().zip(places(p)).for_each(|(row, (i, k))| *row = scheme.jacobian(&w, i, k));
             });
             let mut correction = vec![[0.0; 3]; patch.padded_len()];
-            // Newton squares the residual: solving for much less than that is wasted
+            // Newton's method squares the residual, so that a much more accurate linear solve is wasted
             let share = (0.01 * largest * largest.min(1.0)).max(0.1 * wanted);
             let tolerance = scales.map(|scale| share * scale);
             work += solver.solve(&matrix, &residual, &mut correction, tolerance)?;
@@ -195,7 +200,7 @@ impl ShallowWater {
     }
 }
 
-/// The values at the end of a step, one a node.
+/// The values at the end of a step, one for each node.
 struct Solved {
     values: Vec<Water>,
     work: Work,

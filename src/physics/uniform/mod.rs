@@ -1,4 +1,4 @@
-//! The opponent of a moving mesh: an explicit solver on a uniform one, as fast as it sensibly gets.
+//! An explicit solver on a uniform mesh, made as fast as is sensible, with which moving meshes are compared.
 
 mod stencil;
 
@@ -10,19 +10,19 @@ use crate::parallel;
 use crate::work::Work;
 use stencil::Stencil;
 
-/// Burgers' equation on a uniform mesh that stays, by central differences and classical Runge–Kutta steps
+/// Burgers' equation on a uniform mesh at rest, by central differences and classical Runge–Kutta steps
 ///
 /// ```text
 /// u_t = −(u²/2)_x − (u²/2)_y + ν (u_xx + u_yy)
 /// ```
 ///
 /// Differences are conservative and central, of order 2 or 4 (`order`). A step Δt is divided into equal substeps of
-/// fourth order, 95 % as long as the linearised equation with the largest |u| allows, or a little shorter. Every stage
-/// takes the values of the sides at its own time. Order 4 looks one node past the sides, where it too takes the exact
-/// front: more than a solver can know in general, and in favour of this one.
+/// fourth order, of at most 95 % of the length that is stable for the linearised equation with the largest |u|. Every
+/// stage takes the side values of its own time. Order 4 also needs values one node beyond the sides, where it takes the
+/// exact front: this is more than a solver knows in general, and favours this one.
 ///
-/// A substep goes through memory once: the four stages follow each other row by row, within cache. `u` has one value a
-/// node, in lattice order.
+/// A substep goes through memory once: its four stages follow each other row by row, within the cache. `u` has one
+/// value for each node, in lattice order.
 ///
 /// # Errors
 /// A step returns [`Failure::NotUniform`] where the mesh moves or is not uniform, [`Failure::NotPeriodic`] where
@@ -54,22 +54,22 @@ pub struct UniformBurgers {
     order: usize,
 }
 
-/// Substeps as a share of the longest stable ones: u varies in space, the bound is that of constant u.
+/// Length of substeps as a share of the longest stable one: the bound is for constant u, but u varies in space.
 const SAFETY: f64 = 0.95;
-/// Substeps between looks at the largest |u|, which side values can raise.
+/// Number of substeps after which the largest |u| is computed again, since side values may raise it.
 const ROUND: usize = 64;
-/// Substeps of a step beyond which nobody waits: minutes on the smallest of meshes.
+/// Largest number of substeps in a step: this many take minutes even on the smallest mesh.
 const MOST: f64 = 1e8;
-/// Rows a band for each ghost row. A band computes 3 rows of the first stage, 2 of the second and 1 of the third twice
-/// at either end for each ghost row: 3 % of all.
+/// Number of rows in a band, for each ghost row. At either end of a band, 3 rows of the first stage, 2 of the second
+/// and 1 of the third are computed twice for each ghost row, which makes 3 % of all.
 const BAND: usize = 96;
 
 impl UniformBurgers {
     /// The equation, with its sides and initial values, for differences of `order` 2 or 4.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the order is another, where it is 4 and side values are a formula, which nobody can ask
-    /// beyond the sides, or where the convection is advective.
+    /// [`Error::Invalid`] for another order, for order 4 where side values are a formula (which need not have values
+    /// beyond the sides), and for the advective form.
     pub fn new(burgers: Burgers, order: usize) -> Result<Self> {
         if order != 2 && order != 4 {
             return Err(Error::invalid("order", order, "must be 2 or 4"));
@@ -101,7 +101,7 @@ impl UniformBurgers {
                 break;
             }
             let left = ((t + dt - now) / (SAFETY * grid.stencil.stable_step(largest))).ceil().max(1.0);
-            // not a number is too many, too
+            // NaN counts as too many
             if left.partial_cmp(&MOST).is_none_or(|o| o.is_gt()) {
                 return Err(Failure::ManySubsteps { substeps: left, speed: largest });
             }
@@ -147,7 +147,7 @@ impl Physics for UniformBurgers {
     }
 }
 
-/// Refuses a mesh that is not the uniform one of its box, up to round-off.
+/// Refuses a mesh that is not uniform in its box up to round-off.
 fn check_uniform(mesh: &Mesh<2>) -> Result<(), Failure> {
     let (lattice, lower, extent) = (mesh.lattice(), mesh.lower(), mesh.extent());
     let cells = lattice.cells();
@@ -156,7 +156,7 @@ fn check_uniform(mesh: &Mesh<2>) -> Result<(), Failure> {
         for d in 0..2 {
             let off = x[d] - lower[d] - extent[d] * node[d] as f64 / cells[d] as f64;
             let tolerance = 1e-9 * extent[d] / cells[d] as f64 + 4.0 * f64::EPSILON * x[d].abs();
-            // a NaN is off, too
+            // NaN counts as off
             if off.abs().partial_cmp(&tolerance).is_none_or(|o| o.is_gt()) {
                 return Err(Failure::NotUniform { off, axis: d, node, x });
             }
@@ -165,10 +165,11 @@ fn check_uniform(mesh: &Mesh<2>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The unknowns of a uniform mesh, with G ghosts around them
+/// The unknowns of a uniform mesh, with G ghost nodes around them
 ///
-/// Unknowns are the nodes inside bounded axes and all nodes of periodic ones. A stored row is padded by G columns at
-/// either end: nodes on and past the side, or periodic images. Rows past the ends are computed where they are needed.
+/// The unknowns are the nodes inside bounded axes, and all nodes of periodic ones. A stored row is padded at either end
+/// by G columns, which hold nodes on and beyond a side, or periodic images. Rows beyond the ends are computed where
+/// they are needed.
 struct Grid<'a, const G: usize> {
     burgers: &'a Burgers,
     stencil: Stencil<G>,
@@ -177,18 +178,19 @@ struct Grid<'a, const G: usize> {
     periodic: [bool; 2],
     /// Nodes of the lattice along the second axis.
     stride: usize,
-    /// Node of the first unknown.
+    /// Lattice indices of the first unknown.
     first: [usize; 2],
     lower: [f64; 2],
     spacing: [f64; 2],
     /// Length of a padded row.
     width: usize,
-    /// Rows a band.
+    /// Number of rows in a band.
     band: usize,
 }
 
 impl<'a, const G: usize> Grid<'a, G> {
-    /// Rows of a stage kept at a time: the last stage reads the first one 3G rows behind its newest row.
+    /// Rows of a stage that are stored at a time: the last stage reads the first one up to 3G rows behind its newest
+    /// row.
     const KEPT: usize = 4 * G;
 
     fn new(burgers: &'a Burgers, mesh: &Mesh<2>) -> Result<Self, Failure> {
@@ -214,7 +216,7 @@ impl<'a, const G: usize> Grid<'a, G> {
         })
     }
 
-    /// Rows stored, some at the end unused so that every band has as many.
+    /// Number of rows stored. Some at the end are unused, so that every band has the same number.
     fn rows(&self) -> usize {
         self.size[0].div_ceil(self.band) * self.band
     }
@@ -251,14 +253,14 @@ impl<'a, const G: usize> Grid<'a, G> {
         }
     }
 
-    /// u on or past a side, at a place counted from the first unknown.
+    /// u on or beyond a side, at a place counted from the first unknown.
     fn given(&self, t: f64, at: [isize; 2]) -> f64 {
         let x = [0, 1].map(|d| self.lower[d] + (at[d] + self.first[d] as isize) as f64 * self.spacing[d]);
-        // never asked where it is not known
+        // NaN is never used: the caller asks only for places where u is known
         self.burgers.side_value(t, x).unwrap_or(f64::NAN)
     }
 
-    /// The ghosts of row i, from its unknowns where the axis is periodic.
+    /// Fills the ghosts of row i: from its unknowns on a periodic axis, else with side values.
     fn fill_ends(&self, t: f64, i: isize, row: &mut [f64]) {
         let n = self.size[1];
         for k in 0..G {
@@ -269,7 +271,7 @@ impl<'a, const G: usize> Grid<'a, G> {
         }
     }
 
-    /// A whole row past an end.
+    /// Fills a whole row beyond an end with side values.
     fn fill_row(&self, t: f64, i: isize, row: &mut [f64]) {
         row.iter_mut().enumerate().for_each(|(k, u)| *u = self.given(t, [i, k as isize - G as isize]));
     }
@@ -277,7 +279,7 @@ impl<'a, const G: usize> Grid<'a, G> {
     /// One substep of classical RK4 from `u` at t to `next`.
     fn substep(&self, t: f64, dt: f64, u: &[f64], next: &mut [f64], scratch: &mut [f64]) {
         let (w, m) = (self.width, self.size[0] as isize);
-        // rows past the ends at t, 0 … G − 1 before and G … 2G − 1 after
+        // rows beyond the ends at time t: indices 0 … G − 1 before the first row, G … 2G − 1 after the last one
         let mut outside = vec![0.0; if self.periodic[0] { 0 } else { 2 * G * w }];
         for (k, row) in outside.chunks_exact_mut(w).enumerate() {
             self.fill_row(t, if k < G { k as isize - G as isize } else { m + (k - G) as isize }, row);
@@ -290,13 +292,13 @@ impl<'a, const G: usize> Grid<'a, G> {
         });
     }
 
-    /// A band of rows through all stages
+    /// Takes a band of rows through all stages
     ///
     /// ```text
     /// u₁ = u + Δt/2 R(u)   u₂ = u + Δt/2 R(u₁)   u₃ = u + Δt R(u₂)   next = (−u + u₁ + 2u₂ + u₃)/3 + Δt/6 R(u₃)
     /// ```
     ///
-    /// Each stage follows G rows behind the one before, so that what it reads is still in cache.
+    /// Each stage follows G rows behind the one before it, so that the rows that it reads are still in the cache.
     #[inline(always)]
     fn advance_band(&self, stages: &Stages<'_, G>, first: usize, next: &mut [f64], scratch: &mut [f64]) {
         let (w, n, g) = (self.width, self.size[1], G as isize);
@@ -332,7 +334,7 @@ impl<'a, const G: usize> Grid<'a, G> {
                     if self.periodic[1] {
                         self.fill_ends(t, i, &mut u2[to..][..w]);
                     } else {
-                        // the same time as the stage before
+                        // its time is that of the stage before
                         u2[to..][..G].copy_from_slice(&from[..G]);
                         u2[to + G + n..][..G].copy_from_slice(&from[G + n..]);
                     }
@@ -385,19 +387,19 @@ impl<'a, const G: usize> Grid<'a, G> {
     }
 }
 
-/// What all bands of a substep share.
+/// What all bands of a substep have in common.
 struct Stages<'s, const G: usize> {
     grid: &'s Grid<'s, G>,
     t: f64,
     dt: f64,
     u: &'s [f64],
     outside: &'s [f64],
-    /// R times the length of each stage.
+    /// R, multiplied by the length of each stage.
     by: [Stencil<G>; 4],
 }
 
-/// A band as a task for [`pulp`], which compiles it once more for wider vectors and takes what the machine has. Products
-/// and sums are not fused, so that the bits are the same with any.
+/// A band as a task for [`pulp`], which compiles it once more for wider vectors and runs what the machine supports.
+/// Products and sums are not fused, so that the bits are the same on every machine.
 struct Band<'s, const G: usize> {
     stages: &'s Stages<'s, G>,
     first: usize,

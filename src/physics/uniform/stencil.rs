@@ -6,7 +6,7 @@ use std::array::from_fn;
 /// R_i = centre u_i + Σ_axes Σ_{k=1…G} [ linear_k (u_{i+k} + u_{i−k}) − flux_k (u²_{i+k} − u²_{i−k}) ]
 /// ```
 ///
-/// The differences of the fluxes telescope, so that R sums to zero over periodic axes.
+/// Differences of fluxes telescope, so that R sums to zero over periodic axes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stencil<const G: usize> {
     centre: f64,
@@ -40,7 +40,8 @@ impl<const G: usize> Stencil<G> {
     /// The longest stable step of classical RK4 for speeds up to `speed` along both axes
     ///
     /// The linearised R multiplies the wave exp(i(θk + φl)) by λ(θ, φ). The step is stable where the polynomial of RK4
-    /// maps every Δt·λ into the unit disc. Both parts count together here, neither is bounded by itself.
+    /// maps every Δt·λ into the unit disc. The real and the imaginary part, diffusion and convection, are taken
+    /// together.
     pub(super) fn stable_step(&self, speed: f64) -> f64 {
         const ANGLES: usize = 16;
         let axis = |d: usize| -> [[f64; 2]; ANGLES] {
@@ -65,7 +66,7 @@ impl<const G: usize> Stencil<G> {
                 })
             })
         };
-        // no step is stable that puts a wave past −2.7853 on the real axis, or 3 along the imaginary one
+        // a step is never stable if it moves a wave past −2.7853 on the real axis or 3 on the imaginary one
         let furthest = |part: usize| [&x, &y].map(|w| w.iter().fold(0.0_f64, |m, z| m.max(z[part].abs())));
         let [re, im] = [furthest(0), furthest(1)].map(|[x, y]| x + y);
         let (mut low, mut high) = (0.0, (2.7853 / re).min(3.0 / im));
@@ -78,7 +79,7 @@ impl<const G: usize> Stencil<G> {
 
     /// R along a row: `to[j] = finish(j, R_j)`, where `row(k)` is the padded row k rows further on.
     ///
-    /// Inlined into its callers and written on slices of one length: the compiler makes vectors of it.
+    /// It is inlined into its callers and uses slices of one length, so that the compiler can vectorise it.
     #[inline(always)]
     pub(super) fn apply<'a>(
         &self,
@@ -98,7 +99,7 @@ impl<const G: usize> Stencil<G> {
             let mut r = self.centre * centre[j];
             for (k, axes) in pairs.iter().enumerate() {
                 for (d, [before, after]) in axes.iter().enumerate() {
-                    // a² − b² = (a + b)(a − b) shares the sum with diffusion
+                    // a² − b² = (a + b)(a − b), where diffusion uses the same sum
                     let (a, b) = (after[j], before[j]);
                     r += (a + b) * (self.linear[d][k] - self.flux[d][k] * (a - b));
                 }
