@@ -9,8 +9,9 @@ pub const NOISE_WORTH_A_WARNING: f64 = 0.25;
 /// Σ min(|a|, |b|) over neighbouring edges with changes a b < 0, over Σ |a| over all edges
 /// ```
 ///
-/// 0 for what rises or falls, about 2/n for waves of n cells, a third and more for random numbers, 1 for what alternates. 0,
-/// too, along axes where fewer than a quarter of all pairs of neighbouring edges turn: a few spikes are no noise.
+/// 0 for what rises or falls, about 2/n for waves of n cells, a third and more for random numbers, 1 for what
+/// alternates. 0, too, along axes where fewer than a quarter of all pairs of neighbouring edges turn: a few spikes are
+/// no noise.
 ///
 /// # Example
 /// ```

@@ -9,17 +9,18 @@ use crate::numerics::{larger, sum};
 /// ρ = 1 + 4 s r / ⟨r⟩,   r = max(√|∇u| − b, 0),   b = ⟨|∇u|^⅛⟩⁴,   ⟨·⟩ the mean over the domain
 /// ```
 ///
-/// with ∇u in each mesh cell, per uniform cell along each axis: |∇u|² = (h_x u_x)² + (h_y u_y)², so that a box of any shape is
-/// treated alike. A layer of any width gets the same share of the nodes, about half of them: the mean of the root falls with
-/// the width as fast as its largest value grows. The background b is 0 where u is flat outside its layers, and takes out the
-/// slopes between the shocks of a saw tooth, which would share the nodes otherwise.
+/// with ∇u in each mesh cell, per uniform cell along each axis: |∇u|² = (h_x u_x)² + (h_y u_y)², so that a box of any
+/// shape is treated alike. A layer of any width gets the same share of the nodes, about half of them: the mean of the
+/// root falls with the width as fast as its largest value grows. The background b is 0 where u is flat outside its
+/// layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes otherwise.
 ///
-/// The need s is 0 where u changes by less than 0.18 of its range over a uniform cell everywhere: equal cells resolve it. It is 1
-/// where u changes by more than a quarter of its range over one somewhere. The largest ρ over the smallest is at most 10⁶.
+/// The need s is 0 where u changes by less than 0.18 of its range over a uniform cell everywhere: equal cells resolve
+/// it. It is 1 where u changes by more than a quarter of its range over one somewhere. The largest ρ over the smallest
+/// is at most 10⁶.
 ///
-/// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a twentieth of
-/// the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their cost does not
-/// depend on their number. Where u is constant, ρ = 1.
+/// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
+/// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
+/// cost does not depend on their number. Where u is constant, ρ = 1.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RootGradient {}
 
@@ -33,8 +34,8 @@ const UNRESOLVED: f64 = 0.25;
 const CONTRAST: f64 = 1e6;
 /// Passes of the filter on 41 × 41 nodes.
 const PASSES: f64 = 8.0;
-/// So many layers on a line are smoothed as one is. Were two of them smoothed less, on periodic axes or where a front winds
-/// across the lines, a mesh of 40 cells would not come to rest around layers thinner than a hundredth of the box.
+/// So many layers on a line are smoothed as one is. Were two of them smoothed less, on periodic axes or where a front
+/// winds across the lines, a mesh of 40 cells would not come to rest around layers thinner than a hundredth of the box.
 const FEW: f64 = 2.0;
 /// Differences of u below this share of its size are rounding.
 const ROUNDING: f64 = 1e-10;
@@ -129,8 +130,8 @@ impl Roots {
     }
 }
 
-/// How many layers the lattice lines along each axis meet: half of all that ρ, given by the cell, rises and falls along them
-/// over the sum of the largest ρ − 1 of each line, so that the lines through the strongest layers count most.
+/// How many layers the lattice lines along each axis meet: half of all that ρ, given by the cell, rises and falls along
+/// them over the sum of the largest ρ − 1 of each line, so that the lines through the strongest layers count most.
 fn layers(lattice: &Lattice<2>, rho: &[f64]) -> [f64; 2] {
     let ([n, m], [wraps, wraps_across]) = (lattice.cells(), lattice.periodic());
     // length and stride of the lines, how many there are, and the stride between them
@@ -213,7 +214,8 @@ mod tests {
         }
     }
 
-    /// Eight fronts in a row are as thick after smoothing, as shares of what each has, as two are, and each has as much of ρ.
+    /// Eight fronts in a row are as thick after smoothing, as shares of what each has, as two are, and each has as much
+    /// of ρ.
     #[test]
     fn each_of_many_layers_has_its_share() {
         let contrast = |fronts: f64| {

@@ -26,12 +26,13 @@ pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: 
     Ok(())
 }
 
-/// So many passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does not
-/// depend on their number, which need not be whole
+/// So many passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does
+/// not depend on their number, which need not be whole
 ///
 /// A pass adds ½ to the variance of the filter, in cells². More than [`MOST_PASSES`] are done on a grid of half as many
-/// cells: a pass, the means of neighbours, the passes that are left there, their values back on the finer cells, and a pass
-/// again. The filter keeps constants, the sum of all values and the sign of positive ones, and treats both ends alike.
+/// cells: a pass, the means of neighbours, the passes that are left there, their values back on the finer cells, and a
+/// pass again. The filter keeps constants, the sum of all values and the sign of positive ones, and treats both ends
+/// alike.
 pub(super) fn smooth_widely<const D: usize>(
     size: [usize; D],
     periodic: [bool; D],
@@ -47,8 +48,8 @@ pub(super) fn smooth_widely<const D: usize>(
 const MOST_PASSES: f64 = 15.0;
 /// The fewest cells along an axis that are halved.
 const FEWEST_HALVED: usize = 4;
-/// Lines that are filtered side by side: all that is done to them is done within the cache. With half as many, lines across
-/// memory cost up to twice the time on 512² cells.
+/// Lines that are filtered side by side: all that is done to them is done within the cache. With half as many, lines
+/// across memory cost up to twice the time on 512² cells.
 const LANES: usize = 32;
 /// Values of a line that are read at once where they are neighbours in memory: what one fetch brings.
 const PIECE: usize = 8;
@@ -177,8 +178,8 @@ mod tests {
         }
     }
 
-    /// Where the grid is halved, a hot cell in the middle spreads as it does by the passes themselves, to a few hundredths of
-    /// its largest value, and with the same variance.
+    /// Where the grid is halved, a hot cell in the middle spreads as it does by the passes themselves, to a few
+    /// hundredths of its largest value, and with the same variance.
     #[test]
     fn the_wide_filter_spreads_as_the_passes_do() {
         for (n, passes) in [(64, 19), (101, 49), (256, 312), (511, 1243)] {

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// What a mover carries from step to step: how the mesh was going, and how fast it may follow
 ///
-/// The density is frozen at the nodes over a step, so that a mesh that follows too fast overshoots, and turns back in the
-/// next step. How slow is slow enough depends on how thin the layer is in cells, so the mover looks at itself: with
+/// The density is frozen at the nodes over a step, so that a mesh that follows too fast overshoots, and turns back in
+/// the next step. How slow is slow enough depends on how thin the layer is in cells, so the mover looks at itself: with
 /// e = xⁿ⁺¹ − x* the correction of a step, and c the cosine between it and the one before,
 ///
 /// ```text
@@ -97,8 +97,8 @@ impl Gait {
         self.unrest > 0.5
     }
 
-    /// The density that is to move the mesh: where it is predicted, mixed with the one that moved it last. On the flanks of
-    /// thin layers mesh and density would otherwise take turns from step to step.
+    /// The density that is to move the mesh: where it is predicted, mixed with the one that moved it last. On the
+    /// flanks of thin layers mesh and density would otherwise take turns from step to step.
     pub(crate) fn mixed(&self, rho: &[f64], relaxation: Relaxation) -> Vec<f64> {
         if relaxation.prediction() == 0.0 || self.rho.len() != rho.len() {
             return rho.to_vec();
@@ -106,8 +106,8 @@ impl Gait {
         rho.iter().zip(&self.rho).map(|(newest, last)| NEWEST * newest + (1.0 - NEWEST) * last).collect()
     }
 
-    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ over this
-    /// step, `share` how much of the velocity is kept, and `chooses` is true where τ is the mover's own.
+    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ
+    /// over this step, `share` how much of the velocity is kept, and `chooses` is true where τ is the mover's own.
     pub(super) fn after(
         &self,
         predicted: &Predicted,
@@ -146,9 +146,9 @@ impl Gait {
 
     /// The velocity with which u, what the mesh follows, moves as a whole along periodic axes, 0 along others
     ///
-    /// Where u is carried along at c, what a node finds changes by δu = (d − c Δt)·∇u over a step in which it goes by d: c is
-    /// the best fit to the last step. Nothing else decides on a rigid shift of a periodic mesh, which leaves any density as
-    /// equidistributed as it was.
+    /// Where u is carried along at c, what a node finds changes by δu = (d − c Δt)·∇u over a step in which it goes by
+    /// d: c is the best fit to the last step. Nothing else decides on a rigid shift of a periodic mesh, which leaves
+    /// any density as equidistributed as it was.
     fn drift(&self, mesh: &Mesh<2>, u: &[f64]) -> [f64; 2] {
         let periodic = mesh.lattice().periodic();
         let Some(Last { took, way, u: before }) = self.last.as_ref().filter(|last| last.u.len() == u.len()) else {
@@ -231,8 +231,8 @@ fn cosine(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
 /// On periodic axes the velocity of the mesh as a whole is that of what it follows, `drift`
 ///
 /// The nodes of a periodic mesh may run through what they follow for ever, v = x_ξ δ, and stay equidistributed: nothing
-/// brings them back, and a prediction that learns from them would make them run ever faster. The part of v − drift along
-/// x_ξ, by its mean over the nodes, is taken out.
+/// brings them back, and a prediction that learns from them would make them run ever faster. The part of v − drift
+/// along x_ξ, by its mean over the nodes, is taken out.
 fn go_along(mesh: &Mesh<2>, velocity: &mut [[f64; 2]], drift: [f64; 2]) {
     let (lattice, extent) = (mesh.lattice(), mesh.extent());
     for d in (0..2).filter(|&d| lattice.periodic()[d]) {
@@ -262,7 +262,8 @@ impl Predicted {
     /// Where a mesh is after `dt`; the same mesh where the gain is 0.
     pub(super) fn after(mesh: &Mesh<2>, gait: &Gait, u: &[f64], gain: f64, dt: f64) -> Result<Self, Failure> {
         let mut going = gait.velocity.clone();
-        // corrections are as large in short steps as in long ones: what was learnt from them says nothing of a much longer one
+        // corrections are as large in short steps as in long ones: what was learnt from them says nothing of a much
+        // longer one
         if let Some(last) = gait.last.as_ref().filter(|last| dt > LONGER * last.took) {
             going.iter_mut().flatten().for_each(|v| *v *= LONGER * last.took / dt);
         }

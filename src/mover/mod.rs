@@ -16,10 +16,10 @@ pub(crate) use gait::Predicted;
 
 /// Moves a mesh from step to step
 ///
-/// A step predicts the mesh, x* = xⁿ + Δt v, and does a step of the mesh equation from there, with the mean of the density
-/// of xⁿ and of the one that moved the mesh last; the velocity v of the nodes learns from the correction
-/// e = xⁿ⁺¹ − x* ([`Steps`](crate::meshing::Steps)). With [`Relaxation::Auto`] the mover chooses τ, too ([`Gait`]). A step that
-/// would fold the mesh, or whose equation cannot be solved, is tried again with more [`Care`].
+/// A step predicts the mesh, x* = xⁿ + Δt v, and does a step of the mesh equation from there, with the mean of the
+/// density of xⁿ and of the one that moved the mesh last; the velocity v of the nodes learns from the correction
+/// e = xⁿ⁺¹ − x* ([`Steps`](crate::meshing::Steps)). With [`Relaxation::Auto`] the mover chooses τ, too ([`Gait`]). A
+/// step that would fold the mesh, or whose equation cannot be solved, is tried again with more [`Care`].
 ///
 /// # Example
 /// ```
@@ -54,8 +54,8 @@ pub struct Mover {
 /// What a mesh follows: nodal values on it, in lattice order.
 #[derive(Debug, Clone, Copy)]
 pub struct Followed<'a> {
-    /// What the density was made of: how it moves as a whole is how a mesh on periodic axes goes along. The density itself
-    /// where there is nothing else.
+    /// What the density was made of: how it moves as a whole is how a mesh on periodic axes goes along. The density
+    /// itself where there is nothing else.
     pub u: &'a [f64],
     /// The density.
     pub rho: &'a [f64],
@@ -120,8 +120,8 @@ impl Mover {
         Predicted::after(mesh, gait, u, prediction * stride.dt / stride.scale, stride.dt)
     }
 
-    /// A step of the mesh equation from the predicted mesh, with as much care as it needs. What it fails with is what it
-    /// failed with at first.
+    /// A step of the mesh equation from the predicted mesh, with as much care as it needs. What it fails with is what
+    /// it failed with at first.
     pub(crate) fn relax(
         &mut self,
         predicted: &Predicted,

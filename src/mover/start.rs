@@ -29,8 +29,8 @@ pub enum Ending {
 const MOST_STEPS: usize = 500;
 /// A mesh with more cells along an axis starts from one with half as many.
 const COARSE: usize = 100;
-/// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there: a layer
-/// that the mesh resolves changes by less over each of its edges, however thin it is.
+/// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there: a
+/// layer that the mesh resolves changes by less over each of its edges, however thin it is.
 const JUMP: f64 = 0.2;
 const THIN: f64 = 1e-3;
 /// Motion in one step, as a share of the shortest edge, below which a mesh stands still.
@@ -38,9 +38,9 @@ const AT_REST: f64 = 4e-3;
 
 /// The mesh that rests on a density, from a given mesh
 ///
-/// Steps of a [`Mover`], each with the density at the nodes that the last one led to, until no node moves by more than a
-/// small share of the shortest edge, or until one edge, a thousandth of a uniform cell, still holds a fifth of all that
-/// u changes: data that jump would draw all nodes together without end.
+/// Steps of a [`Mover`], each with the density at the nodes that the last one led to, until no node moves by more than
+/// a small share of the shortest edge, or until one edge, a thousandth of a uniform cell, still holds a fifth of all
+/// that u changes: data that jump would draw all nodes together without end.
 ///
 /// # Errors
 /// What `followed` returns, which gives u and the density of a mesh.
@@ -65,8 +65,8 @@ fn from_coarser(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<S
     to_rest(if check_unfolded(&start).is_ok() { start } else { mesh }, form, followed)
 }
 
-/// The fewest time steps in τ with which a mesh rests on `values`, given at the nodes of `mesh` and carried by interpolation,
-/// as far as [`adapted`] can tell from equal cells; nothing where it does not come to rest.
+/// The fewest time steps in τ with which a mesh rests on `values`, given at the nodes of `mesh` and carried by
+/// interpolation, as far as [`adapted`] can tell from equal cells; nothing where it does not come to rest.
 pub fn steps_to_rest(mesh: &Mesh<2>, form: Form, monitor: &dyn Monitor, values: &[f64]) -> Option<f64> {
     let uniform = Mesh::uniform(*mesh.lattice(), mesh.lower(), mesh.upper()).ok()?;
     let start = to_rest(uniform, form, &mut |on| {

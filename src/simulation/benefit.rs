@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 
 /// What adaptation brought: how well the solution is interpolated on this mesh, and how well on one of equal cells
 ///
-/// Both are estimates of the largest error of linear interpolation, in the unit of what the mesh follows. Without every other
-/// node of a line of the lattice the values left out would be off by e₂; with all of them the error is about e₂/4, where the
-/// mesh resolves the solution. On equal cells it is at least as large as what is lost on the way there and back.
+/// Both are estimates of the largest error of linear interpolation, in the unit of what the mesh follows. Without every
+/// other node of a line of the lattice the values left out would be off by e₂; with all of them the error is about
+/// e₂/4, where the mesh resolves the solution. On equal cells it is at least as large as what is lost on the way there
+/// and back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Benefit {
     /// On this mesh.
@@ -54,8 +55,8 @@ mod tests {
     use super::*;
     use crate::geometry::Lattice;
 
-    /// tanh(40 (x − ½)) is interpolated on 40 equal cells to 0.0894, its largest error over all places, and 25 times better by
-    /// cells that are as much finer in the layer as it is thin; both are told to a fifth.
+    /// tanh(40 (x − ½)) is interpolated on 40 equal cells to 0.0894, its largest error over all places, and 25 times
+    /// better by cells that are as much finer in the layer as it is thin; both are told to a fifth.
     #[test]
     fn interpolation_errors_are_told_where_the_layer_is_resolved() {
         let f = |x: f64| (40.0 * (x - 0.5)).tanh();

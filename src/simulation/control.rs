@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 /// Δt ← Δt (1/eₙ)^(0.7/3) (eₙ₋₁)^(0.4/3),   eₙ = error of step n over four fifths of the tolerance
 /// ```
 ///
-/// The second factor damps what the first would make swing. After a refusal Δt ← Δt (1/e)^(1/3), and the next step is no
-/// longer.
+/// The second factor damps what the first would make swing. After a refusal Δt ← Δt (1/e)^(1/3), and the next step is
+/// no longer.
 ///
 /// # Source
-/// Gustafsson, *Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods* (1994), with k_I = 0.3
-/// and k_P = 0.4: PI.3.4 of Söderlind, *Digital filters in adaptive time-stepping* (2003). Hairer and Wanner, *Solving
-/// Ordinary Differential Equations II*, IV.2.
+/// Gustafsson, *Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods* (1994), with k_I =
+/// 0.3 and k_P = 0.4: PI.3.4 of Söderlind, *Digital filters in adaptive time-stepping* (2003). Hairer and Wanner,
+/// *Solving Ordinary Differential Equations II*, IV.2.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Control {
     tolerance: f64,
@@ -41,8 +41,8 @@ impl Control {
         self.tolerance == tolerance && self.before.is_finite() && self.before >= LEAST
     }
 
-    /// Whether a step is taken, and how much longer the next is than it would have been had it not been `cut` so many times
-    /// shorter.
+    /// Whether a step is taken, and how much longer the next is than it would have been had it not been `cut` so many
+    /// times shorter.
     pub fn judge(&mut self, error: f64, cut: f64) -> (bool, f64) {
         // not `>`: an error that is no number is too large
         let taken = error <= self.tolerance;

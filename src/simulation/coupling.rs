@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 /// piecewise linear interpolation, so that it follows ρ(x) rather than ρ(ξ). `iterations` = l > 1 is (MP)^l: mesh and
 /// physics are computed l times from the same old state, each time with ρ from the newest solution.
 ///
-/// With a `tolerance` ε > 0 both are the most: sub-steps are doubled, 1, 2, 4 …, until the mesh of twice as many differs by
-/// at most ε (M^vP, sub-steps as many as a step needs), and rounds end when the mesh of the next one does, (MP)^∞, which
-/// solves mesh and physics together. ε is a share of the longest side of the box.
+/// With a `tolerance` ε > 0 both are the most: sub-steps are doubled, 1, 2, 4 …, until the mesh of twice as many
+/// differs by at most ε (M^vP, sub-steps as many as a step needs), and rounds end when the mesh of the next one does,
+/// (MP)^∞, which solves mesh and physics together. ε is a share of the longest side of the box.
 ///
 /// # Source
 /// Section 5 of Bihlo, Haynes and Walsh (2015).
@@ -171,12 +171,12 @@ fn held_back(state: &State, predicted: &Predicted, mesh: Mesh<2>, dt: f64, sched
     }
 }
 
-/// The physics over a step; where its error is asked for in two halves, on the same straight paths of the nodes, beside the
-/// whole
+/// The physics over a step; where its error is asked for in two halves, on the same straight paths of the nodes, beside
+/// the whole
 ///
-/// All steppers are trapezoidal: their error over a step is of the third order, that of two halves a quarter of it, and so
-/// a third of the difference. Formulas of several steps would be cheaper, but the nodes turn from step to step, and the
-/// bends would count as errors.
+/// All steppers are trapezoidal: their error over a step is of the third order, that of two halves a quarter of it, and
+/// so a third of the difference. Formulas of several steps would be cheaper, but the nodes turn from step to step, and
+/// the bends would count as errors.
 fn stepped(
     physics: &mut dyn Physics,
     motion: Motion<'_>,
@@ -232,12 +232,12 @@ mod tests {
         mesh.moved(x.collect()).unwrap()
     }
 
-    /// For every stepper, on nodes that move, the estimate is the error against a hundred steps along the same paths, and
-    /// of the third order.
+    /// For every stepper, on nodes that move, the estimate is the error against a hundred steps along the same paths,
+    /// and of the third order.
     #[test]
     fn the_estimate_is_the_error() {
-        let formula = "{\"unknowns\": [\"u\", \"v\"], \"flux\": {\"u\": [\"u^2\", \"u\"]}, \"diffusivity\": {\"u\": \"0.02\", \"v\": \"0.01\"}, \
-                       \"source\": {\"v\": \"u*(1-v)\"}, \"initial\": {\"u\": \"2+sin(2*pi*x)*cos(2*pi*y)\", \"v\": \"0.2\"}}";
+        let formula = r#"{"unknowns": ["u", "v"], "flux": {"u": ["u^2", "u"]}, "diffusivity": {"u": "0.02", "v": "0.01"},
+            "source": {"v": "u*(1-v)"}, "initial": {"u": "2+sin(2*pi*x)*cos(2*pi*y)", "v": "0.2"}}"#;
         let formula: FormulaPde = serde_json::from_str(formula).unwrap();
         let water = |form| {
             let shape = ShallowWater { pile: 1.0, radius: 0.2, width: 0.15, ..ShallowWater::default() };

@@ -29,8 +29,8 @@ fn noisy(simulation: &Simulation, state: &State) -> Option<String> {
     let share = noise(state.mesh.lattice(), &followed);
     (share > NOISE_WORTH_A_WARNING).then(|| {
         format!(
-            "noisy-density: {:.0} % of what the mesh follows goes up and down from node to node, so that it follows noise of \
-             the size of its cells; smooth it, name something smoother in `monitor.of`, or refine `grid.cells`",
+            "noisy-density: {:.0} % of what the mesh follows goes up and down from node to node, so that it follows noise \
+             of the size of its cells; smooth it, name something smoother in `monitor.of`, or refine `grid.cells`",
             100.0 * share
         )
     })
@@ -59,8 +59,8 @@ impl References {
         Some(Self { finer: at(finer)?, coarser: at(finer / 2)? })
     }
 
-    /// The content of an unknown is ∫|u − m|, m its median over the domain. Where it on the finer cells and on the coarser
-    /// ones differ as much as it and that of the mesh do, nothing is known.
+    /// The content of an unknown is ∫|u − m|, m its median over the domain. Where it on the finer cells and on the
+    /// coarser ones differ as much as it and that of the mesh do, nothing is known.
     fn lost(&self, simulation: &Simulation, state: &State, c: usize, name: &str) -> Option<String> {
         let nodal: Vec<f64> = state.u.component(c).collect();
         let values: Vec<f64> = self.finer.1.component(c).collect();
@@ -74,8 +74,8 @@ impl References {
         let off = (there - seen).abs();
         (off > LOSS * there && there > ROUNDING * size && (there - twice).abs() < 0.5 * off).then(|| {
             format!(
-                "`{name}`: the mesh at the start holds {} % of what its initial data hold (∫|{name} − m|, m its median): what \
-                 lies between its nodes is {}; {}",
+                "`{name}`: the mesh at the start holds {} % of what its initial data hold (∫|{name} − m|, m its median): \
+                 what lies between its nodes is {}; {}",
                 (1000.0 * seen / there).round() / 10.0,
                 if seen < there { "missed" } else { "taken for more than it is" },
                 remedy(simulation, state, &nodal)
@@ -84,8 +84,8 @@ impl References {
     }
 }
 
-/// What is small and lies between the nodes: a value within a cell that is far outside of those at the nodes around it. It
-/// is looked for within every cell, and on equal cells, since a blob may be smaller than what divides a wide cell.
+/// What is small and lies between the nodes: a value within a cell that is far outside of those at the nodes around it.
+/// It is looked for within every cell, and on equal cells, since a blob may be smaller than what divides a wide cell.
 fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<String>> {
     let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
     let cells = lattice.cells();
@@ -104,13 +104,14 @@ fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<St
     let told = names.iter().enumerate().map(|(c, name)| {
         let nodal: Vec<f64> = state.u.component(c).collect();
         let [low, high] = ends(looked[0].0.component(c).chain(nodal.iter().copied()));
-        let worst = looked.iter().zip(&places).map(|((data, cells), places)| worst(lattice, &nodal, data, c, cells, places));
-        let (off, x, value, [least, most]) = worst.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let looks = looked.iter().zip(&places);
+        let all = looks.map(|((data, cells), places)| worst(lattice, &nodal, data, c, cells, places));
+        let (off, x, value, [least, most]) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let [x, y] = mesh.image(x);
         (off > HIDDEN * (high - low)).then(|| {
             format!(
-                "`{name}`: between the nodes of the mesh at the start, at x = {x:.6}, y = {y:.6}, its initial data are {value:.3e}, \
-                 and {least:.3e} to {most:.3e} at the nodes around: the mesh does not see that; {}",
+                "`{name}`: between the nodes of the mesh at the start, at x = {x:.6}, y = {y:.6}, its initial data are \
+                 {value:.3e}, and {least:.3e} to {most:.3e} at the nodes around: the mesh does not see that; {}",
                 remedy(simulation, state, &nodal)
             )
         })
@@ -118,7 +119,8 @@ fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<St
     told.collect()
 }
 
-/// The value of some data that is farthest beyond those at the nodes around its cell: by how much, where, and what both are.
+/// The value of some data that is farthest beyond those at the nodes around its cell: by how much, where, and what both
+/// are.
 fn worst(
     lattice: &Lattice<2>,
     nodal: &[f64],

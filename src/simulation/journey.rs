@@ -6,7 +6,8 @@ use crate::geometry::{DualCells, Field, Mesh, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
-/// What moving the nodes through a solution may add to its error over a whole run, as a share of its range: at most this,
+/// What moving the nodes through a solution may add to its error over a whole run, as a share of its range: at most
+/// this,
 const MOST: f64 = 3e-3;
 /// and at most so much of the error with which equal cells interpolate it.
 const OF_UNIFORM: f64 = 0.25;
@@ -23,10 +24,10 @@ const INTERPOLATION: f64 = 0.2;
 /// e = (δ²u_i + δ²u_k)/16,   δ² the second difference along the lattice
 /// ```
 ///
-/// Where the solution stands still nothing heals what that adds up to, so a mesh that starts far from where it wants to be
-/// takes its time: over a run it adds no more than a share of the error that equal cells have. Where the solution changes by
-/// itself, a mesh that follows may add a share of that change, unless equal cells resolve it: there is no hurry on the way back
-/// to them.
+/// Where the solution stands still nothing heals what that adds up to, so a mesh that starts far from where it wants to
+/// be takes its time: over a run it adds no more than a share of the error that equal cells have. Where the solution
+/// changes by itself, a mesh that follows may add a share of that change, unless equal cells resolve it: there is no
+/// hurry on the way back to them.
 pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span: f64) -> f64 {
     let (begin, end) = (DualCells::new(from), DualCells::new(to));
     let swept = begin.swept(&end);

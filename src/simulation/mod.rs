@@ -125,7 +125,8 @@ impl Simulation {
     /// small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
     ///
     /// # Errors
-    /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer returned.
+    /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer
+    /// returned.
     pub fn adapted(&self, mesh: Mesh<2>, observers: &mut [&mut dyn Observer]) -> Result<Start> {
         mover::adapted(mesh, self.mover.equation.form, |mesh| {
             let state = self.with_sides(self.start(mesh.clone())?)?;
@@ -136,7 +137,8 @@ impl Simulation {
         })
     }
 
-    /// A start with the values that its sides will have: where they differ from the initial solution, a layer begins there.
+    /// A start with the values that its sides will have: where they differ from the initial solution, a layer begins
+    /// there.
     fn with_sides(&self, mut state: State) -> Result<State> {
         let (lattice, count) = (*state.mesh.lattice(), state.u.components());
         let mut differs = false;
@@ -157,8 +159,8 @@ impl Simulation {
         Ok(state)
     }
 
-    /// What the user should know of a start although nothing failed: a density that is noise at the scale of its cells, and
-    /// unknowns of which the mesh misses something.
+    /// What the user should know of a start although nothing failed: a density that is noise at the scale of its cells,
+    /// and unknowns of which the mesh misses something.
     pub fn doubts(&self, start: &State) -> Vec<String> {
         doubts::doubts(self, start)
     }
@@ -293,8 +295,8 @@ impl Simulation {
         let t = state.t;
         if hardly_follows {
             record.warnings.push(format!(
-                "{RESTLESS}: at t = {t} τ is {:.0} time steps, since the density turns about from step to step; smooth it, or \
-                 follow something that varies less, by monitor.of",
+                "{RESTLESS}: at t = {t} τ is {:.0} time steps, since the density turns about from step to step; smooth it, \
+                 or follow something that varies less, by monitor.of",
                 state.gait.steps()
             ));
             return;
@@ -325,8 +327,8 @@ impl Simulation {
                 state.t
             ),
             Some(percent) if percent > limit => format!(
-                "{NOISY}: from t = {} on their standard error is {percent:.1} % of the shortest edge of the mesh or more \
-                 (said above {limit} %); more walks or paths, or more sweeps, lower it",
+                "{NOISY}: from t = {} on their standard error is {percent:.1} % of the shortest edge of the mesh or \
+                 more (said above {limit} %); more walks or paths, or more sweeps, lower it",
                 state.t
             ),
             Some(_) => return,

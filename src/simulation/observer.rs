@@ -69,8 +69,8 @@ pub trait Observer {
     /// Whatever stops the observer from doing its work, such as a full disk.
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()>;
 
-    /// Called before the run, with every mesh on the way to the one that is adapted to the initial solution. An error ends
-    /// the run.
+    /// Called before the run, with every mesh on the way to the one that is adapted to the initial solution. An error
+    /// ends the run.
     ///
     /// # Errors
     /// Whatever stops the observer from doing its work.
@@ -86,7 +86,8 @@ pub trait Observer {
         false
     }
 
-    /// Puts what it carries from step to step into a checkpoint, and makes sure that what it wrote so far is on the disk.
+    /// Puts what it carries from step to step into a checkpoint, and makes sure that what it wrote so far is on the
+    /// disk.
     ///
     /// # Errors
     /// What hinders that.

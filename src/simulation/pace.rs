@@ -85,9 +85,9 @@ impl Pace {
 /// Steps as long as the solution and the mesh allow: at no moving node does the first unknown change by much more than
 /// three hundredths of the largest range that it had, or the error of a step stays below a tolerance
 ///
-/// Where the mesh goes along with a front, little changes at its nodes, and a step may carry the front over many times its
-/// width. The next step is chosen from the last one; a step in which much more changes, or that fails, is refused and tried
-/// again with a shorter one. A trial on the resting mesh chooses the first.
+/// Where the mesh goes along with a front, little changes at its nodes, and a step may carry the front over many times
+/// its width. The next step is chosen from the last one; a step in which much more changes, or that fails, is refused
+/// and tried again with a shorter one. A trial on the resting mesh chooses the first.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Free {
     dt: f64,
@@ -109,8 +109,8 @@ const CHANGE: f64 = 0.03;
 const TOO_MUCH: f64 = 2.0;
 /// A step is at most so much longer and shorter than the one before.
 const GROWTH: [f64; 2] = [0.5, 1.2];
-/// A share of the longest step below which the run would take millions of steps, and how many such steps there may be in a
-/// row: what jumps at the start, or from one moment to the next, takes some.
+/// A share of the longest step below which the run would take millions of steps, and how many such steps there may be
+/// in a row: what jumps at the start, or from one moment to the next, takes some.
 const SHORT: f64 = 1e-5;
 const MOST_SHORT: usize = 1000;
 /// A share of the longest step that is lost in rounding.
@@ -121,8 +121,8 @@ const FIRST_AGAIN: f64 = 0.1;
 const GIVEN: f64 = 0.02;
 /// Steps in a run in which nothing changes.
 const FEWEST: f64 = 20.0;
-/// The time in which the mesh follows may halve from one step to the next without a doubt; where the solution seems to change
-/// faster, the change is measured again on a mesh that does not move.
+/// The time in which the mesh follows may halve from one step to the next without a doubt; where the solution seems to
+/// change faster, the change is measured again on a mesh that does not move.
 const DOUBTED: f64 = 0.5;
 /// Share of the change in a step above which what widens the range is growth.
 const GROWS: f64 = 0.5;
@@ -182,8 +182,8 @@ impl Free {
     /// Learns from a step; none is returned where it is refused.
     ///
     /// # Errors
-    /// What a step failed with once it was halved as often as may be, or [`Failure::VanishingStep`], where the next would be
-    /// too short.
+    /// What a step failed with once it was halved as often as may be, or [`Failure::VanishingStep`], where the next
+    /// would be too short.
     fn judge(
         &mut self,
         simulation: &mut Simulation,
@@ -248,8 +248,8 @@ impl Free {
         if scale < self.scale {
             let mut in_place = dt * CHANGE / share(change_in_place(before, after, 0), self.ranges[0]);
             if in_place < DOUBTED * self.scale {
-                // the change at fixed places contains the errors of interpolation that the moving mesh makes; a τ shortened by
-                // these would move the mesh faster and make more of them
+                // the change at fixed places contains the errors of interpolation that the moving mesh makes; a τ
+                // shortened by these would move the mesh faster and make more of them
                 in_place = in_place.max(self.dt * CHANGE / self.share_at_rest(simulation, after));
             }
             scale = scale.max(in_place.min(self.scale));
@@ -281,7 +281,8 @@ impl Free {
     }
 }
 
-/// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic length.
+/// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic
+/// length.
 pub(super) fn rushed(simulation: &Simulation, before: &State, after: &State) -> bool {
     let follows = simulation.mover.equation.relaxation == Relaxation::Auto && simulation.mover.generator.moves();
     let range = range(&before.u, 0).max(range(&after.u, 0));

@@ -53,8 +53,8 @@ impl Schedule {
         Ok(Self { steps: Steps::ByChange, ..Self::new(start, end, step, report)? })
     }
 
-    /// From `start` to `end` with steps whose estimated error is no more than `tolerance`, as a share of the range of the
-    /// solution, meeting all of `report`. `longest` is the first step as well.
+    /// From `start` to `end` with steps whose estimated error is no more than `tolerance`, as a share of the range of
+    /// the solution, meeting all of `report`. `longest` is the first step as well.
     ///
     /// # Errors
     /// As [`Schedule::new`], and [`Error::Invalid`] for a tolerance that is not between 1e-5 and 0.1.
@@ -197,7 +197,12 @@ mod tests {
     proptest! {
         /// Steps never exceed the one asked for, times increase, and every report is met to the last bit.
         #[test]
-        fn reports_are_met_exactly(start in -2.0..2.0_f64, span in 1e-3..5.0_f64, step in 1e-3..1.0_f64, at in prop::collection::vec(0.0..1.0_f64, 0..4)) {
+        fn reports_are_met_exactly(
+            start in -2.0..2.0_f64,
+            span in 1e-3..5.0_f64,
+            step in 1e-3..1.0_f64,
+            at in prop::collection::vec(0.0..1.0_f64, 0..4),
+        ) {
             let end = start + span;
             let report: Vec<f64> = at.iter().map(|s| (start + s * span).clamp(start, end)).collect();
             let schedule = Schedule::new(start, end, step, report.clone()).unwrap();
