@@ -3,8 +3,8 @@ use super::Mesh;
 /// Interpolates a nodal field from one mesh to the nodes of another over the same lattice and box
 ///
 /// Every cell is divided into two triangles by its diagonal from (i, j) to (i+1, j+1), and the field is linear on each.
-/// The search for a node begins in the cell with its index, so that meshes that differ by one time step cost a few
-/// tests for each node. On periodic axes the image next to that cell is searched for: the meshes may have drifted apart
+/// The search for a node begins as many cells from the one with its index as the search for its neighbour ended, so that
+/// it costs a few tests, whatever the meshes are. On periodic axes the image next to that cell is searched for: the meshes may have drifted apart
 /// by any number of periods. Points outside a bounded box take the value at the nearest point of the cell where the
 /// search ends.
 ///
@@ -29,12 +29,18 @@ pub fn interpolate(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
     assert_eq!(values.len(), from.lattice().len(), "one value a node");
     let cells = Cells { mesh: from };
     let lattice = from.lattice();
-    (to.x().iter().enumerate())
-        .map(|(k, &point)| {
-            let (nodes, weights) = cells.find(point, lattice.node(k).map(|i| i as isize));
-            nodes.iter().zip(weights).map(|(&n, w)| w * values[n]).sum()
-        })
-        .collect()
+    // by how many cells the last node was off its own, and the first node of the last row
+    let (mut off, mut off_in_row) = ([0; 2], [0; 2]);
+    let interpolated = to.x().iter().enumerate().map(|(k, &point)| {
+        let node = lattice.node(k);
+        let first_in_row = node[1] == 0;
+        off = if first_in_row { off_in_row } else { off };
+        let (cell, (nodes, weights)) = cells.find(point, [0, 1].map(|d| node[d] as isize + off[d]));
+        off = [0, 1].map(|d| cell[d] - node[d] as isize);
+        off_in_row = if first_in_row { off } else { off_in_row };
+        nodes.iter().zip(weights).map(|(&n, w)| w * values[n]).sum()
+    });
+    interpolated.collect()
 }
 
 /// The cell of a mesh, by its lowest corner, that holds each of some points. The search begins in the cell of the point
@@ -43,9 +49,9 @@ pub(crate) fn cells_of(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -
     let cells = Cells { mesh };
     let mut near = [0; 2];
     let cell = |point| {
-        let (nodes, _) = cells.find(point, near.map(|i: usize| i as isize));
-        near = mesh.lattice().node(nodes[0]);
-        near
+        let (cell, (nodes, _)) = cells.find(point, near);
+        near = cell;
+        mesh.lattice().node(nodes[0])
     };
     points.map(cell).collect()
 }
@@ -68,13 +74,14 @@ impl Cells<'_> {
         (index, std::array::from_fn(|d| x[d] + [i, j][d].div_euclid(nodes[d] as isize) as f64 * extent[d]))
     }
 
-    /// Nodes and barycentric weights of the triangle that holds `point`; the search begins in cell `start`.
-    fn find(&self, point: [f64; 2], start: [isize; 2]) -> Triangle {
+    /// The cell that holds `point`, and nodes and barycentric weights of the triangle that does; the search begins in cell
+    /// `start`.
+    fn find(&self, point: [f64; 2], start: [isize; 2]) -> ([isize; 2], Triangle) {
         let cells = self.mesh.lattice().cells().map(|n| n as isize);
         let periodic = self.mesh.lattice().periodic();
         let exists = |cell: [isize; 2]| (0..2).all(|d| periodic[d] || (0..cells[d]).contains(&cell[d]));
         let mut cell: [isize; 2] =
-            std::array::from_fn(|d| if periodic[d] { start[d] } else { start[d].min(cells[d] - 1) });
+            std::array::from_fn(|d| if periodic[d] { start[d] } else { start[d].clamp(0, cells[d] - 1) });
         let (near, extent) = (self.corner(cell).1, self.mesh.extent());
         let point: [f64; 2] = std::array::from_fn(|d| match periodic[d] {
             true => point[d] - extent[d] * ((point[d] - near[d]) / extent[d]).round(),
@@ -102,14 +109,14 @@ impl Cells<'_> {
                 None => break,
             }
         }
-        self.triangle(point, cell)
+        (cell, self.triangle(point, cell))
     }
 
     /// Of all triangles the one that holds a point, or is nearest to it.
-    fn nearest(&self, point: [f64; 2]) -> Triangle {
+    fn nearest(&self, point: [f64; 2]) -> ([isize; 2], Triangle) {
         let (cells, extent) = (self.mesh.lattice().cells().map(|n| n as isize), self.mesh.extent());
         let periodic = self.mesh.lattice().periodic();
-        let mut best = (f64::INFINITY, self.triangle(point, [0, 0]));
+        let mut best = (f64::INFINITY, ([0, 0], self.triangle(point, [0, 0])));
         for cell in (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| [i, j])) {
             let near = self.corner(cell).1;
             let about = |d: usize| match periodic[d] {
@@ -121,7 +128,7 @@ impl Cells<'_> {
             let edges = [(a, b), (b, c), (c, d), (d, a)];
             let off = edges.into_iter().map(|(p, q)| outside(point, p, q)).fold(0.0, f64::max);
             if off < best.0 {
-                best = (off, self.triangle(point, cell));
+                best = (off, (cell, self.triangle(point, cell)));
             }
         }
         best.1
