@@ -1,12 +1,13 @@
-//! What a whole step costs a node, from small lattices to large ones: density, mesh, Burgers' equation, quality and error.
+//! What a whole step costs a node, from small lattices to large ones: density, mesh, Burgers' equation, quality and
+//! error.
 //!
 //!     cargo bench -p driftmesh --bench whole_step
 //!
-//! One thread, automatic relaxation, steps of a given length; the adapted start stands beside. First the front is as many
-//! cells wide on each lattice and steps shrink with it, then front and steps stay the same.
+//! One thread, automatic relaxation, steps of a given length; the adapted start stands beside. First the front is as
+//! many cells wide on each lattice and steps shrink with it, then front and steps stay the same.
 
 use driftmesh::simulation::Record;
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Kind, MovingMesh, Source};
 
 const STEPS: usize = 8;
 
@@ -29,7 +30,8 @@ fn row(n: usize, viscosity: f64, first: &mut Option<f64>) -> driftmesh::Result<(
     let (step, start) = (2.0 * viscosity, 0.5);
     let end = start + STEPS as f64 * step;
     let text = format!(
-        "[study]\nname = \"step\"\nkind = \"moving-mesh\"\n[grid]\ncells = [{n}, {n}]\n[time]\nstart = {start}\nend = {end}\n\
+        "[study]\nname = \"step\"\nkind = \"moving-mesh\"\n[grid]\ncells = [{n}, {n}]\n[time]\nstart = {start}\nend \
+         = {end}\n\
          step = {step}\n[pde]\nkind = \"burgers\"\nviscosity = {viscosity}\n"
     );
     let study = MovingMesh::from_source(&Source::new("whole_step.toml", text))?;

@@ -9,7 +9,7 @@
 mod line;
 
 use driftmesh::formula::{Formula, Program};
-use driftmesh::study::{EquidistributionStudy, Source, Study};
+use driftmesh::study::{EquidistributionStudy, Kind, Source, Study};
 
 /// A formula, its derivatives, and both ways to evaluate them.
 pub fn formula(data: &[u8]) {
@@ -68,6 +68,7 @@ pub fn checkpoint(data: &[u8]) {
     }
 }
 
-/// The studies of the corpus: `driftmesh run` leaves a checkpoint of them when it is interrupted; its first 55 bytes go.
+/// The studies of the corpus: `driftmesh run` leaves a checkpoint of them when it is interrupted; its first 55 bytes
+/// go.
 const MOVING: &str = include_str!("studies/moving.toml");
 const FRONT: &str = include_str!("studies/front.toml");
