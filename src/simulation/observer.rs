@@ -37,7 +37,8 @@ pub struct Snapshot<'a> {
     pub seconds: f64,
     /// Positions of the nodes of a mesh in two dimensions, in lattice order; empty for a line.
     pub nodes: &'a [[f64; 2]],
-    /// Makes what can be drawn of this moment: not for nothing, so that it is made where somebody asks.
+    /// Makes the scene of this moment. It is a function, since a scene costs as much as a small step and most steps are
+    /// not drawn.
     pub scene: &'a dyn Fn() -> Scene,
     /// More of a simulation of a moving mesh; none of a run of another kind.
     pub moving: Option<Moving<'a>>,

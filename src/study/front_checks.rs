@@ -26,7 +26,7 @@ impl Kind for StefanStudy {
         (&self.study, &self.output)
     }
 
-    /// A start that is none is refused, too.
+    /// Refuses a start that no run can begin with, too.
     fn resolve(&mut self) -> Result<()> {
         self.begin().map(|_| ())
     }
@@ -174,7 +174,7 @@ impl StefanStudy {
         }
     }
 
-    /// The setting behind a start that is none.
+    /// Says which setting makes a start that no run can begin with.
     fn blame(&self, error: Error) -> Error {
         let Error::Failed { failure, .. } = &error else { return error };
         let key = match (failure, self.exact.as_ref().map(|exact| exact.kind)) {

@@ -14,15 +14,16 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
-/// Automatic steps are at most this share of what is stable …
+/// Automatic steps of an explicit front are at most this share of the longest stable one.
 const OF_THE_LIMIT: f64 = 0.5;
-/// … and this part of the run.
+/// Automatic steps of an explicit front are at most the whole run over this number.
 const PARTS: f64 = 50.0;
-/// An implicit front has no limit but accuracy.
+/// Automatic steps of an implicit front are the whole run over this number: accuracy alone limits them.
 const IMPLICIT_PARTS: f64 = 100.0;
-/// How often an automatic step that fails is halved. Each begins anew, so that a run that goes on takes the same steps.
+/// How often an automatic step that fails is halved before the run fails. The next step has its whole length again, so
+/// that a run that goes on from a checkpoint takes the same steps.
 const HALVINGS: i32 = 6;
-/// Fronts drawn over time.
+/// Fronts that the picture over time shows, about.
 const CURVES: usize = 16;
 
 /// A front while it runs.
@@ -51,7 +52,7 @@ pub struct FrontCourse {
     warnings: Vec<String>,
     /// Times and fronts, some of them.
     fronts: Vec<(f64, Vec<f64>)>,
-    /// Of a checkpoint: what frames, tables and observers had put there.
+    /// In a checkpoint, what frames, tables and observers carry; empty in a run.
     kept: Kept,
 }
 
@@ -145,7 +146,7 @@ impl FrontRun {
         }
     }
 
-    /// Tells of the state after an event, at the end of a step of this length.
+    /// Shows the state; `dt` is the length of the step that led to it.
     fn tell(&mut self, event: Event, dt: f64, stage: &mut Stage<'_>) -> Result<()> {
         stage.output(|stage| {
             let mut tables = self.tables.take();

@@ -42,7 +42,8 @@ pub trait Kind: Clone + Serialize + DeserializeOwned {
         true
     }
 
-    /// Tries what a check of the settings alone does not tell, as far as that takes no time.
+    /// Computes the state at the start where that takes no time, so that a check of the study finds what is wrong with
+    /// it.
     ///
     /// # Errors
     /// [`Error::Failed`] with what a run would end with at its start.
@@ -117,8 +118,8 @@ pub trait Running: Sized {
     /// [`Error::Failed`] with the time and step of a numerical failure, or what an observer or a full disk returned.
     fn go(&mut self, stage: &mut Stage<'_>) -> Result<()>;
 
-    /// Goes to a checkpoint, and in a directory behind those rows of its own tables that the checkpoint knows of.
-    /// Returns the seconds up to it, and what observers had put there.
+    /// Takes up a checkpoint. In a directory, tables of its own are cut back to the rows that they had then. Returns
+    /// the seconds up to the checkpoint, and what observers had put there.
     ///
     /// # Errors
     /// [`Unfit`] where it cannot be one of this study, or where the tables are not there.
@@ -141,7 +142,8 @@ pub trait Running: Sized {
         format!("t = {}", moment(scene.t))
     }
 
-    /// Ends what it began to write, after a failure, too, and writes arrays and pictures of this kind alone.
+    /// Writes what runs of other kinds do not have: rows that wait for their file, arrays, pictures. Called once at the
+    /// end, after a failure, too.
     ///
     /// # Errors
     /// [`Error::Unwritable`], or what hinders drawing.
@@ -152,7 +154,7 @@ pub trait Running: Sized {
     /// Puts figures, seconds of its parts and warnings into a summary.
     fn tell(&self, summary: &mut Summary<Self::Figures>);
 
-    /// Adds warnings of what came before.
+    /// Adds warnings: those of the settings, and of checkpoints that would not do.
     fn warn(&mut self, warnings: Vec<String>);
 }
 

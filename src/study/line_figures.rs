@@ -131,11 +131,13 @@ pub struct StepRow {
     pub shortest_cell: f64,
 }
 
-/// Nodes compared with the continuous mesh, and cells over which M is integrated to round-off.
+/// Nodes that are compared with the continuous mesh, at most.
 const COMPARED: usize = 1000;
+/// Cells of a line up to which M is integrated to round-off; in more of them the trapezoidal rule is as good.
 const EXACTLY: usize = 100_000;
-/// Places at which the density is looked at, and a share of ∫M that tells of a layer unseen.
+/// Places at which the density is looked at for layers between the nodes.
 const PLACES: usize = 20_000;
+/// A difference between ∫M over the cells and ∫M, as a share of it, that tells of a layer which the cells miss.
 const NOTICEABLE: f64 = 0.2;
 
 impl LineFigures {

@@ -16,7 +16,7 @@ use std::io::Cursor;
 const DRAWN: usize = 400;
 /// Places between two nodes at which M is drawn.
 const BETWEEN: usize = 8;
-/// Cells over which M is integrated to round-off; of more each is as good as its trapezoid.
+/// Cells of a line up to which M is integrated to round-off in frames; in more of them the trapezoidal rule is as good.
 const EXACTLY: usize = 10_000;
 /// Paths of nodes drawn in time.
 const PATHS: usize = 40;

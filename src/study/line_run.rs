@@ -46,7 +46,7 @@ pub struct LineCheckpoint {
     kept: Kept,
 }
 
-/// Seconds of a run in time after which it writes the history of its steps.
+/// Seconds between two writings of `history.csv` while a mesh moves.
 const SECONDS_UNSEEN: f64 = 1.0;
 
 /// A line while its mesh is found, or moves.
@@ -142,7 +142,7 @@ impl LineRun {
         self.schedule.as_ref().and_then(Schedule::steps).unwrap_or(1)
     }
 
-    /// Tells of the newest mesh after an event, at the end of a step of this length.
+    /// Shows the newest mesh; `dt` is the length of the step that led to it.
     fn tell(&mut self, event: Event, dt: f64, stage: &mut Stage<'_>) -> Result<()> {
         let Evolution { done: step, newest, .. } = &self.evolution;
         let [start, t, end] = [0, *step, self.steps()].map(|step| self.time(step));

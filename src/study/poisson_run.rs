@@ -91,8 +91,9 @@ pub struct Solved {
     seconds: PoissonParts,
 }
 
-/// Meshes below this many nodes are timed several times.
+/// Nodes times passes: small meshes have their stencils computed several times, and the shortest time counts.
 const SMALL: usize = 100_000;
+/// The most passes beside the first one.
 const SMALL_PASSES: usize = 5;
 
 impl PoissonStudy {

@@ -36,7 +36,7 @@ pub struct Finished<R: Running> {
 pub struct Stage<'a> {
     /// Where the run writes; nowhere if nothing is to be left.
     pub(super) directory: Option<&'a RunDirectory>,
-    /// With what the run begins: [`Event::Started`] or [`Event::Resumed`].
+    /// The event with which the run begins: [`Event::Started`] or [`Event::Resumed`].
     pub(super) begins: Event,
     frames: Option<Frames>,
     watchers: Vec<&'a mut dyn Observer>,
@@ -73,8 +73,9 @@ impl<'a> Stage<'a> {
         (observers, self.checkpoints.as_mut())
     }
 
-    /// Tells everybody of an event. After all but the last a checkpoint is written where one is due, made by `keep`
-    /// from the seconds up to now and what observers carry; and the run ends where somebody asks for that.
+    /// Shows an event to all observers. Unless it is the end of the run, a checkpoint is written where one is due,
+    /// which `keep` makes of the seconds up to now and of what observers carry, and the run ends where an observer asks
+    /// for that.
     ///
     /// # Errors
     /// What an observer returned; [`Error::Unwritable`]; [`Error::Interrupted`].
@@ -105,7 +106,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Counts the seconds of what is no computation as output.
+    /// Does something that is no computation, and counts its seconds as those of output.
     pub(super) fn output<T>(&mut self, write: impl FnOnce(&mut Self) -> T) -> T {
         let began = Instant::now();
         let result = write(self);
@@ -113,7 +114,7 @@ impl<'a> Stage<'a> {
         result
     }
 
-    /// Counts the seconds of another run beside this one nowhere.
+    /// Does something whose seconds count nowhere, such as another run that this one is compared with.
     pub(super) fn beside<T>(&mut self, other: impl FnOnce(&mut Self) -> T) -> T {
         let before = self.clock.elapsed();
         let result = other(self);
@@ -191,7 +192,7 @@ pub(super) fn run<K: Kind>(
 /// What runs, at a checkpoint, with the frames that were there by then and the seconds that it took.
 type TakenUp<R> = (R, Frames, SpentBy<R>);
 
-/// Goes to a checkpoint, and in the directory to where the files were then.
+/// Takes up a checkpoint, and takes the files of the directory back to what they were then.
 fn take_up<K: Kind>(study: &K, path: &Path, found: <K::Run as Running>::Checkpoint) -> Result<TakenUp<K::Run>, Unfit> {
     let mut run = begun(study)?;
     let (before, kept) = run.resume(found, Some(path))?;
