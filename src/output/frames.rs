@@ -5,6 +5,7 @@ use crate::geometry::Lattice;
 use crate::kept::Kept;
 use crate::meshing::Decomposition;
 use crate::output::write_file;
+use crate::parallel::map;
 use crate::simulation::{Event, Observer, Scene, Snapshot, Values};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -141,20 +142,41 @@ impl Frames {
         Self { directory, at, subdomains, names, grid: None, nodes: [None, None], written: Vec::new(), writer: None }
     }
 
-    /// Writes one frame, unless its step has one already. The series is complete after every call.
+    /// Writes a frame of each scene whose step has none yet, side by side. The series is complete after every call.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub fn write(&mut self, scene: Scene) -> Result<()> {
-        self.start(scene)?;
-        self.wait()
+    pub fn write(&mut self, scenes: Vec<Scene>) -> Result<()> {
+        self.wait()?;
+        let mut new = Vec::new();
+        for scene in scenes {
+            let entered = self.entered(scene)?;
+            new.extend(entered.map(|scene| (self.directory.join(self.name(scene.step)), scene)));
+        }
+        let Some(grid) = self.grid.as_ref().filter(|_| !new.is_empty()) else { return Ok(()) };
+        let written = map(&new, |(path, scene)| write_file(path, grid.document(scene).as_bytes()));
+        written.into_iter().collect::<Result<()>>()?;
+        write_file(&self.directory.join(self.names[1]), self.series().as_bytes())
     }
 
-    /// The same, with compressing and writing left to a thread beside the run.
-    fn start(&mut self, mut scene: Scene) -> Result<()> {
+    /// The same with one scene, compressed and written by a thread beside the run.
+    fn start(&mut self, scene: Scene) -> Result<()> {
         self.wait()?;
+        if let (Some(scene), Some(grid)) = (self.entered(scene)?, self.grid.clone()) {
+            let series = self.series();
+            let [frame, index] = [self.name(scene.step).as_str(), self.names[1]].map(|name| self.directory.join(name));
+            self.writer.get_or_insert_with(Writer::start).write(Box::new(move || {
+                write_file(&frame, grid.document(&scene).as_bytes())?;
+                write_file(&index, series.as_bytes())
+            }));
+        }
+        Ok(())
+    }
+
+    /// Enters a scene in the series, with what every frame has; none where its step has a frame.
+    fn entered(&mut self, mut scene: Scene) -> Result<Option<Scene>> {
         if self.written.iter().any(|(_, written)| *written == scene.step) {
-            return Ok(());
+            return Ok(None);
         }
         if scene.cells[1] > 0 {
             self.complete(&mut scene)?;
@@ -163,16 +185,10 @@ impl Frames {
             let folder = self.directory.join(self.names[0]);
             std::fs::create_dir_all(&folder)
                 .map_err(|error| Error::Unwritable { path: folder, reason: error.to_string() })?;
+            self.grid = Some(Arc::new(vtu::Grid::new(scene.cells)));
         }
         self.written.push((scene.t, scene.step));
-        let series = self.series();
-        let grid = self.grid.get_or_insert_with(|| Arc::new(vtu::Grid::new(scene.cells))).clone();
-        let [frame, index] = [self.name(scene.step).as_str(), self.names[1]].map(|name| self.directory.join(name));
-        self.writer.get_or_insert_with(Writer::start).write(Box::new(move || {
-            write_file(&frame, grid.document(&scene).as_bytes())?;
-            write_file(&index, series.as_bytes())
-        }));
-        Ok(())
+        Ok(Some(scene))
     }
 
     /// Adds what every frame of a mesh in two dimensions has.
@@ -265,7 +281,7 @@ impl Observer for Frames {
         match event {
             Event::Resumed => Ok(()),
             Event::Stepped if !self.at.due(snapshot.step, snapshot.t, snapshot.dt) => Ok(()),
-            Event::Finished => self.write((snapshot.scene)()),
+            Event::Finished => self.write(vec![(snapshot.scene)()]),
             _ => self.start((snapshot.scene)()),
         }
     }

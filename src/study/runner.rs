@@ -253,7 +253,7 @@ fn leave<R: Running>(run: &mut R, stage: &mut Stage<'_>, directory: &RunDirector
     };
     let last = scenes.last().cloned();
     let written = match &mut stage.frames {
-        Some(frames) => scenes.into_iter().try_for_each(|scene| frames.write(scene)),
+        Some(frames) => frames.write(scenes),
         None => Ok(()),
     };
     (last, left.and(written))
