@@ -139,22 +139,22 @@ impl PoissonStudy {
                 let sources: Vec<bool> = counts.iter().map(|counts| *counts && data.source.is_none()).collect();
                 let everywhere = vec![true; lattice.len()];
                 let needed = [&everywhere, &slopes, &slopes, &sources, &sources];
-                Some(values(&mesh, "exact.u or a derivative of it", program, needed)?)
+                Some(values(mesh, "exact.u or a derivative of it", program, needed)?)
             }
             None => None,
         };
         let source = match &data.source {
-            Some(program) => values(&mesh, "equation.source", program, [&counts])?.into_iter().map(|[f]| f).collect(),
+            Some(program) => values(mesh, "equation.source", program, [&counts])?.into_iter().map(|[f]| f).collect(),
             None => known.iter().flatten().map(|[_, _, _, xx, yy]| xx + yy).collect::<Vec<f64>>(),
         };
         let mut side = match &data.boundary {
-            Some(program) => values(&mesh, "equation.boundary", program, [&given])?.into_iter().map(|[u]| u).collect(),
+            Some(program) => values(mesh, "equation.boundary", program, [&given])?.into_iter().map(|[u]| u).collect(),
             None => known.iter().flatten().map(|v| v[0]).collect::<Vec<f64>>(),
         };
-        let flux = data.flux.as_ref().map(|program| values(&mesh, "equation.flux", program, [&flows])).transpose()?;
+        let flux = data.flux.as_ref().map(|program| values(mesh, "equation.flux", program, [&flows])).transpose()?;
         for index in lattice.sides() {
             if let Some(at) = problem.neumann_side(lattice, index) {
-                let n = outward(&mesh, index, at);
+                let n = outward(mesh, index, at);
                 side[index] = match (&flux, &known) {
                     (Some(flux), _) => flux[index][0],
                     (None, known) => {
