@@ -2,7 +2,7 @@
 //!
 //!     cargo bench -p driftmesh --bench checkpoint
 
-use driftmesh::study::{MovingMesh, Source, run};
+use driftmesh::study::{Begin, Kind, MovingMesh, Source};
 use std::path::Path;
 
 const STEPS: usize = 40;
@@ -16,7 +16,7 @@ fn main() -> driftmesh::Result<()> {
         let sets =
             ["grid.cells=[160, 160]", &end, "time.report=[]", "output.report=false", "output.frames.every=1000", at];
         sets.iter().try_for_each(|set| source.set(set))?;
-        Ok(run(&MovingMesh::from_source(&source)?, &place, &mut [])?.summary.seconds.wall)
+        Ok(MovingMesh::from_source(&source)?.run(&place, Begin::Anew, &mut [])?.summary.seconds.wall)
     };
     // turn by turn, so that both meet the same neighbours on the machine
     let [mut with, mut without] = [f64::INFINITY; 2];

@@ -7,7 +7,7 @@ use driftmesh::geometry::Patch;
 use driftmesh::meshing::{MeshGenerator, Mmpde, Moved, Whole};
 use driftmesh::numerics::linear::{Bicgstab, LatticeMatrix, LinearSolver, SparseLu};
 use driftmesh::simulation::{Record, State};
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Kind, MovingMesh, Source};
 use ndarray::{Array1, Array2};
 use std::time::Instant;
 

@@ -7,7 +7,7 @@
 //! many cells wide on each lattice and steps shrink with it, then front and steps stay the same.
 
 use driftmesh::simulation::Record;
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Kind, MovingMesh, Source};
 
 const STEPS: usize = 8;
 

@@ -5,7 +5,7 @@
 pub mod dice;
 
 use dice::Dice;
-use driftmesh::study::EquidistributionStudy;
+use driftmesh::study::{EquidistributionStudy, Kind};
 
 /// The text of a study of the density `[density]`: averages, method, subdomains, tolerances and first mesh by the dice.
 pub fn text(dice: &mut Dice, density: &str) -> String {
@@ -46,12 +46,12 @@ pub fn text(dice: &mut Dice, density: &str) -> String {
 /// # Errors
 /// What is wrong.
 pub fn ending(study: &EquidistributionStudy) -> Result<&'static str, String> {
-    let mut evolution = Default::default();
-    let outcome = study.problem().and_then(|line| study.compute(&line, &mut evolution));
-    match outcome {
-        Ok(()) if !evolution.mesh().is_sorted_by(|a, b| a < b) => Err("completed out of order".into()),
-        Ok(()) => Ok("completed"),
-        Err(driftmesh::Error::Failed { failure, .. }) => Ok(failure.name()),
-        Err(other) => Err(format!("ended without a name: {other}")),
+    match study.compute() {
+        Ok((run, None)) if !run.evolution.mesh().is_sorted_by(|a, b| a < b) => Err("completed out of order".into()),
+        Ok((_, None)) => Ok("completed"),
+        Ok((_, Some(driftmesh::Error::Failed { failure, .. }))) | Err(driftmesh::Error::Failed { failure, .. }) => {
+            Ok(failure.name())
+        }
+        Ok((_, Some(other))) | Err(other) => Err(format!("ended without a name: {other}")),
     }
 }

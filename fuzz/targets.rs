@@ -9,7 +9,7 @@
 mod line;
 
 use driftmesh::formula::{Formula, Program};
-use driftmesh::study::{EquidistributionStudy, Source, Study};
+use driftmesh::study::{EquidistributionStudy, Kind, Source, Study};
 
 /// A formula, its derivatives, and both ways to evaluate them.
 pub fn formula(data: &[u8]) {

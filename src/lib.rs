@@ -36,7 +36,8 @@
 //! Laplacians on any structured mesh are in [`laplacian`], moving phase boundaries in [`stefan`], meshes on a line in
 //! [`equidistribution`].
 //!
-//! Whole studies come from TOML files: [`study::MovingMesh`] reads one, [`study::run`] runs it into a directory.
+//! Whole studies come from TOML files: [`study::Study`] reads one of any kind and runs it into a directory; a
+//! [`study::Kind`] does so with one of its kind, and returns what was found.
 //!
 //! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`],
 //! [`equidistribution`], [`laplacian`], [`meshing`] and [`physics`], then [`mover`] and [`stefan`], then

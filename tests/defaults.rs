@@ -2,7 +2,7 @@
 
 use driftmesh::meshing::{Mmpde, Whole};
 use driftmesh::mover::Mover;
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Kind, MovingMesh, Source};
 
 /// A study that says as little as it may.
 fn resolved(more: &str) -> MovingMesh {

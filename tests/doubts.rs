@@ -2,7 +2,7 @@
 
 use driftmesh::Error;
 use driftmesh::simulation::Record;
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 
 fn study(time: &str, pde: &str, more: &str) -> MovingMesh {
     let text = format!(
@@ -14,7 +14,7 @@ fn study(time: &str, pde: &str, more: &str) -> MovingMesh {
 
 /// The warnings of a run, which completes.
 fn warnings(study: &MovingMesh) -> Vec<String> {
-    let (summary, failure) = compute(study).unwrap();
+    let (MovingRun { record: summary, .. }, failure) = study.compute().unwrap();
     assert!(failure.is_none(), "{failure:?}");
     summary.warnings
 }
@@ -128,7 +128,7 @@ fn noise_is_named() {
 fn steps_that_vanish_say_why() {
     let pde = "kind = \"formula\"\nunknowns = [\"u\"]\nsource = { u = \"u^2\" }\ndiffusivity = { u = \"1e-4\" }\n\
                initial = { u = \"1 + exp(-((x-0.5)^2 + (y-0.5)^2)/0.1^2)\" }\nboundary = { u = \"no-flux\" }";
-    let failed = |study: &MovingMesh| match compute(study).unwrap().1 {
+    let failed = |study: &MovingMesh| match study.compute().unwrap().1 {
         Some(error @ Error::Failed { .. }) => (error.to_string(), study.remedy(&error).unwrap()),
         other => panic!("{other:?}"),
     };

@@ -1,6 +1,6 @@
 //! Studies of kind `equidistribution`: what they leave, and what they refuse.
 
-use driftmesh::study::{EquidistributionStudy, LineFinished, Source, Study};
+use driftmesh::study::{Begin, EquidistributionStudy, Finished, Kind, LineRun, Source, Study};
 use driftmesh::{Error, Failure};
 use serde_json::Value;
 use std::path::Path;
@@ -10,14 +10,14 @@ fn source(name: &str) -> Source {
 }
 
 /// Runs a study of `studies/` with settings on top, and reads its summary.
-fn run(name: &str, set: &[&str]) -> (LineFinished, Value) {
+fn run(name: &str, set: &[&str]) -> (Finished<LineRun>, Value) {
     let mut source = source(name);
     set.iter().for_each(|assignment| source.set(assignment).unwrap());
     let Study::Equidistribution(study) = Study::from_source(&source).unwrap() else {
         panic!("{name} is of another kind")
     };
     let out = tempfile::tempdir().unwrap();
-    let finished = study.run(&out.path().join("run")).unwrap();
+    let finished = study.run(&out.path().join("run"), Begin::Anew, &mut []).unwrap();
     let at = |file: &str| out.path().join("run").join(file);
     let files = ["study.toml", "history.csv", "final.npz", "mesh.png", "mesh.svg"];
     files.into_iter().for_each(|file| assert!(at(file).is_file(), "{name} leaves no {file}"));
@@ -205,12 +205,12 @@ fn in_time() {
     let (finished, summary) = run("moving-front-1d", &["output.frames.every=1"]);
     let per = &summary["iterations_per_step"];
     assert!((per["mean"].as_f64().unwrap() - 75.5).abs() < 0.5, "{per}");
-    assert_eq!(finished.evolution.meshes.len(), 101);
+    assert_eq!(finished.run.evolution.meshes.len(), 101);
     for (n, expected) in [(0, [0.4031, 0.4379]), (50, [0.4465, 0.4617]), (100, [0.4967, 0.5032])] {
-        let mesh = &finished.evolution.meshes[n];
+        let mesh = &finished.run.evolution.meshes[n];
         assert!((mesh[45] - expected[0]).abs() < 6e-5 && (mesh[55] - expected[1]).abs() < 6e-5, "{n}");
     }
-    assert!(finished.evolution.meshes.iter().all(|mesh| mesh.windows(2).all(|x| x[1] > x[0])));
+    assert!(finished.run.evolution.meshes.iter().all(|mesh| mesh.windows(2).all(|x| x[1] > x[0])));
     // the same mesh without subdomains
     let text =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/moving-front-1d.toml")).unwrap();
@@ -218,9 +218,15 @@ fn in_time() {
     let study =
         EquidistributionStudy::from_source(&Source::new("whole", format!("{}{}", &text[..before], &text[after..])))
             .unwrap();
-    let mut whole = driftmesh::study::Evolution::default();
-    study.compute(&study.problem().unwrap(), &mut whole).unwrap();
-    let off = whole.mesh().iter().zip(finished.evolution.mesh()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let (whole, failure) = study.compute().unwrap();
+    assert!(failure.is_none());
+    let off = whole
+        .evolution
+        .mesh()
+        .iter()
+        .zip(finished.run.evolution.mesh())
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
     assert!(off < 1e-7, "{off:e}");
     // a step that misses its tolerance names itself
     let (finished, _) = run("moving-front-1d", &["stop.iterations=70"]);

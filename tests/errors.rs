@@ -9,7 +9,7 @@ use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use driftmesh::output::RunDirectory;
 use driftmesh::physics::{Burgers, Convection, FormulaPde, Motion, Physics, Prescribed, ShallowWater, UniformBurgers};
 use driftmesh::simulation::Schedule;
-use driftmesh::study::{Begin, MovingMesh, Source};
+use driftmesh::study::{Begin, Kind, MovingMesh, Source};
 use driftmesh::{Error, Failure};
 use std::collections::BTreeSet;
 use std::sync::Mutex;
@@ -181,7 +181,7 @@ fn vanishing_step() {
                 diffusivity = { u = \"1e-4\" }\n\
                 initial = { u = \"1 + exp(-((x-0.5)^2 + (y-0.5)^2)/0.1^2)\" }\nboundary = { u = \"no-flux\" }";
     let study = MovingMesh::from_source(&Source::new("blow-up.toml", text)).unwrap();
-    let (_, failure) = driftmesh::study::compute(&study).unwrap();
+    let (_, failure) = study.compute().unwrap();
     let message = ["time steps shrank to", "the solution grows faster than any step can follow"];
     assert_says(failure.unwrap(), &message, Some("the end of the run"), true);
 }
@@ -528,7 +528,7 @@ impl driftmesh::simulation::Observer for Impatient {
         _event: driftmesh::simulation::Event,
         snapshot: &driftmesh::simulation::Snapshot<'_>,
     ) -> driftmesh::Result<()> {
-        let state = snapshot.state;
+        let state = snapshot.state().unwrap();
         match state.step {
             3 => Err(Error::Interrupted(driftmesh::error::Moment { t: state.t, step: state.step })),
             _ => Ok(()),

@@ -3,7 +3,7 @@
 use driftmesh::geometry::{DualCells, Field, Lattice, Mesh};
 use driftmesh::physics::{FormulaPde, Motion, Physics};
 use driftmesh::simulation::Record;
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 use driftmesh::{Error, Failure};
 
 fn physics(text: &str) -> Box<dyn Physics> {
@@ -267,7 +267,7 @@ fn study(assignments: &[&str]) -> Result<MovingMesh, Error> {
 }
 
 fn computed(assignments: &[&str]) -> Result<Record, Error> {
-    let (record, failure) = compute(&study(assignments)?)?;
+    let (MovingRun { record, .. }, failure) = study(assignments)?.compute()?;
     failure.map_or(Ok(record), Err)
 }
 
@@ -373,7 +373,7 @@ fn meshes_follow_what_they_are_told() {
         let mut source = Source::new("dam.toml", include_str!("../studies/dam-break.toml"));
         short.iter().chain([&format!("monitor.of={of}").as_str()]).for_each(|set| source.set(set).unwrap());
         let study = MovingMesh::from_source(&source).unwrap();
-        let (record, failure) = compute(&study).unwrap();
+        let (MovingRun { record, .. }, failure) = study.compute().unwrap();
         assert!(failure.is_none(), "{failure:?}");
         record.reports[0].quality
     };

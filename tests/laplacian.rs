@@ -2,7 +2,7 @@
 
 use driftmesh::geometry::{Lattice, Mesh};
 use driftmesh::laplacian::{Laplacian, stencils};
-use driftmesh::study::{PoissonStudy, Source};
+use driftmesh::study::{Kind, PoissonStudy, Source};
 
 const MODEL: &str = "[domain]\nx = [0.0, 1.5707963267948966]\nbottom = \"0\"\ntop = \"1 + cos(x)/4\"\n";
 

@@ -5,7 +5,7 @@ mod drawn;
 
 use drawn::dice::Dice;
 use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
-use driftmesh::study::{EquidistributionStudy, Source};
+use driftmesh::study::{EquidistributionStudy, Kind, Source};
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;

@@ -5,7 +5,7 @@ use driftmesh::geometry::{Lattice, Mesh, check_unfolded};
 use driftmesh::meshing::{Form, Whole};
 use driftmesh::mover::{Ending, Followed, Gait, Mover, adapted};
 use driftmesh::simulation::Record;
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 use std::f64::consts::PI;
 
 /// Steps of a mover with nothing set, from equal cells, after u(x, step); `watch` sees each new mesh and the way of its
@@ -196,7 +196,7 @@ impl Problem {
     }
 
     fn l2(&self, set: &[&str]) -> f64 {
-        let (record, failure) = compute(&self.study(set)).unwrap();
+        let (MovingRun { record, .. }, failure) = self.study(set).compute().unwrap();
         assert!(failure.is_none(), "{}: {failure:?}", self.name);
         record.reports.last().unwrap().error.unwrap().l2
     }
@@ -330,7 +330,7 @@ fn a_wave_goes_round_and_round() {
     for sharpness in [50, 400] {
         let exact = format!("exp({sharpness}*(cos(2*pi*(x - T)) - 1))");
         let wave = problem("a wave", strip, [0.0, 10.0], AROUND, &exact);
-        let (record, failure) = compute(&wave.study(&["time.report=[1.0, 10.0]"])).unwrap();
+        let (MovingRun { record, .. }, failure) = wave.study(&["time.report=[1.0, 10.0]"]).compute().unwrap();
         assert!(failure.is_none(), "{failure:?}");
         let [first, last] = [0, 1].map(|k| record.reports[k].error.unwrap().linf);
         assert!(
@@ -345,7 +345,8 @@ fn a_wave_goes_round_and_round() {
 #[test]
 fn a_saw_tooth_forms_on_a_periodic_mesh() {
     let pde = "kind = \"burgers\"\nviscosity = 1e-3\ninitial = \"0.75 + 0.5*sin(2*pi*(x + y))\"";
-    let (record, failure) = compute(&problem("a saw tooth", TORUS, [0.0, 5.0], pde, "").study(&[])).unwrap();
+    let (MovingRun { record, .. }, failure) =
+        problem("a saw tooth", TORUS, [0.0, 5.0], pde, "").study(&[]).compute().unwrap();
     assert!(failure.is_none() && record.work.steps < 300, "{failure:?} after {:?}", record.work);
 }
 
@@ -364,7 +365,7 @@ fn the_journey_harms_nothing() {
                 exact: format!("0.5*(1 - tanh((x - 1)/{width}))"),
             };
             let study = study.study(&["mesh.start=uniform", &format!("time.step={step}")]);
-            let (record, failure) = compute(&study).unwrap();
+            let (MovingRun { record, .. }, failure) = study.compute().unwrap();
             let error = record.reports[0].error.unwrap().linf;
             assert!(failure.is_none() && error <= 5e-3, "{cells} cells, width {width}, Δt = {step}: {error:e}");
         }
@@ -420,7 +421,7 @@ fn a_fixed_mesh_stays() {
 fn a_small_step_is_no_worse_than_a_long_one() {
     let study = include_str!("../studies/burgers.toml").replace("end = 1.25", "end = 1.25\nstep = 2e-3");
     let study = MovingMesh::from_source(&Source::new("the study", study)).unwrap();
-    let (summary, failure) = compute(&study).unwrap();
+    let (MovingRun { record: summary, .. }, failure) = study.compute().unwrap();
     assert!(failure.is_none() && summary.work.steps == 500);
     for report in summary.reports {
         let error = report.error.unwrap().linf;
@@ -458,7 +459,8 @@ fn the_way_back_to_equal_cells_harms_nothing() {
                  [mesh]\ngenerator = {{ kind = \"{generator}\" }}\n",
                 w * w
             );
-            let (summary, failure) = compute(&MovingMesh::from_source(&Source::new("pulse", text)).unwrap()).unwrap();
+            let (MovingRun { record: summary, .. }, failure) =
+                MovingMesh::from_source(&Source::new("pulse", text)).unwrap().compute().unwrap();
             assert!(failure.is_none(), "{failure:?}");
             summary.reports.iter().map(|report| report.error.unwrap().l2).collect::<Vec<f64>>()
         };
@@ -482,7 +484,8 @@ fn a_layer_that_begins_at_a_side_is_seen() {
              boundary = {{ u = \"if(x < 0.5, 1, 0)\" }}\n\
              exact = {{ u = \"if(x <= 0, 1, 1 - erf(x/sqrt(4*{diffusivity}*max(t, 1e-14))))\" }}\n"
         );
-        let (summary, failure) = compute(&MovingMesh::from_source(&Source::new("wall", text)).unwrap()).unwrap();
+        let (MovingRun { record: summary, .. }, failure) =
+            MovingMesh::from_source(&Source::new("wall", text)).unwrap().compute().unwrap();
         assert!(failure.is_none(), "{failure:?}");
         let errors: Vec<f64> = summary.reports.iter().map(|report| report.error.unwrap().l2).collect();
         assert!(errors.iter().all(|error| *error < 6e-3), "{cells} cells, D = {diffusivity}: {errors:?}");
@@ -504,7 +507,8 @@ fn given_jumps_complete() {
             "[study]\nname = \"jump\"\nkind = \"moving-mesh\"\n[grid]\ncells = [24, 24]\n[time]\nstart = 0.0\n\
              end = 0.1\n[pde]\nkind = \"prescribed\"\nu = \"{u}\"\n"
         );
-        let (summary, failure) = compute(&MovingMesh::from_source(&Source::new("jump", text)).unwrap()).unwrap();
+        let (MovingRun { record: summary, .. }, failure) =
+            MovingMesh::from_source(&Source::new("jump", text)).unwrap().compute().unwrap();
         assert!(failure.is_none() && summary.work.steps <= 1000, "{u}: {failure:?}");
     }
 }

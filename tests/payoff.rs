@@ -2,7 +2,7 @@
 
 use driftmesh::geometry::Mesh;
 use driftmesh::simulation::Record;
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 
 /// A study of the front with nothing but these set.
 fn front(viscosity: f64, cells: usize, end: f64, set: &[&str]) -> MovingMesh {
@@ -19,7 +19,7 @@ fn front(viscosity: f64, cells: usize, end: f64, set: &[&str]) -> MovingMesh {
 
 /// l_inf at the end, and the number of steps.
 fn run(study: &MovingMesh) -> (f64, usize) {
-    let (record, failure) = compute(study).unwrap();
+    let (MovingRun { record, .. }, failure) = study.compute().unwrap();
     assert!(failure.is_none(), "{failure:?}");
     assert!(record.warnings.is_empty(), "{:?}", record.warnings);
     (record.reports.last().unwrap().error.unwrap().linf, record.work.steps)
@@ -108,7 +108,7 @@ fn walks_follow_the_conservative_form() {
 #[test]
 fn a_constant_rests() {
     let set = ["pde={kind=\"burgers\",viscosity=0.01,initial=\"0.7\",boundary=\"0.7\"}"];
-    let (record, failure) = compute(&front(0.01, 12, 1.0, &set)).unwrap();
+    let (MovingRun { record, .. }, failure) = front(0.01, 12, 1.0, &set).compute().unwrap();
     assert!(failure.is_none() && record.work.steps == 20, "{:?}", record.work);
     let quality = record.reports[0].quality;
     assert!((quality.q_max - 1.0).abs() < 1e-12 && (quality.equidistribution - 1.0).abs() < 1e-12, "{quality:?}");
@@ -131,7 +131,7 @@ fn a_jump_on_the_sides_is_kept() {
 #[test]
 fn a_jump_at_the_start_is_smoothed_out() {
     let jump = "pde={kind=\"burgers\",viscosity=0.01,initial=\"if(abs(x-0.4)+abs(y-0.4)<0.2,1,0.2)\",boundary=\"0.2\"}";
-    let (record, failure) = compute(&front(0.01, 20, 0.5, &[jump])).unwrap();
+    let (MovingRun { record, .. }, failure) = front(0.01, 20, 0.5, &[jump]).compute().unwrap();
     assert!(failure.is_none(), "{failure:?}");
     assert!(record.warnings[0].contains("`mesh.start`"), "{:?}", record.warnings);
     assert!(record.work.steps < 300, "{:?}", record.work);

@@ -2,7 +2,7 @@
 
 use driftmesh::geometry::check_unfolded;
 use driftmesh::simulation::{Event, Observer, Record, Snapshot, State};
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 use driftmesh::{Error, Failure, Result};
 use std::path::Path;
 
@@ -19,9 +19,9 @@ struct Times(Vec<f64>);
 
 impl Observer for Times {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        check_unfolded(&snapshot.state.mesh)?;
+        check_unfolded(&snapshot.state().unwrap().mesh)?;
         if event != Event::Finished {
-            self.0.push(snapshot.state.t);
+            self.0.push(snapshot.t);
         }
         Ok(())
     }
@@ -190,7 +190,7 @@ fn a_tolerance_alone_decides() {
 /// The warning that the mesh does not move, if there is one.
 fn resting(assignments: &[&str]) -> Option<String> {
     let short = ["grid.cells=[16,16]", "pde.viscosity=0.01", "time.end=0.75", "time.report=[0.75]", "time.step=0.01"];
-    let (record, failure) = compute(&study("burgers", &[&short[..], assignments].concat())).unwrap();
+    let (MovingRun { record, .. }, failure) = study("burgers", &[&short[..], assignments].concat()).compute().unwrap();
     assert!(failure.is_none(), "{failure:?}");
     let mut warnings = record.warnings.into_iter().filter(|warning| warning.starts_with("the mesh does not move"));
     let warning = warnings.next();

@@ -1,7 +1,7 @@
 //! Fronts against exact solutions and against the figures of another implementation; each bad input once.
 
 use driftmesh::Error;
-use driftmesh::study::{FrontFinished, Source, StefanStudy, Study};
+use driftmesh::study::{FrontCourse, Kind, Source, StefanStudy, Study};
 use std::path::Path;
 
 fn source(name: &str, set: &[String]) -> Source {
@@ -11,8 +11,15 @@ fn source(name: &str, set: &[String]) -> Source {
     source
 }
 
-fn compute(name: &str, set: &[String]) -> FrontFinished {
-    StefanStudy::from_source(&source(name, set)).unwrap().compute().unwrap()
+/// What a run came to.
+struct Finished {
+    course: FrontCourse,
+    failure: Option<Error>,
+}
+
+fn compute(name: &str, set: &[String]) -> Finished {
+    let (run, failure) = StefanStudy::from_source(&source(name, set)).unwrap().compute().unwrap();
+    Finished { course: run.course, failure }
 }
 
 /// Errors of front and temperature with 10 n × 8 n cells in steps of .01/n².
@@ -22,7 +29,7 @@ fn errors(name: &str, n: usize, more: &[&str]) -> [f64; 2] {
     set.extend(more.iter().map(|s| s.to_string()));
     let finished = compute(name, &set);
     assert!(finished.failure.is_none(), "{name}: {:?}", finished.failure);
-    let report = finished.summary.reports[0];
+    let report = finished.course.reports[0];
     [report.front.error_linf.unwrap(), report.error.unwrap().linf]
 }
 
@@ -73,19 +80,19 @@ fn every_variant_converges() {
 #[test]
 fn the_slides_problem_meets_its_figures() {
     let finished = compute("stefan-slides", &[]);
-    let (h, n) = (&finished.state.front, 40);
-    println!("{} {} {:?}", h[20], h[0], finished.summary.reports);
+    let (h, n) = (&finished.course.state.front, 40);
+    println!("{} {} {:?}", h[20], h[0], finished.course.reports);
     assert!((h[20] - 1.2328).abs() <= 5e-4 && (h[0] - 1.2251).abs() <= 5e-4);
     assert!((0..=n).all(|i| (h[i] - h[n - i]).abs() <= 1e-12));
     let fourth = |h: &[f64]| (h[0] - 4.0 * h[1] + 6.0 * h[2] - 4.0 * h[3] + h[4]).abs();
     assert!(fourth(h) < 1e-4, "{:e}", fourth(h));
-    let last = finished.summary.reports[2];
+    let last = finished.course.reports[2];
     assert!(last.energy_imbalance.unwrap() <= 0.01);
     assert!(last.energy_imbalance_by_differences.unwrap() > 0.02);
     // the heavier filter leaves a kink at the walls for good
     let heavy = compute("stefan-slides", &["front.filter=[1, 2, 1]".into()]);
-    assert!((heavy.state.front[0] - 1.2247).abs() <= 5e-4);
-    assert!(fourth(&heavy.state.front) > 1e-3);
+    assert!((heavy.course.state.front[0] - 1.2247).abs() <= 5e-4);
+    assert!(fourth(&heavy.course.state.front) > 1e-3);
 }
 
 /// Twice the estimated limit and more: refused when explicit, done when implicit, to the same front.
@@ -96,8 +103,8 @@ fn an_implicit_front_has_no_step_limit() {
     assert!(says(explicit.failure.as_ref().unwrap(), &["past the stability limit", "3.18"]), "{:?}", explicit.failure);
     let implicit = compute("stefan-slides", &[long[0].clone(), "front.stepping=\"implicit\"".into()]);
     assert!(implicit.failure.is_none(), "{:?}", implicit.failure);
-    assert!((implicit.state.front[20] - 1.2328).abs() < 3e-3, "{}", implicit.state.front[20]);
-    assert!(implicit.summary.work.work.newton_iterations < 20 * implicit.summary.work.steps);
+    assert!((implicit.course.state.front[20] - 1.2328).abs() < 3e-3, "{}", implicit.course.state.front[20]);
+    assert!(implicit.course.work.work.newton_iterations < 20 * implicit.course.work.steps);
 }
 
 /// The estimate of the limit means something: without the check, a run at twice the limit without filter saws.
@@ -105,7 +112,7 @@ fn an_implicit_front_has_no_step_limit() {
 fn automatic_steps_keep_to_the_limit() {
     let finished = compute("stefan-slides", &["time.step=\"auto\"".into()]);
     assert!(finished.failure.is_none());
-    assert!((finished.state.front[20] - 1.2328).abs() < 1e-3, "{}", finished.state.front[20]);
+    assert!((finished.course.state.front[20] - 1.2328).abs() < 1e-3, "{}", finished.course.state.front[20]);
 }
 
 /// An automatic step that fails is halved: a boundary that heats up ever faster stops steps that are given.
@@ -119,9 +126,9 @@ fn automatic_steps_that_fail_are_halved() {
     };
     let [given, automatic] = ["0.04", "\"auto\""].map(ends);
     assert!(says(given.failure.as_ref().unwrap(), &["stalled", "lower the time step"]), "{:?}", given.failure);
-    assert!(given.state.t < 1.6 && given.summary.work.rejected_steps == 0);
+    assert!(given.course.state.t < 1.6 && given.course.work.rejected_steps == 0);
     assert!(automatic.failure.is_none(), "{:?}", automatic.failure);
-    assert!(automatic.state.t == 2.0 && automatic.summary.work.rejected_steps > 0);
+    assert!(automatic.course.state.t == 2.0 && automatic.course.work.rejected_steps > 0);
 }
 
 /// Far from the origin the implicit front converges, too.
@@ -137,7 +144,7 @@ fn an_implicit_front_may_be_anywhere() {
         ];
         let finished = compute("stefan-planar", &set);
         assert!(finished.failure.is_none(), "{offset}: {:?}", finished.failure);
-        finished.summary.reports[0].front.error_linf.unwrap()
+        finished.course.reports[0].front.error_linf.unwrap()
     };
     let [near, far] = ["0", "1e6"].map(error);
     assert!((far / near - 1.0).abs() < 1e-3, "{near:e} {far:e}");
@@ -231,8 +238,10 @@ fn a_run_that_fails_keeps_its_last_good_state() {
         let error = finished.failure.as_ref().unwrap_or_else(|| panic!("{name}"));
         println!("{error}");
         assert!(says(error, &[name, "at t ="]), "{name}: {error}");
-        assert!(finished.state.front.iter().chain(finished.state.u.iter().flatten()).all(|v| v.is_finite()));
-        assert_eq!(finished.state.step, finished.summary.work.steps);
+        assert!(
+            finished.course.state.front.iter().chain(finished.course.state.u.iter().flatten()).all(|v| v.is_finite())
+        );
+        assert_eq!(finished.course.state.step, finished.course.work.steps);
     }
 }
 
@@ -242,7 +251,7 @@ fn threads_do_not_change_a_bit() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         pool.install(|| compute("stefan-slides", &["time.end=0.05".to_string(), "time.report=[]".into()]))
     });
-    assert_eq!(one.state, three.state);
+    assert_eq!(one.course.state, three.course.state);
 }
 
 /// The unscaled harmonic fit loses the radial front on 41 columns, where the default keeps it.
@@ -250,8 +259,8 @@ fn threads_do_not_change_a_bit() {
 fn the_published_fit_loses_the_line_source() {
     let set = ["laplacian.kind=\"published\"".to_string(), "laplacian.polynomials=\"harmonic\"".into()];
     let finished = compute("stefan-line-source", &set);
-    println!("{:?} {:?}", finished.failure, finished.summary.reports);
+    println!("{:?} {:?}", finished.failure, finished.course.reports);
     let printed = compute("stefan-line-source", &set[..1]);
-    println!("{:?} {:?}", printed.failure, printed.summary.reports);
-    assert!(finished.failure.is_some() || finished.summary.reports[0].front.error_linf.unwrap() > 1e-3);
+    println!("{:?} {:?}", printed.failure, printed.course.reports);
+    assert!(finished.failure.is_some() || finished.course.reports[0].front.error_linf.unwrap() > 1e-3);
 }

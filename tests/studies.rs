@@ -6,7 +6,7 @@
 use driftmesh::geometry::DualCells;
 use driftmesh::output::Summary;
 use driftmesh::simulation::{Event, Observer, Snapshot};
-use driftmesh::study::{MovingMesh, Source, compute, run};
+use driftmesh::study::{Begin, Kind, MovingFigures, MovingMesh, Source};
 use std::path::Path;
 
 /// Follows x of node (10, 10).
@@ -17,28 +17,28 @@ struct Node {
 
 impl Observer for Node {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let mesh = &snapshot.state.mesh;
-        self.history.push((snapshot.state.t, mesh.x()[mesh.lattice().index([10, 10])][0]));
+        let mesh = &snapshot.state().unwrap().mesh;
+        self.history.push((snapshot.t, mesh.x()[mesh.lattice().index([10, 10])][0]));
         Ok(())
     }
 }
 
-fn rerun(name: &str) -> (Summary, Node) {
+fn rerun(name: &str) -> (Summary<MovingFigures>, Node) {
     let mut node = Node::default();
     (rerun_with(name, &mut node), node)
 }
 
-fn rerun_with(name: &str, observer: &mut dyn Observer) -> Summary {
+fn rerun_with(name: &str, observer: &mut dyn Observer) -> Summary<MovingFigures> {
     rerun_set(name, &[], observer)
 }
 
-fn rerun_set(name: &str, assignments: &[&str], observer: &mut dyn Observer) -> Summary {
+fn rerun_set(name: &str, assignments: &[&str], observer: &mut dyn Observer) -> Summary<MovingFigures> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(format!("{name}.toml"));
     let mut source = Source::read(&file).unwrap();
     assignments.iter().for_each(|assignment| source.set(assignment).unwrap());
     let study = MovingMesh::from_source(&source).unwrap();
     let out = tempfile::tempdir().unwrap();
-    let finished = run(&study, &out.path().join("run"), &mut [observer]).unwrap();
+    let finished = study.run(&out.path().join("run"), Begin::Anew, &mut [observer]).unwrap();
     assert!(finished.failure.is_none(), "{name}: {:?}", finished.failure);
     finished.summary
 }
@@ -54,24 +54,28 @@ fn assert_row(name: &str, what: &str, found: [f64; 3], expected: [f64; 3], toler
     }
 }
 
-fn linf(summary: &Summary) -> [f64; 3] {
-    std::array::from_fn(|k| summary.reports[k].error.unwrap().linf)
+fn linf(summary: &Summary<MovingFigures>) -> [f64; 3] {
+    std::array::from_fn(|k| summary.figures.reports[k].error.unwrap().linf)
 }
 
-fn q_max(summary: &Summary) -> [f64; 3] {
-    std::array::from_fn(|k| summary.reports[k].quality.q_max)
+fn q_max(summary: &Summary<MovingFigures>) -> [f64; 3] {
+    std::array::from_fn(|k| summary.figures.reports[k].quality.q_max)
 }
 
-fn q_mean(summary: &Summary) -> [f64; 3] {
-    std::array::from_fn(|k| summary.reports[k].quality.q_mean)
+fn q_mean(summary: &Summary<MovingFigures>) -> [f64; 3] {
+    std::array::from_fn(|k| summary.figures.reports[k].quality.q_mean)
 }
 
 /// Counters: steps, Newton iterations and solves to the one; linear iterations to 1 %, since they turn on the last bit
 /// of a residual and `exp` differs in it from system to system.
-fn assert_work(summary: &Summary, newton: usize, solves: usize, iterations: usize) {
-    let work = summary.work.work;
+fn assert_work(summary: &Summary<MovingFigures>, newton: usize, solves: usize, iterations: usize) {
+    let work = summary.figures.work.work;
     let name = &summary.study;
-    assert_eq!([summary.work.steps, work.newton_iterations, work.linear_solves], [1000, newton, solves], "{name}");
+    assert_eq!(
+        [summary.figures.work.steps, work.newton_iterations, work.linear_solves],
+        [1000, newton, solves],
+        "{name}"
+    );
     assert!(
         work.linear_iterations.abs_diff(iterations) * 100 <= iterations,
         "{name}: {} iterations",
@@ -92,8 +96,8 @@ fn case_b_conservative() {
 }
 
 /// Largest of |R_max − 1|, |R_mean − 1| and the mesh's distance from the reference over the reports.
-fn worst(summary: &Summary) -> [f64; 3] {
-    let all = summary.reports.iter().map(|report| report.comparison.expect("the study compares"));
+fn worst(summary: &Summary<MovingFigures>) -> [f64; 3] {
+    let all = summary.figures.reports.iter().map(|report| report.comparison.expect("the study compares"));
     all.fold([0.0; 3], |m, c| [m[0].max((c.r_max - 1.0).abs()), m[1].max((c.r_mean - 1.0).abs()), m[2].max(c.mesh_rms)])
 }
 
@@ -113,17 +117,17 @@ fn case_b_by_residual_walks() {
         assert_row(name, "l_inf", linf(&summary), [0.01032, 0.01066, 0.01375], [0.005; 3]);
         let [r_max, r_mean, mesh_rms] = worst(&summary);
         assert!(r_max <= 0.003 && r_mean <= 0.001 && mesh_rms <= rms, "{settings:?}: {r_max} {r_mean} {mesh_rms:e}");
-        let work = summary.work.work;
-        assert_eq!([summary.work.steps, work.newton_iterations, work.linear_solves], [1000, 2001, solves]);
+        let work = summary.figures.work.work;
+        assert_eq!([summary.figures.work.steps, work.newton_iterations, work.linear_solves], [1000, 2001, solves]);
         assert!((15_900_000..16_100_000).contains(&work.path_steps), "{} path steps", work.path_steps);
-        let interface = summary.reports[2].interface.unwrap();
+        let interface = summary.figures.reports[2].interface.unwrap();
         assert_eq!((interface.points, interface.walks, interface.exchanges), (225, 10, 1));
         // what the samples say of themselves is what the mesh shows
         assert!((0.3..3.0).contains(&(interface.standard_error.unwrap() / mesh_rms)), "{interface:?} {mesh_rms:e}");
     }
     let one = rerun_set(name, &[&published(1)], &mut Node::default());
     assert!(worst(&one)[2] > 3e-5, "one walk is enough: {:?}", worst(&one));
-    assert_eq!(one.reports[2].interface.unwrap().standard_error, None);
+    assert_eq!(one.figures.reports[2].interface.unwrap().standard_error, None);
 }
 
 /// Case B by strips alone: R_max within .003 and the mesh within 3e-5, with what the program chooses and with 8 nodes
@@ -136,9 +140,9 @@ fn case_b_by_strips() {
         let [r_max, r_mean, mesh_rms] = worst(&summary);
         println!("{strip}: {r_max:.1e} {r_mean:.1e} {mesh_rms:.1e}");
         assert!(r_max <= 0.003 && r_mean <= 0.001 && mesh_rms <= 3e-5, "{strip}: {r_max} {r_mean} {mesh_rms:e}");
-        let interface = summary.reports[2].interface.unwrap();
+        let interface = summary.figures.reports[2].interface.unwrap();
         assert_eq!((interface.walks, interface.exchanges, interface.standard_error), (0, 1, None));
-        assert!(summary.warnings.is_empty() && summary.work.work.path_steps == 0, "{:?}", summary.warnings);
+        assert!(summary.warnings.is_empty() && summary.figures.work.work.path_steps == 0, "{:?}", summary.warnings);
     }
 }
 
@@ -151,8 +155,8 @@ fn case_b_by_a_few_schwarz_iterations() {
             [&format!("mesh.generator={generator}"), "time.end=0.3", "time.report=[0.3]"].map(str::to_string);
         let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
         let summary = rerun_set("burgers-b-schwarz", &settings, &mut Node::default());
-        assert_eq!((summary.work.steps, summary.work.rejected_steps), (50, 0));
-        let interface = summary.reports[0].interface.unwrap();
+        assert_eq!((summary.figures.work.steps, summary.figures.work.rejected_steps), (50, 0));
+        let interface = summary.figures.reports[0].interface.unwrap();
         assert_eq!((interface.contraction.unwrap().iterations, interface.exchanges), (3, 3));
         worst(&summary)[2]
     };
@@ -166,7 +170,7 @@ fn case_b_by_a_few_schwarz_iterations() {
 fn a_thin_front_without_a_number() {
     let (whole, _) = rerun("burgers");
     assert_row("burgers", "l_inf", linf(&whole), [4.76e-3, 6.25e-3, 9.45e-3], [0.1; 3]);
-    assert!((90..148).contains(&whole.work.steps), "{} steps", whole.work.steps);
+    assert!((90..148).contains(&whole.figures.work.steps), "{} steps", whole.figures.work.steps);
     assert!(whole.warnings.is_empty(), "{:?}", whole.warnings);
     let (walks, _) = rerun("burgers-stochastic");
     assert_row("burgers-stochastic", "l_inf", linf(&walks), linf(&whole), [0.01; 3]);
@@ -187,12 +191,12 @@ fn the_uniform_mesh_of_the_same_error_has_it() {
         set.iter().for_each(|assignment| source.set(assignment).unwrap());
         MovingMesh::from_source(&source).unwrap()
     };
-    let moving = compute(&study(&[])).unwrap().0.reports[0];
+    let moving = study(&[]).compute().unwrap().0.record.reports[0];
     let found = study(&[]).uniform_equivalent(&moving).unwrap().unwrap();
     assert_eq!((found.thicker, found.t, found.nodes[0]), (2.5, 0.75, found.nodes[1]));
     let cells = format!("grid.cells={:?}", found.nodes.map(|n| n - 1));
     let uniform = ["mesh.generator={kind=\"fixed\"}", "time.stepper=\"rk4\"", "time.step=1.0", &cells];
-    let uniform = compute(&study(&uniform)).unwrap().0.reports[0].error.unwrap().linf;
+    let uniform = study(&uniform).compute().unwrap().0.record.reports[0].error.unwrap().linf;
     let moving = moving.error.unwrap().linf;
     assert!((uniform / moving - 1.0).abs() < 0.1, "{uniform:e} on {:?} nodes against {moving:e}", found.nodes);
 }
@@ -204,11 +208,11 @@ fn periodic_studies_without_a_number() {
         [("burgers-periodic-auto", 100, 0.7), ("dam-break-auto", 50, 1.0), ("rings-auto", 40, 0.7)]
     {
         let (summary, _) = rerun(name);
-        let quality = summary.reports.last().unwrap().quality;
-        assert!(summary.work.steps < most && summary.warnings.is_empty(), "{name}: {:?}", summary.work);
+        let quality = summary.figures.reports.last().unwrap().quality;
+        assert!(summary.figures.work.steps < most && summary.warnings.is_empty(), "{name}: {:?}", summary.figures.work);
         // the mesh has moved, far from folding; waves of water that spread leave equal cells again
         assert!((0.05..contraction).contains(&quality.min_scaled_jacobian), "{name}: {quality:?}");
-        let drift = summary.reports.last().unwrap().conserved.drift;
+        let drift = summary.figures.reports.last().unwrap().conserved.drift;
         assert!(name == "rings-auto" || drift.abs() < 1e-13, "{name}: {drift:e}");
     }
 }
@@ -219,7 +223,7 @@ fn case_b_by_schwarz() {
     let summary = rerun_set(name, &["time.end=0.35", "time.report=[0.35]"], &mut Node::default());
     let [r_max, r_mean, mesh_rms] = worst(&summary);
     assert!(r_max < 1e-6 && r_mean < 1e-6 && mesh_rms < 1e-9, "{r_max:e} {r_mean:e} {mesh_rms:e}");
-    let contraction = summary.reports[0].interface.unwrap().contraction.unwrap();
+    let contraction = summary.figures.reports[0].interface.unwrap().contraction.unwrap();
     let predicted = contraction.predicted.unwrap();
     assert!(contraction.observed > 0.2 && contraction.observed < predicted && predicted < 0.7);
 }
@@ -228,7 +232,7 @@ fn case_b_by_schwarz() {
 #[test]
 fn rings() {
     let summary = rerun_with("rings", &mut Node::default());
-    let quality = summary.reports[0].quality;
+    let quality = summary.figures.reports[0].quality;
     assert!((quality.q_max / 1.480 - 1.0).abs() < 0.002 && (quality.q_mean / 1.140 - 1.0).abs() < 0.002, "{quality:?}");
     assert!(worst(&summary)[2] < 1e-6);
     // as published, by Monte Carlo with one substep
@@ -237,7 +241,7 @@ fn rings() {
     assert!(r_max < 0.02 && r_mean < 0.01, "{r_max} {r_mean}");
     // without smoothing the mesh is just not tangled
     let bare = ["monitor.gradient=central", "monitor.smoothing=0", "mesh.generator={kind=\"whole\"}"];
-    let quality = rerun_set("rings", &bare, &mut Node::default()).reports[0].quality;
+    let quality = rerun_set("rings", &bare, &mut Node::default()).figures.reports[0].quality;
     assert!((2.7..4.1).contains(&quality.q_max) && quality.min_scaled_jacobian > 0.0, "{quality:?}");
 }
 
@@ -246,10 +250,10 @@ fn periodic_burgers() {
     let summary = rerun_with("burgers-periodic", &mut Node::default());
     let [r_max, r_mean, mesh_rms] = worst(&summary);
     assert!(r_max < 0.001 && r_mean < 0.001 && mesh_rms < 1e-4, "{r_max:e} {r_mean:e} {mesh_rms:e}");
-    for (report, q_max) in summary.reports.iter().zip([1.342, 1.246]) {
+    for (report, q_max) in summary.figures.reports.iter().zip([1.342, 1.246]) {
         assert!((report.quality.q_max / q_max - 1.0).abs() < 0.002, "{:?}", report.quality);
     }
-    assert_eq!([summary.work.steps, summary.work.work.newton_iterations], [200, 400]);
+    assert_eq!([summary.figures.work.steps, summary.figures.work.work.newton_iterations], [200, 400]);
 }
 
 /// Also node (10, 10) to 2e-5 at all three times, and the smallest corner Jacobian.
@@ -260,7 +264,7 @@ fn case_b_advective() {
     assert_row(name, "l_inf", linf(&summary), [0.03076, 0.03413, 0.03307], DIGITS);
     assert_row(name, "Q max", q_max(&summary), [2.126, 2.232, 2.560], Q);
     assert_row(name, "Q mean", q_mean(&summary), [1.1111, 1.1420, 1.1299], Q);
-    assert!((summary.reports[0].quality.min_scaled_jacobian - 0.16936).abs() < 1e-5);
+    assert!((summary.figures.reports[0].quality.min_scaled_jacobian - 0.16936).abs() < 1e-5);
     for (t, expected) in [(0.75, 0.256858), (1.0, 0.270088), (1.25, 0.254841)] {
         let x = node.history.iter().find(|(time, _)| *time == t).unwrap().1;
         assert!((x - expected).abs() < 2e-5, "x of node (10, 10) at t = {t} is {x}, expected {expected}");
@@ -277,7 +281,7 @@ fn case_a_advective() {
     assert_row(name, "l_inf", linf(&summary), [0.0961, 0.1051, 0.0989], tolerance);
     assert_row(name, "Q max", q_max(&summary), [1.38, 1.26, 1.76], tolerance);
     assert_row(name, "Q mean", q_mean(&summary), [1.02, 1.01, 1.04], tolerance);
-    assert_eq!(summary.work.steps, 1000);
+    assert_eq!(summary.figures.work.steps, 1000);
 }
 
 #[test]
@@ -309,12 +313,12 @@ fn uniform_meshes() {
 fn advected_bump() {
     let [moving, still] = [vec![], vec!["mesh.generator={kind=\"fixed\"}"]]
         .map(|settings| rerun_set("advected-bump", &settings, &mut Node::default()));
-    for ((ours, theirs), share) in moving.reports.iter().zip(&still.reports).zip([0.08, 0.24]) {
+    for ((ours, theirs), share) in moving.figures.reports.iter().zip(&still.figures.reports).zip([0.08, 0.24]) {
         let [ours, theirs] = [ours, theirs].map(|report| report.error.unwrap());
         println!("{:.3e} {:.3e}, {:.3e} {:.3e}", ours.linf, theirs.linf, ours.l2, theirs.l2);
         assert!(ours.linf < share * theirs.linf && ours.l2 < share * theirs.l2, "{ours:?} {theirs:?}");
     }
-    assert_eq!(moving.work.steps, 100);
+    assert_eq!(moving.figures.work.steps, 100);
 }
 
 /// The wave is where the exact one is, and no worse than on a mesh that stays: equal cells resolve it, toe and all.
@@ -322,7 +326,7 @@ fn advected_bump() {
 fn fisher() {
     let errors = |settings: &[&str]| {
         let summary = rerun_set("fisher", settings, &mut Node::default());
-        summary.reports.iter().map(|report| report.error.unwrap().linf).collect::<Vec<_>>()
+        summary.figures.reports.iter().map(|report| report.error.unwrap().linf).collect::<Vec<_>>()
     };
     let [ours, still] = [&[][..], &["mesh.generator={kind=\"fixed\"}"]].map(errors);
     assert!(ours[0] < 2.1e-3 && ours[1] < 1.1e-2, "{ours:?}");
@@ -337,7 +341,7 @@ struct Substances {
 
 impl Observer for Substances {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        for values in snapshot.state.u.values().as_chunks::<2>().0 {
+        for values in snapshot.state().unwrap().u.values().as_chunks::<2>().0 {
             self.lowest = std::array::from_fn(|c| self.lowest[c].min(values[c]));
             self.highest = std::array::from_fn(|c| self.highest[c].max(values[c]));
         }
@@ -354,7 +358,7 @@ fn gray_scott() {
     println!("{:?} {:?}", found.lowest, found.highest);
     assert!(found.lowest[0] > 0.1 && found.lowest[1] > -1e-5, "{:?}", found.lowest);
     assert!(found.highest[0] < 1.0 + 1e-6 && (0.25..0.65).contains(&found.highest[1]), "{:?}", found.highest);
-    assert_eq!(summary.work.steps, 100);
+    assert_eq!(summary.figures.work.steps, 100);
 
     let mut totals = Pair::default();
     let closed = ["pde.source.u=\"-u*v^2\"", "pde.source.v=\"u*v^2\"", "time.end=100.0", "time.report=[100.0]"];
@@ -373,8 +377,10 @@ struct Pair {
 
 impl Observer for Pair {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let areas = DualCells::new(&snapshot.state.mesh).areas().to_vec();
-        let total = |c: usize| areas.iter().zip(snapshot.state.u.component(c)).map(|(area, u)| area * u).sum::<f64>();
+        let areas = DualCells::new(&snapshot.state().unwrap().mesh).areas().to_vec();
+        let total = |c: usize| {
+            areas.iter().zip(snapshot.state().unwrap().u.component(c)).map(|(area, u)| area * u).sum::<f64>()
+        };
         self.history.push([total(0), total(1)]);
         Ok(())
     }

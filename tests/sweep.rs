@@ -5,7 +5,7 @@ mod dice;
 use dice::Dice;
 use driftmesh::geometry::{Mesh, check_unfolded};
 use driftmesh::simulation::{Event, Observer, Record, Retries, Snapshot};
-use driftmesh::study::{MovingMesh, Source};
+use driftmesh::study::{Kind, MovingMesh, Source};
 use driftmesh::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -111,7 +111,7 @@ struct Watch;
 
 impl Observer for Watch {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        let state = snapshot.state;
+        let state = snapshot.state().unwrap();
         assert_sound(&state.mesh);
         assert!(state.u.values().iter().all(|u| u.is_finite()), "u is not finite at t = {}", state.t);
         Ok(())

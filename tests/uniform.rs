@@ -3,7 +3,7 @@
 use driftmesh::Failure;
 use driftmesh::geometry::{Field, Lattice, Mesh};
 use driftmesh::physics::{Burgers, Convection, Motion, Physics, UniformBurgers};
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 use std::f64::consts::PI;
 
 fn burgers(viscosity: f64) -> Burgers {
@@ -142,7 +142,7 @@ fn studies_choose_it() {
     };
     let span = ["time.end=0.75", "time.report=[0.75]", "time.step=1.0", "pde.viscosity=0.05", "time.stepper=\"rk4\""];
     let with = |more: &[&str]| study(&[&span[..], more].concat());
-    let (record, failure) = compute(&with(&["time.order=4"]).unwrap()).unwrap();
+    let (MovingRun { record, .. }, failure) = with(&["time.order=4"]).unwrap().compute().unwrap();
     assert!(failure.is_none());
     assert_eq!([record.work.steps, record.work.work.substeps], [1, 162]);
     assert!(record.reports[0].error.unwrap().linf < 2e-5);

@@ -3,7 +3,6 @@ use crate::{
     terminal::{complain, say, warn},
 };
 use clap::Args;
-use driftmesh::study::Study;
 use std::process::ExitCode;
 
 #[derive(Args)]
@@ -14,18 +13,9 @@ pub struct Check {
 
 impl Check {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
-        let study = match self.study.read()? {
-            Study::MovingMesh(study) => study,
-            Study::Equidistribution(study) => return Ok(valid(&study.to_toml(), study.memory())),
-            Study::Poisson(study) => return Ok(valid(&study.to_toml(), study.memory())),
-            Study::Stefan(study) => {
-                study.warnings()?.iter().for_each(|warning| warn(warning));
-                return Ok(valid(&study.to_toml(), study.memory()));
-            }
-        };
+        let study = self.study.read()?;
         study.warnings()?.iter().for_each(|warning| warn(warning));
-        // on equal cells: adapting the mesh is part of the run
-        if let Err(error) = study.simulation()?.start(study.uniform_mesh()?) {
+        if let Err(error) = study.try_start() {
             return Ok(complain(&error, study.remedy(&error).or_else(|| error.help()), None));
         }
         Ok(valid(&study.to_toml(), study.memory()))

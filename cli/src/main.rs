@@ -1,16 +1,14 @@
 //! The `driftmesh` program: a thin door to the library.
 
 mod check;
-mod equidistribution;
 mod interrupts;
 mod list;
-mod poisson;
 mod progress;
 mod report;
 mod reproduce;
 mod run;
 mod schema;
-mod stefan;
+mod tables;
 mod terminal;
 
 use clap::{Args, Parser, Subcommand};
@@ -44,9 +42,8 @@ enum Verb {
     #[command(after_help = "Example:\n  driftmesh report out/burgers")]
     Report(report::Report),
     /// Print the JSON Schema of a study file, for editors.
-    #[command(
-        after_help = "Example:\n  driftmesh schema > driftmesh.schema.json   and then, as the first line of a study:\n  #:schema ./driftmesh.schema.json"
-    )]
+    #[command(after_help = "Example:\n  driftmesh schema > driftmesh.schema.json   and then, as the first line of a \
+                      study:\n  #:schema ./driftmesh.schema.json")]
     Schema,
 }
 

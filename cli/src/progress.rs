@@ -1,5 +1,5 @@
 use crate::terminal;
-use driftmesh::simulation::{Advance, Event, Observer, Snapshot, State};
+use driftmesh::simulation::{Event, Observer, Snapshot, State};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
@@ -39,7 +39,7 @@ impl Progress {
     }
 
     /// Where the run is, where that is news.
-    fn show(&mut self, event: Event, at: &Advance) {
+    fn show(&mut self, event: Event, at: &Snapshot<'_>) {
         // beside the percentage and the smallest bar
         let room = || usize::from(console::Term::stderr().size().1).saturating_sub(16);
         let pieces = if self.bar.is_some() { OF_THE_BAR } else { LINES };
@@ -63,9 +63,7 @@ impl Progress {
 
 impl Observer for Progress {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let (State { t, step, .. }, quality) = (snapshot.state, snapshot.quality);
-        let Snapshot { steps, share, seconds, .. } = *snapshot;
-        self.show(event, &Advance { t: *t, step: *step, steps, share, smallest: quality.min_scaled_jacobian, seconds });
+        self.show(event, snapshot);
         Ok(())
     }
 
@@ -83,14 +81,11 @@ impl Observer for Progress {
         }
         Ok(())
     }
-
-    fn advanced(&mut self, advance: &Advance) {
-        self.show(Event::Stepped, advance);
-    }
 }
 
-/// Where a run is, how fast, and for how long still, as far as the time simulated so far tells; what matters most comes first.
-fn words(at: &Advance) -> Vec<String> {
+/// Where a run is, how fast, and for how long still, as far as the time simulated so far tells; what matters most comes
+/// first.
+fn words(at: &Snapshot<'_>) -> Vec<String> {
     let of = at.steps.map_or(String::new(), |steps| format!(" of {steps}"));
     let mut words = vec![
         format!("t = {}", terminal::moment(at.t)),

@@ -1,7 +1,7 @@
 use crate::errors::raised;
 use crate::threads::{BRIEFLY, Ended, PATIENCE, calls, interruptible};
 use driftmesh::output::{RunDirectory, Standing};
-use driftmesh::simulation::{Advance, Event, Observer, Snapshot, State};
+use driftmesh::simulation::{Event, Observer, Snapshot, State};
 use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
 use pyo3::prelude::*;
@@ -25,27 +25,17 @@ impl Seen {
 
 struct Watcher(Arc<Seen>);
 
-impl Watcher {
-    fn saw(&self, share: f64, state: &State) {
-        *self.0.progress() = Some((share, state.t, state.step));
-    }
-}
-
 impl Observer for Watcher {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
         if event != Event::Finished {
-            self.saw(snapshot.share, snapshot.state);
+            *self.0.progress() = Some((snapshot.share, snapshot.t, snapshot.step));
         }
         Ok(())
     }
 
     fn adapting(&mut self, state: &State) -> Result<()> {
-        self.saw(0.0, state);
+        *self.0.progress() = Some((0.0, state.t, state.step));
         Ok(())
-    }
-
-    fn advanced(&mut self, advance: &Advance) {
-        *self.0.progress() = Some((advance.share, advance.t, advance.step));
     }
 
     fn interrupts(&self) -> bool {

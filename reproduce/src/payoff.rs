@@ -1,7 +1,7 @@
 use super::{Options, Rerun, Table};
 use driftmesh::error::Result;
 use driftmesh::output::{Curve, Figure};
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 
 /// How a run came out.
 #[derive(Debug, Clone, Copy)]
@@ -73,7 +73,7 @@ impl Method {
 
     /// Runs it once; none where the run fails.
     fn run(self, task: Task, cells: usize) -> Result<Option<(Run, f64)>> {
-        let (record, failure) = compute(&self.study(task, cells)?)?;
+        let (MovingRun { record, .. }, failure) = self.study(task, cells)?.compute()?;
         let spent = record.seconds;
         let seconds = spent.mesh + spent.pde + spent.monitor + spent.interface;
         let steps = record.work.steps.max(record.work.work.substeps);

@@ -103,11 +103,11 @@ impl RunDirectory {
     }
 
     /// Tables and frames, which a run adds to as it goes on.
-    pub(crate) const GROWING: [&str; 4] = ["history.csv", "front.csv", "run.pvd", FRAMES[0]];
+    const GROWING: [&str; 4] = ["history.csv", "front.csv", "run.pvd", FRAMES[0]];
 
     /// Removes what only a run that ended writes, and leaves checkpoints and what the run adds to.
-    pub(crate) fn clear_ended(&self, growing: &[&str]) -> Result<()> {
-        self.clear_but(&[&["summary.json", "study.toml"], growing, &Checkpoints::NAMES].concat())
+    pub(crate) fn clear_ended(&self) -> Result<()> {
+        self.clear_but(&[&["summary.json", "study.toml"], &Self::GROWING[..], &Checkpoints::NAMES].concat())
     }
 
     /// Removes what an earlier run wrote, and nothing else.
@@ -200,7 +200,8 @@ pub enum Standing {
     Complete,
 }
 
-/// True if a run of ours wrote this directory: its summary says so, a checkpoint, or the lock of a run that was killed before.
+/// True if a run of ours wrote this directory: its summary says so, a checkpoint, or the lock of a run that was killed
+/// before.
 fn wrote(path: &Path) -> bool {
     if path.join(LOCK).is_file() || Checkpoints::are_in(path) {
         return true;

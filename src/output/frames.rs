@@ -1,12 +1,12 @@
 use super::directory::is_frame;
-use super::vtu::{self, Values};
+use super::vtu;
 use crate::error::{Error, Result, Unfit};
-use crate::geometry::{cell_jacobians, cell_qualities};
-use crate::kept::{Kept, check_nodal};
+use crate::geometry::Lattice;
+use crate::kept::Kept;
 use crate::meshing::Decomposition;
 use crate::output::write_file;
-use crate::simulation::State;
-use crate::simulation::{Event, Observer, Snapshot};
+use crate::parallel::map;
+use crate::simulation::{Event, Observer, Scene, Snapshot, Values};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -56,8 +56,10 @@ impl FramesAt {
     }
 }
 
-/// `frames/*.vtu` and the `run.pvd` that puts them in time, for ParaView, PyVista and meshio: the unknowns, ρ and the mesh
-/// velocity at the nodes; Q, the smallest corner Jacobian and the number of the subdomain in the cells.
+/// `frames/*.vtu` and the `run.pvd` that puts them in time, for ParaView, PyVista and meshio
+///
+/// A frame holds what its scene does. To a mesh in two dimensions it adds ρ and the velocity of the mesh at the nodes,
+/// and the number of the subdomain in the cells; ρ is 1 where no density moves the mesh.
 #[derive(Debug)]
 pub struct Frames {
     directory: PathBuf,
@@ -79,7 +81,8 @@ pub(crate) fn frame_name(folder: &str, number: usize) -> String {
     format!("{folder}/step-{number:06}.vtu")
 }
 
-/// A thread beside the run that writes one frame at a time; starting one a frame would cost more than to prepare the frame.
+/// A thread beside the run that writes one frame at a time; starting one a frame would cost more than to prepare the
+/// frame.
 #[derive(Debug)]
 struct Writer {
     jobs: Sender<Job>,
@@ -124,82 +127,81 @@ struct KeptFrames {
 }
 
 impl Frames {
-    /// Starts the series in a run directory.
-    ///
-    /// # Errors
-    /// [`Error::Unwritable`].
-    pub fn create(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Result<Self> {
+    /// Starts the series in a run directory, of a mesh with so many subdomains along each axis.
+    pub fn create(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Self {
         Self::named(directory, at, subdomains, ["frames", "run.pvd"])
     }
 
     /// Starts the series of the run that this one is compared with: `compare/*.vtu` and `compare.pvd`.
-    ///
-    /// # Errors
-    /// [`Error::Unwritable`].
-    pub fn of_reference(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Result<Self> {
+    pub fn of_reference(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Self {
         Self::named(directory, at, subdomains, ["compare", "compare.pvd"])
     }
 
-    fn named(directory: &Path, at: FramesAt, subdomains: [usize; 2], names: [&'static str; 2]) -> Result<Self> {
-        let frames = directory.join(names[0]);
-        std::fs::create_dir_all(&frames)
-            .map_err(|error| Error::Unwritable { path: frames, reason: error.to_string() })?;
+    fn named(directory: &Path, at: FramesAt, subdomains: [usize; 2], names: [&'static str; 2]) -> Self {
         let directory = directory.to_path_buf();
-        Ok(Self {
-            directory,
-            at,
-            subdomains,
-            names,
-            grid: None,
-            nodes: [None, None],
-            written: Vec::new(),
-            writer: None,
-        })
+        Self { directory, at, subdomains, names, grid: None, nodes: [None, None], written: Vec::new(), writer: None }
     }
 
-    /// Writes one frame, unless the state has one already. The series is complete after every call.
+    /// Writes a frame of each scene whose step has none yet, side by side. The series is complete after every call.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
-    pub fn write(&mut self, unknowns: &[String], state: &State) -> Result<()> {
-        self.start(unknowns, state)?;
-        self.wait()
+    pub fn write(&mut self, scenes: Vec<Scene>) -> Result<()> {
+        self.wait()?;
+        let mut new = Vec::new();
+        for scene in scenes {
+            let entered = self.entered(scene)?;
+            new.extend(entered.map(|scene| (self.directory.join(self.name(scene.step)), scene)));
+        }
+        let Some(grid) = self.grid.as_ref().filter(|_| !new.is_empty()) else { return Ok(()) };
+        let written = map(&new, |(path, scene)| write_file(path, grid.document(scene).as_bytes()));
+        written.into_iter().collect::<Result<()>>()?;
+        write_file(&self.directory.join(self.names[1]), self.series().as_bytes())
     }
 
-    /// The same, with compressing and writing left to a thread beside the run.
-    fn start(&mut self, unknowns: &[String], state: &State) -> Result<()> {
+    /// The same with one scene, compressed and written by a thread beside the run.
+    fn start(&mut self, scene: Scene) -> Result<()> {
         self.wait()?;
-        if self.written.iter().any(|(_, written)| *written == state.step) {
-            return Ok(());
+        if let (Some(scene), Some(grid)) = (self.entered(scene)?, self.grid.clone()) {
+            let series = self.series();
+            let [frame, index] = [self.name(scene.step).as_str(), self.names[1]].map(|name| self.directory.join(name));
+            self.writer.get_or_insert_with(Writer::start).write(Box::new(move || {
+                write_file(&frame, grid.document(&scene).as_bytes())?;
+                write_file(&index, series.as_bytes())
+            }));
         }
-        let lattice = state.mesh.lattice();
-        let scalars = |values: &[f64]| Values::Scalars(lattice.closed(values).into_owned());
-        let mut nodes: Vec<(String, Values)> = (unknowns.iter().enumerate())
-            .map(|(c, unknown)| (unknown.clone(), scalars(&state.u.component(c).collect::<Vec<f64>>())))
-            .collect();
+        Ok(())
+    }
+
+    /// Enters a scene in the series, with what every frame has; none where its step has a frame.
+    fn entered(&mut self, mut scene: Scene) -> Result<Option<Scene>> {
+        if self.written.iter().any(|(_, written)| *written == scene.step) {
+            return Ok(None);
+        }
+        if scene.cells[1] > 0 {
+            self.complete(&mut scene)?;
+        }
+        if self.grid.is_none() {
+            let folder = self.directory.join(self.names[0]);
+            std::fs::create_dir_all(&folder)
+                .map_err(|error| Error::Unwritable { path: folder, reason: error.to_string() })?;
+            self.grid = Some(Arc::new(vtu::Grid::new(scene.cells)));
+        }
+        self.written.push((scene.t, scene.step));
+        Ok(Some(scene))
+    }
+
+    /// Adds what every frame of a mesh in two dimensions has.
+    fn complete(&self, scene: &mut Scene) -> Result<()> {
+        let lattice = Lattice::new(scene.cells, scene.periodic)?;
         // an unknown may have that name
-        let density = if unknowns.iter().any(|unknown| unknown == "rho") { "mesh density" } else { "rho" };
-        nodes.push((density.into(), scalars(&state.rho)));
-        nodes.push(("mesh velocity".into(), Values::Vectors(lattice.closed(&self.velocity(state)).into_owned())));
-        let subdomains = Decomposition::new(lattice, self.subdomains)?.of_cells();
-        let inside = |name: &str| match unknowns.iter().any(|unknown| unknown == name) {
-            true => format!("{name} of cells"),
-            false => name.into(),
-        };
-        let cells = [
-            (inside("Q"), Values::Scalars(cell_qualities(&state.mesh))),
-            (inside("jacobian"), Values::Scalars(cell_jacobians(&state.mesh))),
-            (inside("subdomain"), Values::Numbers(subdomains)),
-        ];
-        let points = state.mesh.closed().into_owned();
-        self.written.push((state.t, state.step));
-        let series = self.series();
-        let grid = self.grid.get_or_insert_with(|| Arc::new(vtu::Grid::new(lattice.cells()))).clone();
-        let [frame, index] = [self.name(state.step).as_str(), self.names[1]].map(|name| self.directory.join(name));
-        self.writer.get_or_insert_with(Writer::start).write(Box::new(move || {
-            write_file(&frame, grid.document(&points, &nodes, &cells).as_bytes())?;
-            write_file(&index, series.as_bytes())
-        }));
+        let name = if scene.has("rho") { "mesh density" } else { "rho" };
+        let density = scene.density.take().unwrap_or_else(|| vec![1.0; scene.points.len()]);
+        let velocity = lattice.closed(&self.velocity(scene.t, lattice.len())).into_owned();
+        let subdomains = Decomposition::new(&lattice, self.subdomains)?.of_cells();
+        scene.add_to_cells("subdomain", Values::Numbers(subdomains));
+        scene.nodal.push((name.into(), Values::Scalars(density)));
+        scene.nodal.push(("mesh velocity".into(), Values::Vectors(velocity)));
         Ok(())
     }
 
@@ -212,33 +214,22 @@ impl Frames {
         vtu::collection(self.written.iter().map(|(t, step)| (*t, self.name(*step))))
     }
 
-    /// Goes on behind the frames that a checkpoint knows of, from its state; later ones are removed.
+    /// Goes on behind the frames that a checkpoint knows of; later ones are removed.
     ///
     /// # Errors
     /// [`Unfit`] where they are not there.
-    pub(crate) fn resume(
-        directory: &Path,
-        at: FramesAt,
-        subdomains: [usize; 2],
-        state: &State,
-        kept: &Kept,
-    ) -> Result<Self, Unfit> {
+    pub(crate) fn resume(directory: &Path, at: FramesAt, subdomains: [usize; 2], kept: &Kept) -> Result<Self, Unfit> {
         let beside = |file: &Path, error: &dyn std::fmt::Display| Unfit::Beside {
             file: file.display().to_string(),
             reason: error.to_string(),
         };
-        let mut frames = Self::create(directory, at, subdomains).map_err(|error| beside(directory, &error))?;
         let KeptFrames { written, before } = kept.get("frames")?;
-        let names: Vec<PathBuf> = written.iter().map(|(_, step)| directory.join(frames.name(*step))).collect();
+        let mut frames = Self::create(directory, at, subdomains);
+        (frames.written, frames.nodes) = (written, [None, before]);
+        let names: Vec<PathBuf> = frames.written.iter().map(|(_, step)| directory.join(frames.name(*step))).collect();
         if let Some(missing) = names.iter().find(|name| !name.is_file()) {
             return Err(beside(missing, &"it is not there"));
         }
-        if let Some((t, x)) = before {
-            check_nodal("frame before", &x, state.mesh.x().len())?;
-            frames.nodes[1] = Some((t, x));
-        }
-        frames.nodes[0] = Some((state.t, state.mesh.x().to_vec()));
-        frames.written = written;
         let entries = std::fs::read_dir(directory.join(frames.names[0])).into_iter().flatten().flatten();
         for later in entries.map(|entry| entry.path()).filter(|path| is_frame(path) && !names.contains(path)) {
             std::fs::remove_file(&later).map_err(|error| beside(&later, &error))?;
@@ -263,36 +254,35 @@ impl Frames {
         }
     }
 
-    /// How fast the nodes moved in the step that led to a state; they rest at the start.
-    fn velocity(&self, state: &State) -> Vec<[f64; 2]> {
+    /// How fast the nodes moved in the step that led to a time; they rest at the start.
+    fn velocity(&self, now: f64, nodes: usize) -> Vec<[f64; 2]> {
         match &self.nodes {
-            [Some((t, x)), Some((before, old))] if *t == state.t && t > before => {
+            [Some((t, x)), Some((before, old))] if *t == now && t > before && x.len() == old.len() => {
                 let per = 1.0 / (t - before);
                 x.iter().zip(old).map(|(x, old)| [0, 1].map(|d| (x[d] - old[d]) * per)).collect()
             }
-            _ => vec![[0.0; 2]; state.rho.len()],
+            _ => vec![[0.0; 2]; nodes],
         }
     }
 }
 
 impl Observer for Frames {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        let state = snapshot.state;
-        if event == Event::Resumed {
-            return Ok(());
+        // the nodes before those of a checkpoint are in it
+        if matches!(event, Event::Started | Event::Stepped) {
+            self.nodes.swap(0, 1);
         }
         if event != Event::Finished {
-            self.nodes.swap(0, 1);
-            let [newest, _] = &mut self.nodes;
-            let (t, x) = newest.get_or_insert_default();
-            *t = state.t;
+            let (t, x) = self.nodes[0].get_or_insert_default();
+            *t = snapshot.t;
             x.clear();
-            x.extend_from_slice(state.mesh.x());
+            x.extend_from_slice(snapshot.nodes);
         }
         match event {
-            Event::Stepped if !self.at.due(state.step, state.t, snapshot.dt) => Ok(()),
-            Event::Finished => self.write(snapshot.unknowns, state),
-            _ => self.start(snapshot.unknowns, state),
+            Event::Resumed => Ok(()),
+            Event::Stepped if !self.at.due(snapshot.step, snapshot.t, snapshot.dt) => Ok(()),
+            Event::Finished => self.write(vec![(snapshot.scene)()]),
+            _ => self.start((snapshot.scene)()),
         }
     }
 

@@ -1,12 +1,13 @@
 use super::rows::Rows;
 use crate::error::{Result, Unfit};
 use crate::kept::Kept;
-use crate::simulation::{Event, Observer, Snapshot};
+use crate::simulation::{Event, Moving, Observer, Snapshot};
 use serde::Serialize;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// `history.csv`: one row for the initial state and one a step; iterations, rejected steps and seconds are totals since the start.
+/// `history.csv`: one row for the initial state and one a step; iterations, rejected steps and seconds are totals since
+/// the start.
 ///
 /// Rows reach the file whole, and twice a second: a call of the system for each would cost as much as a small step.
 #[derive(Debug)]
@@ -70,23 +71,24 @@ impl Observer for History {
             Event::Finished => return self.flush(),
             Event::Started | Event::Stepped => {}
         }
-        let work = snapshot.work.work;
-        let contraction = snapshot.interface.and_then(|i| i.contraction);
+        // runs of other kinds have other columns
+        let Some(Moving { quality, error, work: total, interface, .. }) = &snapshot.moving else { return Ok(()) };
+        let contraction = interface.and_then(|i| i.contraction);
         let row = Row {
-            t: snapshot.state.t,
+            t: snapshot.t,
             dt: snapshot.dt,
-            min_scaled_jacobian: snapshot.quality.min_scaled_jacobian,
-            q_max: snapshot.quality.q_max,
-            q_mean: snapshot.quality.q_mean,
-            error_linf: snapshot.error.map(|e| e.linf),
-            error_l2: snapshot.error.map(|e| e.l2),
-            linear_iterations: work.linear_iterations,
-            newton_iterations: work.newton_iterations,
-            interface_standard_error: snapshot.interface.and_then(|i| i.standard_error),
-            interface_noise: snapshot.interface.and_then(|i| i.noise),
+            min_scaled_jacobian: quality.min_scaled_jacobian,
+            q_max: quality.q_max,
+            q_mean: quality.q_mean,
+            error_linf: error.map(|e| e.linf),
+            error_l2: error.map(|e| e.l2),
+            linear_iterations: total.work.linear_iterations,
+            newton_iterations: total.work.newton_iterations,
+            interface_standard_error: interface.and_then(|i| i.standard_error),
+            interface_noise: interface.and_then(|i| i.noise),
             contraction_observed: contraction.map(|c| c.observed),
             contraction_predicted: contraction.and_then(|c| c.predicted),
-            rejected_steps: snapshot.work.rejected_steps,
+            rejected_steps: total.rejected_steps,
             seconds: snapshot.seconds,
         };
         self.rows.add(row)?;

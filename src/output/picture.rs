@@ -1,9 +1,7 @@
 use super::directory::write_file;
 use crate::error::Result;
-use crate::simulation::State;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::{tiny_skia, usvg};
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -56,74 +54,10 @@ pub(super) const BOTTOM: f64 = 64.0;
 pub(super) const BAR: f64 = 24.0;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
-/// Opacities with which mesh lines may be drawn: a line beside wide cells is drawn more strongly than one between narrow cells,
-/// so that crowded lines do not hide the colours.
-const STRENGTHS: [f64; 8] = [0.04, 0.08, 0.13, 0.19, 0.26, 0.35, 0.46, 0.6];
-/// Steps from white to black lines, and the shares of the colour map over which they change.
-const TONES: usize = 5;
-const WHITE_UP_TO: f64 = 0.35;
-const BLACK_FROM: f64 = 0.65;
-/// From the middle of a white line beside a black one to that of both: half a pixel of the PNG.
-const BESIDE: f64 = 0.25;
-const FADES: f64 = 0.08;
 /// An axis that begins so little below a round number, as a share of its length, counts from there.
 const NEARLY: f64 = 0.05;
 /// Bytes of a part of a PNG.
 const CHUNK: usize = 1 << 16;
-/// Cells drawn along an axis; a finer mesh shows every second, third … line.
-const MAX_CELLS: usize = 240;
-
-/// What a picture of a mesh shows.
-#[derive(Debug, Clone)]
-pub(crate) struct Sheet<'a> {
-    /// Above it.
-    pub title: &'a str,
-    /// Above the colour bar.
-    pub unknown: &'a str,
-    /// Cells along ξ and η.
-    pub cells: [usize; 2],
-    /// Axes that wrap around.
-    pub periodic: [bool; 2],
-    /// Lower corner of the box that is shown.
-    pub lower: [f64; 2],
-    /// Its width and height.
-    pub extent: [f64; 2],
-    /// Nodes, of shape cells + 1.
-    pub x: &'a [[f64; 2]],
-    /// Values there.
-    pub u: &'a [f64],
-    /// Values of the first and the last colour; those that occur where nothing is said.
-    pub range: Option<[f64; 2]>,
-    /// A front over all of it.
-    pub line: &'a [[f64; 2]],
-}
-
-/// Draws the mesh of a state over its first unknown, with axes and a colour bar, and a line where there is one.
-pub fn draw(title: &str, unknown: &str, state: &State, line: &[[f64; 2]]) -> Picture {
-    let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
-    let values: Vec<f64> = state.u.component(0).collect();
-    let sheet = Sheet {
-        title,
-        unknown,
-        cells: lattice.cells(),
-        periodic: lattice.periodic(),
-        lower: mesh.lower(),
-        extent: mesh.extent(),
-        x: &mesh.closed(),
-        u: &lattice.closed(&values),
-        range: None,
-        line,
-    };
-    Picture::of(&svg(&sheet), &mut Canvas::default())
-}
-
-impl Sheet<'_> {
-    /// Draws it.
-    pub(crate) fn svg(&self) -> String {
-        svg(self)
-    }
-}
-
 /// Colours of an image, row by row.
 #[derive(Debug, Clone)]
 pub(crate) struct Pixels {
@@ -133,180 +67,8 @@ pub(crate) struct Pixels {
     pub rgba: Vec<u8>,
 }
 
-fn svg(sheet: &Sheet<'_>) -> String {
-    let Sheet { title, unknown, cells, periodic, lower: [lx, ly], extent: [wx, wy], x, u, range, line } = *sheet;
-    let ends = || u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
-    let [low, high] = range.unwrap_or_else(ends);
-    let scale = LONGER / wx.max(wy);
-    let (width, height) = ((wx * scale).max(SHORTER_AT_LEAST), (wy * scale).max(SHORTER_AT_LEAST));
-    let to = |p: [f64; 2]| [LEFT + (p[0] - lx) / wx * width, TOP + height - (p[1] - ly) / wy * height];
-    let (w, h) = (LEFT + width + RIGHT, TOP + height + BOTTOM);
-
-    let mut s = String::new();
-    let _ = writeln!(
-        s,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.0} {h:.0}\" width=\"{w:.0}\" height=\"{h:.0}\" \
-         font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"13\" fill=\"#222\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
-    );
-    heading(&mut s, title, width);
-
-    let lines = cells.map(|n| {
-        let stride = n.div_ceil(MAX_CELLS);
-        (0..n).step_by(stride).chain([n]).collect::<Vec<usize>>()
-    });
-    let at = |i: usize, j: usize| i * (cells[1] + 1) + j;
-    // a periodic mesh leaves the box on one side and enters on the other: it is drawn as often as it shows, cut to size
-    let reach = periodic.map(|periodic| if periodic { vec![-1.0, 0.0, 1.0] } else { vec![0.0] });
-    let shifts: Vec<[f64; 2]> =
-        reach[0].iter().flat_map(|&i| reach[1].iter().map(move |&j| [i * wx, j * wy])).collect();
-    let shown = |corners: &[usize], shift: [f64; 2]| {
-        let outside = |d: usize, low: f64, width: f64| {
-            corners.iter().all(|&k| x[k][d] + shift[d] < low)
-                || corners.iter().all(|&k| x[k][d] + shift[d] > low + width)
-        };
-        !(outside(0, lx, wx) || outside(1, ly, wy))
-    };
-    let through = |path: &mut String, nodes: &mut dyn Iterator<Item = usize>, shift: [f64; 2]| {
-        for (n, k) in nodes.enumerate() {
-            path.push(if n == 0 { 'M' } else { 'L' });
-            add_point(path, to([x[k][0] + shift[0], x[k][1] + shift[1]]));
-        }
-    };
-    if periodic.contains(&true) {
-        let _ = writeln!(
-            s,
-            "<clipPath id=\"box\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\n\
-             <g clip-path=\"url(#box)\">"
-        );
-    } else {
-        s.push_str("<g>\n");
-    }
-    // cells, without soft edges, so that no gap shines through; those of one colour together, and neighbours of one colour
-    // as one strip, which is drawn fast
-    let mut fills: BTreeMap<String, String> = BTreeMap::new();
-    for i in lines[0].windows(2) {
-        let cell = |j: &[usize]| {
-            let corners = [at(i[0], j[0]), at(i[1], j[0]), at(i[1], j[1]), at(i[0], j[1])];
-            let mean = 0.25 * corners.iter().map(|&k| u[k]).sum::<f64>();
-            (corners, colour((mean - low) / (high - low)))
-        };
-        let row: Vec<([usize; 4], String)> = lines[1].windows(2).map(cell).collect();
-        for strip in row.chunk_by(|(_, before), (_, after)| before == after) {
-            let path = fills.entry(strip[0].1.clone()).or_default();
-            let seen = |shift: &&[f64; 2]| strip.iter().any(|(corners, _)| shown(corners, **shift));
-            for &shift in shifts.iter().filter(seen) {
-                let there = [strip[0].0[0]].into_iter().chain(strip.iter().map(|([.., d], _)| *d));
-                let back = strip.iter().rev().map(|([_, _, c, _], _)| *c).chain([strip[0].0[1]]);
-                through(path, &mut there.chain(back), shift);
-                path.push('Z');
-            }
-        }
-    }
-    s.push_str("<g shape-rendering=\"crispEdges\">\n");
-    for (fill, path) in &fills {
-        let _ = writeln!(s, "<path d=\"{path}\" fill=\"{fill}\"/>");
-    }
-    s.push_str("</g>\n");
-
-    // mesh lines, white on dark colours and black on light ones; where neither stands out a white one beside a black one, for
-    // a jump would look like a line of its own; fainter where cells are few pixels wide, so that the colours stay what they
-    // are; one pixel of the PNG wide, which is drawn fast
-    let mut paths = [false, true].map(|_| [0; TONES].map(|_| STRENGTHS.map(|_| String::new())));
-    let tone = |a: usize, b: usize| {
-        let part = (0.5 * (u[a] + u[b]) - low) / (high - low);
-        let black = (part - WHITE_UP_TO) / (BLACK_FROM - WHITE_UP_TO);
-        (black.clamp(0.0, 1.0) * (TONES - 1) as f64).round() as usize
-    };
-    let steep = |a: usize, b: usize| {
-        let [a, b] = [a, b].map(|k| to(x[k]));
-        (b[1] - a[1]).abs() > (b[0] - a[0]).abs()
-    };
-    let strength = |a: usize, b: usize, beside: usize| {
-        let [a, b, c] = [a, b, beside].map(|k| to(x[k]));
-        let [e, f] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
-        let wide = (e[0] * f[1] - e[1] * f[0]).abs() / e[0].hypot(e[1]);
-        STRENGTHS.iter().rposition(|strength| FADES * (wide - 1.0) >= *strength)
-    };
-    let mut mesh_line = |nodes: &[usize], beside: &[usize]| {
-        let look = |e: &[usize], c: usize| Some((steep(e[0], e[1]), tone(e[0], e[1]), strength(e[0], e[1], c)?));
-        let edges: Vec<_> = nodes.windows(2).zip(beside).map(|(e, &c)| (e, look(e, c))).collect();
-        for part in edges.chunk_by(|(_, before), (_, after)| before == after) {
-            let Some((steep, tone, strength)) = part[0].1 else { continue };
-            let seen = |shift: &&[f64; 2]| part.iter().any(|(edge, _)| shown(edge, **shift));
-            for &shift in shifts.iter().filter(seen) {
-                let nodes = [part[0].0[0]].into_iter().chain(part.iter().map(|(edge, _)| edge[1]));
-                through(&mut paths[usize::from(steep)][tone][strength], &mut { nodes }, shift);
-            }
-        }
-    };
-    let neighbours = |lines: &[usize]| -> Vec<[usize; 2]> {
-        (0..lines.len()).map(|k| [lines[k], lines[if k + 1 < lines.len() { k + 1 } else { k - 1 }]]).collect()
-    };
-    for [i, beside] in neighbours(&lines[0]) {
-        let along = |i: usize| lines[1].iter().map(|&j| at(i, j)).collect::<Vec<_>>();
-        mesh_line(&along(i), &along(beside));
-    }
-    for [j, beside] in neighbours(&lines[1]) {
-        let along = |j: usize| lines[0].iter().map(|&i| at(i, j)).collect::<Vec<_>>();
-        mesh_line(&along(j), &along(beside));
-    }
-    let [flat, steep] = paths.map(|tones| tones.into_iter().enumerate());
-    let tones = flat.map(|tone| ([0.0, BESIDE], tone)).chain(steep.map(|tone| ([BESIDE, 0.0], tone)));
-    for (side, (tone, paths)) in tones {
-        let black = tone as f64 / (TONES - 1) as f64;
-        let mixed = black > 0.0 && black < 1.0;
-        let lines =
-            [("#fff", 1.0 - black, -1.0), ("#000", black, 1.0)].into_iter().filter(|(_, share, _)| *share > 0.0);
-        for (path, strength) in paths.iter().zip(STRENGTHS).filter(|(path, _)| !path.is_empty()) {
-            for (colour, share, way) in lines.clone() {
-                let aside = if mixed {
-                    format!(" transform=\"translate({} {})\"", way * side[0], way * side[1])
-                } else {
-                    String::new()
-                };
-                let _ = writeln!(
-                    s,
-                    "<path d=\"{path}\"{aside} fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"{:.3}\" stroke-width=\"0.5\"/>",
-                    strength * share
-                );
-            }
-        }
-    }
-    if !line.is_empty() {
-        let points: Vec<String> = line.iter().map(|p| point(to(*p))).collect();
-        let points = points.join(" ");
-        for (colour, width) in [("white", 4.5), ("#d55e00", 2.5)] {
-            let _ = writeln!(
-                s,
-                "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"/>"
-            );
-        }
-    }
-    s.push_str("</g>\n");
-
-    let stretched = [width / wx, height / wy].map(|each| each / scale);
-    let names = ["x", "y"].into_iter().zip(stretched).map(|(name, factor)| match factor > 1.0 + 1e-9 {
-        true => format!("{name}, stretched {} times", factor.round()),
-        false => name.into(),
-    });
-    axes(&mut s, [lx, ly], [wx, wy], [width, height], &names.collect::<Vec<_>>());
-    colour_bar(&mut s, unknown, low, high, LEFT + width + BAR, height);
-    if !line.is_empty() {
-        let (x, y) = (LEFT + width + BAR, TOP + height + 20.0);
-        let _ = writeln!(
-            s,
-            "<path d=\"M{x:.1} {:.1}h16\" stroke=\"#d55e00\" stroke-width=\"2.5\"/><text x=\"{:.1}\" y=\"{y:.1}\">front</text>",
-            y - 4.5,
-            x + 25.0
-        );
-    }
-    s.push_str("</svg>\n");
-    s
-}
-
-/// The title, over the box; over the whole drawing where it is too wide for that, and as small as it needs to be; in two
-/// lines where that would be too small to read.
+/// The title, over the box; over the whole drawing where it is too wide for that, and as small as it needs to be; in
+/// two lines where that would be too small to read.
 pub(super) fn heading(s: &mut String, title: &str, width: f64) {
     const SIZE: f64 = 15.0;
     const LEGIBLE: f64 = 10.0;
@@ -341,14 +103,16 @@ pub(super) fn axes(
     let bottom = TOP + height;
     let _ = writeln!(
         s,
-        "<g stroke=\"#222\" fill=\"none\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" height=\"{height:.1}\"/></g>"
+        "<g stroke=\"#222\" fill=\"none\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" \
+         height=\"{height:.1}\"/></g>"
     );
     let [along, up] = [0, 1].map(|d| Ticks::between(lower[d], lower[d] + extent[d]));
     for (value, label) in &along.marks {
         let x = LEFT + (value - lower[0]) / extent[0] * width;
         let _ = writeln!(
             s,
-            "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
+            "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" \
+             text-anchor=\"middle\">{label}</text>",
             bottom + 20.0
         );
     }
@@ -356,7 +120,8 @@ pub(super) fn axes(
         let y = bottom - (value - lower[1]) / extent[1] * height;
         let _ = writeln!(
             s,
-            "<path d=\"M{LEFT} {y:.1}h-5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+            "<path d=\"M{LEFT} {y:.1}h-5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\" \
+             text-anchor=\"end\">{label}</text>",
             LEFT - 9.0,
             y + 4.5
         );
@@ -500,14 +265,15 @@ pub(super) fn colour(fraction: f64) -> String {
     format!("#{c:x}")
 }
 
-fn point(p: [f64; 2]) -> String {
+pub(super) fn point(p: [f64; 2]) -> String {
     let mut text = String::new();
     add_point(&mut text, p);
     text
 }
 
-/// A point of the drawing to a hundredth, by whole numbers: `format` of floating point takes longer than the rest of a picture.
-fn add_point(text: &mut String, point: [f64; 2]) {
+/// A point of the drawing to a hundredth, by whole numbers: `format` of floating point takes longer than the rest of a
+/// picture.
+pub(super) fn add_point(text: &mut String, point: [f64; 2]) {
     for (value, end) in point.into_iter().zip([",", ""]) {
         let hundredths = (100.0 * value).round() as i64;
         let sign = if hundredths < 0 { "-" } else { "" };
@@ -558,7 +324,8 @@ impl Canvas {
     }
 }
 
-/// Pixels as PNG, without their opacity, which is full; compressed fast, since writing must not take longer than computing.
+/// Pixels as PNG, without their opacity, which is full; compressed fast, since writing must not take longer than
+/// computing.
 fn encoded(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());

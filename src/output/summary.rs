@@ -1,36 +1,90 @@
 use crate::error::{Error, Failure};
-use crate::simulation::{Report, Retries, Seconds, WorkTotal};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-/// `summary.json`.
+/// `summary.json`: what runs of all kinds of studies say, and the figures of one kind.
 #[derive(Debug, Clone, Serialize)]
-pub struct Summary {
+#[serde(bound = "")]
+pub struct Summary<F: Figures> {
     /// Version of this format.
     pub schema: u32,
     /// Name of the study.
     pub study: String,
     /// Kind of the study.
-    pub kind: String,
+    pub kind: &'static str,
     /// Version of the program.
-    pub version: String,
-    /// `running`, `completed`, `interrupted` or `failed`.
-    pub status: String,
-    /// What failed and when, if it did.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub error: Option<Failed>,
+    pub version: &'static str,
+    /// `running`, `completed`, `interrupted`, `not-converged` or `failed`.
+    pub status: &'static str,
+    /// What failed and when, if something did.
+    #[serde(flatten)]
+    pub ended: Option<Ended>,
     /// Where the time went.
-    pub seconds: Seconds,
+    pub seconds: Spent<F::Parts>,
     /// What the run had at its disposal.
     pub parallel: Parallel,
-    /// Steps and their cost.
-    pub work: WorkTotal,
-    /// Steps that were tried again.
-    pub safety: Retries,
-    /// One entry for each time of `time.report` that was reached.
-    pub reports: Vec<Report>,
+    /// What a study of this kind finds.
+    #[serde(flatten)]
+    pub figures: F,
     /// What the user should know although nothing failed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+impl<F: Figures> Summary<F> {
+    /// The summary of a run that has just begun.
+    pub(crate) fn running(study: &str, kind: &'static str) -> Self {
+        Self {
+            schema: 1,
+            study: study.into(),
+            kind,
+            version: env!("CARGO_PKG_VERSION"),
+            status: "running",
+            ended: None,
+            seconds: Spent::default(),
+            parallel: Parallel { ranks: 1, threads: rayon::current_num_threads() },
+            figures: F::default(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Notes how the run ended, with the remedy of a failure in the words of the study.
+    pub(crate) fn note(&mut self, failure: Option<&Error>, remedy: impl Fn(&Error) -> Option<String>) {
+        self.status = status(failure);
+        self.ended = failure.map(|error| F::ENDED(Failed::of(error, remedy(error))));
+    }
+}
+
+/// What a study of one kind finds, as `summary.json` has it.
+pub trait Figures: Clone + Default + Serialize {
+    /// Seconds of the parts of a run.
+    type Parts: std::fmt::Debug + Copy + Default + Serialize;
+
+    /// The name under which a failure is told.
+    const ENDED: fn(Failed) -> Ended = Ended::Error;
+}
+
+/// What ended a run early, under the name that it has in `summary.json`.
+#[derive(Debug, Clone, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Ended {
+    /// Where the errors of the solution are told report by report.
+    Error(Failed),
+    /// Where `error` is, or could be taken for, an error of the solution.
+    Failure(Failed),
+}
+
+/// Seconds that a run took, over all its parts.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub struct Spent<P> {
+    /// By the clock.
+    pub wall: f64,
+    /// Of all threads.
+    pub cpu: f64,
+    /// By what was computed.
+    #[serde(flatten)]
+    pub parts: P,
+    /// Watching and writing: progress, history, frames, pictures.
+    pub output: f64,
 }
 
 /// A failure in `summary.json`.
@@ -54,7 +108,7 @@ pub struct Failed {
 
 impl Failed {
     /// What is told of an error, with the remedy in the words of the study.
-    pub(crate) fn of(error: &Error, help: Option<String>) -> Self {
+    fn of(error: &Error, help: Option<String>) -> Self {
         let (kind, moment) = match error.cause() {
             Error::Failed { failure, moment } => (failure.name(), *moment),
             Error::Interrupted(moment) => ("interrupted", Some(*moment)),
@@ -72,7 +126,7 @@ impl Failed {
 }
 
 /// `status` of a run that has ended, from what ended it early.
-pub(crate) fn status(failure: Option<&Error>) -> &'static str {
+fn status(failure: Option<&Error>) -> &'static str {
     match failure.map(Error::cause) {
         None => "completed",
         Some(Error::Failed { failure: Failure::NotConverged { .. }, .. }) => "not-converged",

@@ -1,3 +1,4 @@
+use crate::simulation::{Scene, Values};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
 use std::fmt::Write;
@@ -6,14 +7,6 @@ use std::io::Write as _;
 /// VTK's numbers of the shapes of cells.
 const LINE: u8 = 3;
 const QUAD: u8 = 9;
-
-/// A named array with one value, or the two components of a vector, for each point or cell.
-#[derive(Debug)]
-pub(crate) enum Values {
-    Scalars(Vec<f64>),
-    Vectors(Vec<[f64; 2]>),
-    Numbers(Vec<usize>),
-}
 
 /// A series of unstructured grids over one lattice, as `.vtu` files with compressed inline arrays.
 #[derive(Debug)]
@@ -25,16 +18,16 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Quadrilaterals.
+    /// Quadrilaterals; pieces of a line where there are no cells along the second axis.
     pub fn new(cells: [usize; 2]) -> Self {
         let row = cells[1] + 1;
-        let corners = (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| i * row + j));
-        Self::of(QUAD, corners.map(|k| [k, k + row, k + row + 1, k + 1]))
-    }
-
-    /// Pieces of a line.
-    pub fn line(cells: usize) -> Self {
-        Self::of(LINE, (0..cells).map(|k| [k, k + 1]))
+        match cells {
+            [pieces, 0] => Self::of(LINE, (0..pieces).map(|k| [k, k + 1])),
+            _ => {
+                let corners = (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| i * row + j));
+                Self::of(QUAD, corners.map(|k| [k, k + row, k + row + 1, k + 1]))
+            }
+        }
     }
 
     /// Cells of one shape, by the nodes at their corners.
@@ -47,19 +40,19 @@ impl Grid {
         Self { count, topology: xml.text + "</Cells>\n" }
     }
 
-    /// One document: `points` and `nodes` in the order of the lattice, `cells` one value a cell.
-    pub fn document(&self, points: &[[f64; 2]], nodes: &[(String, Values)], cells: &[(String, Values)]) -> String {
+    /// One document.
+    pub fn document(&self, scene: &Scene) -> String {
         let mut xml = Xml::of(format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
              header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n\
              <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n<Points>\n",
-            points.len(),
+            scene.points.len(),
             self.count
         ));
-        xml.vectors("Points", points);
+        xml.vectors("Points", &scene.points);
         xml.text.push_str("</Points>\n");
         xml.text.push_str(&self.topology);
-        for (tag, fields) in [("PointData", nodes), ("CellData", cells)] {
+        for (tag, fields) in [("PointData", &scene.nodal), ("CellData", &scene.in_cells)] {
             let _ = writeln!(xml.text, "<{tag}>");
             for (name, values) in fields {
                 match values {

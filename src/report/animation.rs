@@ -2,7 +2,8 @@ use super::files::RunFiles;
 use super::frame::Frame;
 use super::viewer::clock;
 use crate::error::{Error, Result};
-use crate::output::{COLOURS, Canvas, Curve, Figure, Picture, Scale, Sheet, write_file};
+use crate::output::{COLOURS, Canvas, Curve, Figure, Picture, Scale, svg, write_file};
+use crate::simulation::{Scene, Values};
 use gif::{Encoder, Repeat};
 use plotters::style::RGBColor;
 use std::collections::HashMap;
@@ -150,20 +151,20 @@ fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Drawing
     Box::new(move |frame| {
         let along =
             |j: usize| (0..=frame.cells[0]).filter_map(move |i| frame.x.get(i * (frame.cells[1] + 1) + j).copied());
-        let line: Vec<[f64; 2]> = front.filter(|j| *j <= frame.cells[1]).map_or(Vec::new(), |j| along(j).collect());
-        let sheet = Sheet {
-            title: &title(run, frame),
-            unknown,
+        let scene = Scene {
+            t: frame.t,
+            step: 0,
             cells: frame.cells,
             periodic,
             lower,
             extent: [upper[0] - lower[0], upper[1] - lower[1]],
-            x: &frame.x,
-            u: &frame.fields[0].1,
-            range: Some(range),
-            line: &line,
+            points: frame.x.clone(),
+            nodal: vec![(unknown.into(), Values::Scalars(frame.fields[0].1.clone()))],
+            density: None,
+            in_cells: Vec::new(),
+            curve: front.filter(|j| *j <= frame.cells[1]).map_or(Vec::new(), |j| along(j).collect()),
         };
-        sheet.svg()
+        svg(&title(run, frame), &scene, Some(range))
     })
 }
 

@@ -10,14 +10,16 @@ mod observer;
 mod pace;
 mod record;
 mod safety;
+mod scene;
 mod schedule;
 
 pub use benefit::Benefit;
 pub(crate) use checkpoint::{Checkpoint, Course, Keeper};
 pub use coupling::Coupling;
-pub use observer::{Advance, Event, Observer, Snapshot};
+pub use observer::{Event, Moving, Observer, Snapshot};
 pub use record::{Conserved, ErrorNorms, Record, Report, Seconds, WorkTotal};
 pub use safety::{Retries, Safety};
+pub use scene::{Scene, Values};
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
@@ -353,16 +355,16 @@ impl Simulation {
         let output = Instant::now();
         let (quality, error) = self.assess(state);
         let snapshot = Snapshot {
-            state,
-            unknowns: &self.physics.unknowns(),
+            t: state.t,
+            step: state.step,
             dt,
             steps: self.schedule.steps(),
             share: (state.t - self.schedule.start()) / (self.schedule.end() - self.schedule.start()),
-            quality,
-            error,
-            work: record.work,
-            interface: record.interface,
+            smallest: quality.min_scaled_jacobian,
             seconds: clock.seconds(),
+            nodes: state.mesh.x(),
+            scene: &|| state.scene(&self.physics.unknowns()),
+            moving: Some(Moving { state, quality, error, work: record.work, interface: record.interface }),
         };
         let outcome = observers.iter_mut().try_for_each(|observer| observer.observe(event, &snapshot));
         record.seconds.output += output.elapsed().as_secs_f64();

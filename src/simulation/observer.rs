@@ -1,6 +1,6 @@
-//! Who watches a run: each observer sees the state after every step.
+//! Who watches a run: each observer is told of every step.
 
-use super::{ErrorNorms, State, WorkTotal};
+use super::{ErrorNorms, Scene, State, WorkTotal};
 use crate::error::Result;
 use crate::geometry::Quality;
 use crate::kept::Kept;
@@ -19,46 +19,51 @@ pub enum Event {
     Finished,
 }
 
-/// What an observer sees.
-#[derive(Debug)]
+/// What an observer sees of a run of any kind.
 pub struct Snapshot<'a> {
-    /// Time, mesh and solution.
-    pub state: &'a State,
-    /// Names of the unknowns.
-    pub unknowns: &'a [String],
+    /// Simulated time.
+    pub t: f64,
+    /// Time steps done.
+    pub step: usize,
     /// Length of the step that led here; 0 at the start.
     pub dt: f64,
-    /// Number of steps of the whole run.
+    /// Time steps of the whole run, where they are known before.
     pub steps: Option<usize>,
     /// Share of the simulated time that is done, 0 … 1.
     pub share: f64,
-    /// Quality of the mesh.
-    pub quality: Quality,
-    /// Error where an exact solution is known.
-    pub error: Option<ErrorNorms>,
-    /// Work so far.
-    pub work: WorkTotal,
-    /// What the last step knows about the interfaces between subdomains.
-    pub interface: Option<Interface>,
-    /// Seconds since the run began, over all its parts.
-    pub seconds: f64,
-}
-
-/// How far a run on a line has come in time.
-#[derive(Debug, Clone, Copy)]
-pub struct Advance {
-    /// Time.
-    pub t: f64,
-    /// Steps done.
-    pub step: usize,
-    /// Steps of the whole run, where they are known.
-    pub steps: Option<usize>,
-    /// Share of the simulated time that is done, 0 … 1.
-    pub share: f64,
-    /// The smallest Jacobian over that of equal cells: on a line, the shortest cell over the mean one.
+    /// The smallest corner Jacobian over that of equal cells; on a line, the shortest cell over the mean one.
     pub smallest: f64,
     /// Seconds since the run began, over all its parts.
     pub seconds: f64,
+    /// Positions of the nodes of a mesh in two dimensions, in lattice order; empty for a line.
+    pub nodes: &'a [[f64; 2]],
+    /// Makes the scene of this moment. It is a function, since a scene costs as much as a small step and most steps are
+    /// not drawn.
+    pub scene: &'a dyn Fn() -> Scene,
+    /// More of a simulation of a moving mesh; none of a run of another kind.
+    pub moving: Option<Moving<'a>>,
+}
+
+/// What an observer sees of a simulation of a moving mesh beside what runs of all kinds have.
+#[derive(Debug)]
+pub struct Moving<'a> {
+    /// Time, mesh, solution and density.
+    pub state: &'a State,
+    /// Quality of the mesh.
+    pub quality: Quality,
+    /// Error of the solution where an exact one is known.
+    pub error: Option<ErrorNorms>,
+    /// Work so far.
+    pub work: WorkTotal,
+    /// What the last step found at the interfaces between subdomains.
+    pub interface: Option<Interface>,
+}
+
+impl<'a> Snapshot<'a> {
+    /// The state of a moving mesh; none of a run of another kind.
+    pub fn state(&self) -> Option<&'a State> {
+        self.moving.as_ref().map(|moving| moving.state)
+    }
 }
 
 /// Something that follows a run.
@@ -77,9 +82,6 @@ pub trait Observer {
     fn adapting(&mut self, _state: &State) -> Result<()> {
         Ok(())
     }
-
-    /// Called in place of [`observe`](Self::observe) after every step of a run on a line.
-    fn advanced(&mut self, _advance: &Advance) {}
 
     /// Asked after every step: true ends the run there, with a checkpoint where it has any.
     fn interrupts(&self) -> bool {

@@ -1,5 +1,6 @@
-use super::moving_mesh::Header;
-use super::{EquidistributionStudy, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
+use super::kind::Kind;
+use super::runner::{self, Begin};
+use super::{EquidistributionStudy, Header, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
 use crate::error::{Act, Error, Failure, Result, Unfit};
 use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing};
 use crate::simulation::Observer;
@@ -7,15 +8,6 @@ use schemars::generate::SchemaSettings;
 use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;
-
-/// Where a run begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Begin {
-    /// At its start.
-    Anew,
-    /// At the newest checkpoint; at its start where there is none.
-    Resumed,
-}
 
 /// A study of any kind.
 #[derive(Debug, Clone)]
@@ -29,6 +21,18 @@ pub enum Study {
     Stefan(StefanStudy),
     /// Of kind `equidistribution`.
     Equidistribution(EquidistributionStudy),
+}
+
+/// Does the same with a study of any [`Kind`].
+macro_rules! each {
+    ($study:expr, $it:ident => $does:expr) => {
+        match $study {
+            Study::MovingMesh($it) => $does,
+            Study::Poisson($it) => $does,
+            Study::Stefan($it) => $does,
+            Study::Equidistribution($it) => $does,
+        }
+    };
 }
 
 impl Study {
@@ -58,14 +62,14 @@ impl Study {
     pub fn schema() -> serde_json::Value {
         let mut generator = SchemaSettings::draft2020_12().for_deserialize().into_generator();
         let kinds = [
-            ("moving-mesh", generator.subschema_for::<MovingMesh>()),
-            ("poisson", generator.subschema_for::<PoissonStudy>()),
-            ("stefan", generator.subschema_for::<StefanStudy>()),
-            ("equidistribution", generator.subschema_for::<EquidistributionStudy>()),
+            (StudyKind::MovingMesh, generator.subschema_for::<MovingMesh>()),
+            (StudyKind::Poisson, generator.subschema_for::<PoissonStudy>()),
+            (StudyKind::Stefan, generator.subschema_for::<StefanStudy>()),
+            (StudyKind::Equidistribution, generator.subschema_for::<EquidistributionStudy>()),
         ];
         // the kind decides, so that an editor complains of what is wrong in it and not of four kinds
         let each = kinds.map(|(kind, schema)| {
-            let named = json!({ "properties": { "study": { "properties": { "kind": { "const": kind } } } } });
+            let named = json!({ "properties": { "study": { "properties": { "kind": { "const": kind.name() } } } } });
             json!({ "if": named, "then": schema })
         });
         json!({
@@ -82,16 +86,9 @@ impl Study {
     /// Runs it into a directory, and says why it ended early, if it did. Observers watch what goes step by step.
     ///
     /// # Errors
-    /// As the `run` of each kind; [`Error::Checkpoint`] where there are checkpoints, but none that will do.
+    /// As [`Kind::run`].
     pub fn run(&self, directory: &Path, begin: Begin, watchers: &mut [&mut dyn Observer]) -> Result<Option<Error>> {
-        Ok(match (self, begin) {
-            (Self::MovingMesh(study), Begin::Anew) => super::run(study, directory, watchers)?.failure,
-            (Self::MovingMesh(study), Begin::Resumed) => super::resume(study, directory, watchers)?.failure,
-            (Self::Stefan(study), Begin::Anew) => study.run(directory, watchers)?.failure,
-            (Self::Stefan(study), Begin::Resumed) => study.resume(directory, watchers)?.failure,
-            (Self::Poisson(study), _) => study.run(directory).map(|_| None)?,
-            (Self::Equidistribution(study), _) => study.run_from(directory, watchers, begin)?.failure,
-        })
+        each!(self, study => study.run(directory, begin, watchers).map(|finished| finished.failure))
     }
 
     /// How far the run of this very study in a directory came.
@@ -110,57 +107,53 @@ impl Study {
         Ok(standing)
     }
 
-    /// The step of a checkpoint of this study, from the bytes behind its checksum: whatever they are, what a run could not go
-    /// on from is refused, and nothing is allocated that they do not fill.
+    /// The step of a checkpoint of this study, from the bytes behind its checksum: whatever they are, what a run could
+    /// not go on from is refused, and nothing is allocated that they do not fill.
     ///
     /// # Errors
     /// [`Unfit`] with what is wrong.
     pub fn decode(&self, bytes: &[u8]) -> Result<usize, Unfit> {
-        match self {
-            Self::MovingMesh(study) => super::run::decode(study, bytes),
-            Self::Stefan(study) => study.decode(bytes),
-            Self::Equidistribution(study) => study.decode(bytes),
-            Self::Poisson(_) => Err(Unfit::Foreign),
-        }
+        each!(self, study => runner::decode(study, bytes))
     }
 
     /// The remedy for an error, in the keys of this study.
     pub fn remedy(&self, error: &Error) -> Option<String> {
-        match self {
-            Self::MovingMesh(study) => study.remedy(error),
-            Self::Poisson(study) => study.remedy(error),
-            Self::Stefan(study) => study.remedy(error),
-            Self::Equidistribution(study) => study.remedy(error),
-        }
+        each!(self, study => study.remedy(error))
     }
 
     /// What this study may change against a failure, each with the keys that take the change.
     pub fn offers(&self, failure: &Failure) -> Vec<(Act, Vec<String>)> {
-        match self {
-            Self::MovingMesh(study) => super::remedy::offers(study, failure),
-            Self::Poisson(study) => super::remedy::offers(study, failure),
-            Self::Stefan(study) => super::remedy::offers(study, failure),
-            Self::Equidistribution(study) => super::remedy::offers(study, failure),
-        }
+        each!(self, study => study.offers(failure))
     }
 
     /// The study as a file, every default filled in.
     pub fn to_toml(&self) -> String {
-        match self {
-            Self::MovingMesh(study) => study.to_toml(),
-            Self::Poisson(study) => study.to_toml(),
-            Self::Stefan(study) => study.to_toml(),
-            Self::Equidistribution(study) => study.to_toml(),
-        }
+        each!(self, study => study.to_toml())
     }
 
     /// Its name.
     pub fn name(&self) -> &str {
-        match self {
-            Self::MovingMesh(study) => &study.study.name,
-            Self::Poisson(study) => &study.study.name,
-            Self::Stefan(study) => &study.study.name,
-            Self::Equidistribution(study) => &study.study.name,
-        }
+        each!(self, study => &study.common().0.name)
+    }
+
+    /// Memory that the run needs, in bytes.
+    pub fn memory(&self) -> u128 {
+        each!(self, study => study.memory())
+    }
+
+    /// What is allowed but probably not meant.
+    ///
+    /// # Errors
+    /// As [`Kind::resolve`].
+    pub fn warnings(&self) -> Result<Vec<String>> {
+        each!(self, study => study.warnings())
+    }
+
+    /// Tries what a check of the settings alone does not tell, as far as that takes no time.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] with what a run would end with at its start.
+    pub fn try_start(&self) -> Result<()> {
+        each!(self, study => study.try_start())
     }
 }

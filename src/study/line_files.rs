@@ -1,12 +1,12 @@
 //! Studies of kind `equidistribution`: the files that a run leaves beside its summary.
 
 use super::EquidistributionStudy;
-use super::line_run::{Evolution, NumberedIterate};
+use super::line_figures::NumberedIterate;
+use super::line_run::Evolution;
 use crate::equidistribution::{FaceDensity, History, Line};
-use crate::error::{Error, Result};
-use crate::output::vtu::{Grid, Values, collection};
-use crate::output::{Curve, Figure, RunDirectory, Scale, frame_name, moment, write_file};
-use crate::parallel::map;
+use crate::error::Result;
+use crate::output::{Curve, Figure, RunDirectory, Scale, moment};
+use crate::simulation::{Scene, Values};
 use ndarray::{Array1, Array2, arr0};
 use ndarray_npy::{NpzWriter, WriteNpzError};
 use serde::Serialize;
@@ -16,20 +16,18 @@ use std::io::Cursor;
 const DRAWN: usize = 400;
 /// Places between two nodes at which M is drawn.
 const BETWEEN: usize = 8;
-/// Cells over which M is integrated to round-off; of more each is as good as its trapezoid.
+/// Cells of a line up to which M is integrated to round-off in frames; in more of them the trapezoidal rule is as good.
 const EXACTLY: usize = 10_000;
 /// Paths of nodes drawn in time.
 const PATHS: usize = 40;
 
-/// Writes the history, the arrays, the frames and the pictures; so many frames are there already.
+/// Writes the arrays and the pictures.
 pub(super) fn keep(
     study: &EquidistributionStudy,
     line: &Line,
     directory: &RunDirectory,
     evolution: &Evolution,
-    written: usize,
 ) -> Result<()> {
-    write_series(study, line, directory, evolution, written)?;
     directory.write("final.npz", &arrays(line, evolution))?;
     let mut pictures = vec![(
         "mesh",
@@ -73,54 +71,26 @@ fn arrays(line: &Line, evolution: &Evolution) -> Vec<u8> {
     write().expect("writing to memory cannot fail")
 }
 
-/// `history.csv`, and `frames/*.vtu` with `run.pvd`: the meshes over time; without time those of the iterates, or the one
-/// mesh that there is. Of the frames so many are there already; how many are now is returned.
-///
-/// At the nodes u, where M is the arc length of one, and M; in the cells ∫M and the length, both over their mean, the first
-/// subdomain that a cell lies in and how many more it lies in.
-pub(super) fn write_series(
+/// Writes `history.csv`: the steps of a run in time, or the iterates.
+pub(super) fn write_history(
     study: &EquidistributionStudy,
-    line: &Line,
     directory: &RunDirectory,
     evolution: &Evolution,
-    written: usize,
-) -> Result<usize> {
+) -> Result<()> {
     let iterates = evolution.last.iter().flat_map(|history| &history.iterates);
     let table = match study.time {
         Some(_) => csv_of(&evolution.steps),
         None => csv_of(iterates.enumerate().map(|(n, iterate)| NumberedIterate::new(n, iterate)).collect::<Vec<_>>()),
     };
-    directory.write("history.csv", &table)?;
-    let folder = directory.path().join("frames");
-    std::fs::create_dir_all(&folder)
-        .map_err(|error| Error::Unwritable { path: folder.clone(), reason: error.to_string() })?;
-    let meshes: Vec<(usize, f64, &[f64])> = match (&study.time, &evolution.last) {
-        (Some(_), _) => {
-            let kept = evolution.kept.iter().zip(&evolution.times).zip(&evolution.meshes);
-            kept.map(|((step, t), mesh)| (*step, *t, mesh.as_slice())).collect()
-        }
-        (None, Some(history)) => {
-            let path = history.path.iter().map(|(n, mesh)| (*n, mesh.as_slice()));
-            let last = (history.count(), history.mesh.as_slice());
-            let all = path.filter(|(n, _)| *n < last.0).chain([last]);
-            all.map(|(n, mesh)| (n, n as f64, mesh)).collect()
-        }
-        (None, None) => vec![(0, 0.0, evolution.mesh())],
-    };
-    let ranges = study.decomposition()?.map_or(Vec::new(), |(_, ranges)| ranges);
-    let grid = Grid::line(line.cells);
-    let outcomes = map(&meshes[written..], |&(number, at, mesh)| {
-        let t = study.time.map_or(0.0, |_| at);
-        let document = frame(line, t, mesh, &ranges, &grid);
-        write_file(&directory.path().join(frame_name("frames", number)), document.as_bytes())
-    });
-    outcomes.into_iter().collect::<Result<()>>()?;
-    let files = meshes.iter().map(|(number, at, _)| (*at, frame_name("frames", *number)));
-    directory.write("run.pvd", collection(files).as_bytes())?;
-    Ok(meshes.len())
+    directory.write("history.csv", &table)
 }
 
-fn frame(line: &Line, t: f64, mesh: &[f64], ranges: &[[usize; 2]], grid: &Grid) -> String {
+/// A mesh of the line at time t, shown with a number and at a place on the axis of time that are those of an iterate
+/// where iterates are shown
+///
+/// At the nodes u, where M is the arc length of one, and M; in the cells ∫M and the length, both over their mean, the
+/// first subdomain that a cell lies in and how many more it lies in.
+pub(super) fn scene(line: &Line, shown: (usize, f64), t: f64, mesh: &[f64], ranges: &[[usize; 2]]) -> Scene {
     let [a, b] = line.ends;
     // an iterate that is none may leave the line, where nothing need be known
     let places: Vec<f64> = mesh.iter().map(|x| x.clamp(a, b)).collect();
@@ -145,8 +115,19 @@ fn frame(line: &Line, t: f64, mesh: &[f64], ranges: &[[usize; 2]], grid: &Grid) 
     let cells: Vec<_> = cells
         .chain([("subdomain".into(), Values::Numbers(subdomain)), ("overlap".into(), Values::Numbers(overlap))])
         .collect();
-    let points: Vec<[f64; 2]> = mesh.iter().map(|x| [*x, 0.0]).collect();
-    grid.document(&points, &nodes, &cells)
+    Scene {
+        t: shown.1,
+        step: shown.0,
+        cells: [line.cells, 0],
+        periodic: [false; 2],
+        lower: [a, 0.0],
+        extent: [b - a, 0.0],
+        points: mesh.iter().map(|x| [*x, 0.0]).collect(),
+        nodal: nodes,
+        density: None,
+        in_cells: cells,
+        curve: Vec::new(),
+    }
 }
 
 /// Places in a list, the first and the last among them.
@@ -247,8 +228,8 @@ fn convergence(study: &EquidistributionStudy, history: &History) -> Figure {
         Some(Curve { name: format!("{name}, {rate:.4} in two iterations"), points, plain: true, ..Curve::default() })
     };
     let mut curves = vec![Curve { name: "observed".into(), points: errors.clone(), ..Curve::default() }.outlined()];
-    // slopes: what is predicted holds in the end, before the error stands still; a bound from the start, for even iterates
-    // and odd ones apart
+    // slopes: what is predicted holds in the end, before the error stands still; a bound from the start, for even
+    // iterates and odd ones apart
     let end = errors.iter().rfind(|e| e[1] >= 10.0 * floor).unwrap_or(&errors[last]);
     curves.extend(line("predicted", history.prediction.predicted, *end));
     let [first, second] = [errors[0][1], errors[1.min(last)][1]];

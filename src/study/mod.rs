@@ -1,43 +1,49 @@
 //! From a study file to a run: text → checked parts → simulation → run directory.
 
 mod any;
-mod ending;
+mod common;
 mod equidistribution;
+mod front_checks;
+mod front_figures;
 mod front_run;
+mod kind;
+mod line_checks;
+mod line_figures;
 mod line_files;
 mod line_run;
 mod mapped;
 mod memory;
+mod moving_checks;
 mod moving_mesh;
+mod moving_run;
 mod poisson;
+mod poisson_run;
 mod remedy;
 mod rest;
-mod run;
+mod runner;
 mod source;
 mod stefan;
 mod uniform;
 
-pub use any::{Begin, Study};
+pub use any::Study;
+pub use common::{Header, Output, StudyKind};
 pub use equidistribution::{
     Discretization, EquidistributionStudy, FirstMesh, Integral, Interval, LineArclength, LineDensityKind, LineDomain,
     LineFormula, LineGrid, LineTime, MethodName, SchwarzTable, Start, StopTable,
 };
-pub use front_run::{FrontError, FrontFigures, FrontFinished, FrontReport, FrontSeconds, StefanSummary};
-pub use line_run::{
-    EquidistributionSummary, Evolution, LineFinished, LineQuality, LineSeconds, LineWork, NumberedIterate, PerStep,
-    Rate, StepRow,
-};
+pub use front_figures::{FrontError, FrontFigures, FrontParts, FrontReport, FrontSummary};
+pub use front_run::{FrontCourse, FrontRun};
+pub use kind::{Kind, Running, SpentBy};
+pub use line_figures::{LineFigures, LineParts, LineQuality, LineWork, NumberedIterate, PerStep, Rate, StepRow};
+pub use line_run::{Evolution, LineRun};
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
 pub use memory::check_memory;
-pub use moving_mesh::{
-    Compare, Domain, Grid, Header, MeshForm, MeshTable, MovingMesh, Output, Stepper, StudyKind, Time,
-};
-pub use poisson::{
-    Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonError, PoissonSeconds, PoissonStudy, PoissonSummary,
-    Sides, Solved, SolverKind, SolverTable, StencilReport,
-};
+pub use moving_mesh::{Compare, Domain, Grid, MeshForm, MeshTable, MovingMesh, StartMesh, Stepper, Time};
+pub use moving_run::{MovingFigures, MovingParts, MovingRun};
+pub use poisson::{Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonStudy, Sides, SolverKind, SolverTable};
+pub use poisson_run::{PoissonError, PoissonFigures, PoissonParts, PoissonRun, Solved, StencilReport};
 pub use remedy::failures;
-pub use run::{Finished, compute, resume, run};
+pub use runner::{Begin, Finished, Stage};
 pub use source::Source;
 pub use stefan::{
     Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy,

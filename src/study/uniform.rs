@@ -1,4 +1,4 @@
-use super::{MovingMesh, Source, compute};
+use super::{Kind, MovingMesh, Source};
 use crate::error::Result;
 use crate::physics::PdeKind;
 use crate::simulation::Report;
@@ -23,14 +23,14 @@ const FEWEST: f64 = 8.0;
 const RUNS: usize = 3;
 
 impl MovingMesh {
-    /// The uniform mesh on which second-order differences would have the l_inf of a report; none where the solution is not
-    /// the exact front of Burgers' equation, or the mesh of the study does not move
+    /// The uniform mesh on which second-order differences would have the l_inf of a report; none where the solution is
+    /// not the exact front of Burgers' equation, or the mesh of the study does not move
     ///
     /// Errors on a uniform mesh depend on the cell over the width of the front, so they are measured on a front of
     /// ν = 5e-3, and cells grow like 1/ν. Between runs l_inf ~ h².
     ///
     /// # Errors
-    /// As [`compute`].
+    /// As [`Kind::compute`].
     pub fn uniform_equivalent(&self, report: &Report) -> Result<Option<UniformEquivalent>> {
         let PdeKind::Burgers(burgers) = &self.pde else { return Ok(None) };
         let Some(error) = report.error.filter(|error| error.linf > 0.0 && report.t > self.time.start) else {
@@ -55,8 +55,8 @@ impl MovingMesh {
                 self.time.start,
                 report.t
             );
-            let (record, _) = compute(&Self::from_source(&Source::new("uniform", text))?)?;
-            let Some(found) = record.reports.last().and_then(|report| report.error) else { return Ok(None) };
+            let (run, _) = Self::from_source(&Source::new("uniform", text))?.compute()?;
+            let Some(found) = run.record.reports.last().and_then(|report| report.error) else { return Ok(None) };
             cells *= (found.linf / error.linf).sqrt();
             if cells > MOST {
                 break;

@@ -299,7 +299,7 @@ def test_a_killed_line_leaves_what_it_had(tmp_path):
     settings = ["time.step=1e-6", "output.frames.every=50", "output.checkpoint.steps=200"]
     run = subprocess.Popen(command + [part for setting in settings for part in ("--set", setting)])
     for _ in range(600):
-        if (tmp_path / "run.pvd").exists():
+        if (tmp_path / "history.csv").exists():
             break
         time.sleep(0.05)
     run.kill()

@@ -3,7 +3,7 @@
 use crate::{Rerun, Table};
 use driftmesh::error::Result;
 use driftmesh::output::{Curve, Figure, Scale};
-use driftmesh::study::{EquidistributionStudy, Evolution, Source};
+use driftmesh::study::{EquidistributionStudy, Evolution, Kind, Source};
 
 const FRONT: &str = "(1 - tanh((1 + 249.5*(1 + tanh(10*(t - 0.2))))*(x - t - 0.4)))/2";
 const CELLS: usize = 100;
@@ -83,9 +83,8 @@ fn evolved(divided: &str) -> Result<Evolution> {
          end = 0.1\nstep = 1e-3\nrelaxation = 0.01\n"
     );
     let study = EquidistributionStudy::from_source(&Source::new("figure-8-6", text))?;
-    let mut evolution = Evolution::default();
-    study.compute(&study.problem()?, &mut evolution)?;
-    Ok(evolution)
+    let (run, failure) = study.compute()?;
+    failure.map_or(Ok(run.evolution), Err)
 }
 
 /// Ends of subdomains over time, the overlaps shaded by the paths of their nodes.

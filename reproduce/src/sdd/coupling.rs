@@ -6,7 +6,7 @@ use crate::{InterfaceStep, Options, Rerun, Table};
 use driftmesh::error::Result;
 use driftmesh::meshing::{EstimatorKind, Mmpde, MonteCarlo};
 use driftmesh::simulation::State;
-use driftmesh::study::compute;
+use driftmesh::study::{Kind, MovingRun};
 
 pub fn coupling(options: Options) -> Result<Rerun> {
     Ok(vec![procedures(options)?, paths()?].into())
@@ -77,7 +77,7 @@ fn procedure(name: &str, more: &[&str], s: usize, plain: &mut [f64; 2]) -> Resul
     ]);
     let generator = if s == 1 { WHOLE.into() } else { stochastic([s, s], RESIDUAL) };
     let all = [common.as_slice(), &settings(more), &[generator]].concat();
-    let (record, failure) = compute(&study(BURGERS, &all)?)?;
+    let (MovingRun { record, .. }, failure) = study(BURGERS, &all)?.compute()?;
     let on = if s == 1 { "one domain".to_string() } else { format!("{s}×{s}") };
     let dash = || "–".to_string();
     let (Some(report), None) = (record.reports.first(), &failure) else {

@@ -42,7 +42,7 @@ pub fn figures(options: Options) -> Result<Rerun> {
                     let title =
                         format!("{}, {}, t = {t}, {where_}", figure.name.replace("figure-", "Figure "), figure.what);
                     let name = format!("{}-{s}x{s}-t{}", figure.name, t.to_string().replace('.', "_"));
-                    pictures.push((name, draw(&title, figure.unknown, &state, &[])));
+                    pictures.push((name, draw(&title, &state.scene(&[figure.unknown.into()]))));
                 }
             }
         }

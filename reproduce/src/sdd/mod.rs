@@ -24,7 +24,7 @@ use super::Table;
 use driftmesh::error::{Error, Result};
 use driftmesh::meshing::{Decomposition, MeshGenerator, Whole};
 use driftmesh::simulation::Record;
-use driftmesh::study::{MovingMesh, Source, compute};
+use driftmesh::study::{Kind, MovingMesh, MovingRun, Source};
 
 pub(super) const BURGERS: &str = include_str!("../../../studies/burgers-b-stochastic.toml");
 pub(super) const PERIODIC: &str = include_str!("../../../studies/burgers-periodic.toml");
@@ -192,7 +192,7 @@ impl Ratios {
         for s in sizes {
             let study = way.on(s)?;
             let side = study.domain.upper[0] - study.domain.lower[0];
-            let (record, failure) = compute(&study)?;
+            let (MovingRun { record, .. }, failure) = study.compute()?;
             for p in self.paper.iter().filter(|p| p.subdomains == s) {
                 self.table.row(cells(&way.label, p, side, &record, failure.as_ref()));
             }

@@ -3,7 +3,7 @@
 use super::{DAM_BREAK, NODES, PERIODIC, RESIDUAL, Ratios, Way, first_step, monte_carlo, published, settings, study};
 use crate::{Options, Table};
 use driftmesh::error::Result;
-use driftmesh::study::compute;
+use driftmesh::study::{Kind, MovingRun};
 
 pub fn table_3(options: Options) -> Result<Vec<Table>> {
     let all = published(&[
@@ -81,6 +81,6 @@ pub fn table_4(options: Options) -> Result<Vec<Table>> {
 
 /// Relative drift of the mass over the dam break.
 fn drift(settings: &[String]) -> Result<f64> {
-    let (record, failure) = compute(&study(DAM_BREAK, settings)?)?;
+    let (MovingRun { record, .. }, failure) = study(DAM_BREAK, settings)?.compute()?;
     failure.map_or_else(|| Ok(record.reports.last().map_or(f64::NAN, |report| report.conserved.drift)), Err)
 }

@@ -3,7 +3,7 @@
 use super::{NODES, RESIDUAL, RINGS, Ratios, WHOLE, Way, ended, first_step, monte_carlo, published, settings, study};
 use crate::{Options, Table};
 use driftmesh::error::Result;
-use driftmesh::study::compute;
+use driftmesh::study::{Kind, MovingRun};
 
 pub fn rings(options: Options) -> Result<Vec<Table>> {
     let all = published(&[(2, 0.05, 1.0, 1.0), (3, 0.05, 1.0, 1.0), (4, 0.05, 1.0, 1.0)]);
@@ -55,7 +55,7 @@ fn one_domain(bare: &[String]) -> Result<Table> {
     }
     for (label, own) in cases {
         let all = [own.as_slice(), &settings(&super::NO_SAFETY), &[WHOLE.into()]].concat();
-        let (record, failure) = compute(&study(RINGS, &all)?)?;
+        let (MovingRun { record, .. }, failure) = study(RINGS, &all)?.compute()?;
         let quality = record.reports.last().map(|report| report.quality);
         let cells = match (failure, quality) {
             (None, Some(q)) => [q.q_max, q.q_mean].map(|q| format!("{q:.4}")),

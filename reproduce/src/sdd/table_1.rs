@@ -3,8 +3,8 @@
 use super::{BURGERS, RESIDUAL, Ratios, WHOLE, Way, ended, monte_carlo, published, settings, study};
 use crate::{Options, Table};
 use driftmesh::error::{Error, Result};
-use driftmesh::simulation::Record;
-use driftmesh::study::compute;
+
+use driftmesh::study::{Kind, MovingRun};
 
 /// l_inf of the paper for one domain, 2×2, 3×3 and 4×4 at t = .75, 1, 1.25, with .032, .035 and .024 for the printed
 /// .320,
@@ -92,7 +92,7 @@ pub fn table_1(options: Options) -> Result<Vec<Table>> {
             false => ratios.unaided(&way)?,
         }
         for &(s, paper) in LINF[1..].iter().filter(|_| estimator == RESIDUAL && !options.quick) {
-            errors.row(linf_row(&format!("{label}, {s}×{s}"), &compute(&way.on(s)?)?, &paper));
+            errors.row(linf_row(&format!("{label}, {s}×{s}"), &way.on(s)?.compute()?, &paper));
         }
     }
     let mut table = ratios.table;
@@ -122,7 +122,7 @@ fn one_domain(v: &Variants) -> Result<Table> {
     ];
     for (label, variant) in variants {
         let all = [variant.as_slice(), &[WHOLE.into()], &super::settings(&super::NO_SAFETY)].concat();
-        table.row(linf_row(label, &compute(&study(BURGERS, &all)?)?, &paper));
+        table.row(linf_row(label, &study(BURGERS, &all)?.compute()?, &paper));
     }
     table.note(
         "the paper names neither a filter of the density nor, beside (4.1), a form of the convection: rows with \
@@ -137,8 +137,8 @@ fn one_domain(v: &Variants) -> Result<Table> {
 }
 
 /// Errors at the report times beside the paper's.
-fn linf_row(label: &str, (record, failure): &(Record, Option<Error>), paper: &[f64; 3]) -> Vec<String> {
-    let found = |k: usize| record.reports.get(k).and_then(|report| report.error).map(|error| error.linf);
+fn linf_row(label: &str, (run, failure): &(MovingRun, Option<Error>), paper: &[f64; 3]) -> Vec<String> {
+    let found = |k: usize| run.record.reports.get(k).and_then(|report| report.error).map(|error| error.linf);
     let cells = (0..3).map(|k| found(k).map_or("–".into(), |e| format!("{e:.4}")));
     let ratios = || (0..3).filter_map(|k| Some(found(k)? / paper[k]));
     let [least, largest] = [ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max)];

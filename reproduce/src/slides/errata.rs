@@ -4,7 +4,7 @@ use crate::Rerun;
 use crate::errata::{self, row};
 use driftmesh::error::{Error, Result};
 use driftmesh::formula::Formula;
-use driftmesh::study::{FrontFinished, Source, StefanStudy};
+use driftmesh::study::{Kind, Source, StefanStudy};
 use std::f64::consts::PI;
 
 /// A place that no symmetry singles out.
@@ -67,8 +67,8 @@ fn sign() -> Result<Vec<String>> {
     let text = "[study]\nname = \"melting\"\nkind = \"stefan\"\n[domain]\nx = [-1.0, 1.0]\nbottom = \"0\"\ntop = \
          \"2\"\n[grid]\ncells = [8, 8, 8]\n[exact]\nkind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = \
          0.7\n[time]\nduration = 0.01\nstep = 0.001\n";
-    let FrontFinished { state, .. } = StefanStudy::from_source(&Source::new("melting", text))?.compute()?;
-    let moved = state.front[0] - 0.7;
+    let (run, _) = StefanStudy::from_source(&Source::new("melting", text))?.compute()?;
+    let moved = run.course.state.front[0] - 0.7;
     Ok(row(
         [
             "(3.16)",

@@ -3,17 +3,20 @@
 use crate::{Options, Rerun, Table};
 use driftmesh::error::{Error, Result};
 use driftmesh::output::{Curve, Figure, Picture, draw};
-use driftmesh::study::{FrontFinished, Source, StefanStudy};
+use driftmesh::study::{FrontRun, Kind, Running, Source, StefanStudy};
 
 const BOX: &str = "[domain]\nx = [-1.0, 1.0]\nbottom = \"0\"\ntop = \"2 + cos(x)/2\"\n";
 
-fn compute(rest: &str) -> Result<FrontFinished> {
+/// A run with its failure, if it had one.
+type Ran = (FrontRun, Option<Error>);
+
+fn compute(rest: &str) -> Result<Ran> {
     let text = format!("[study]\nname = \"reproduced\"\nkind = \"stefan\"\n{BOX}{rest}");
     StefanStudy::from_source(&Source::new("reproduced", text))?.compute()
 }
 
 /// The slides' problem up to a time, with settings of its front and its Laplacian.
-fn problem(across: usize, rows: usize, front: &str, end: f64) -> Result<FrontFinished> {
+fn problem(across: usize, rows: usize, front: &str, end: f64) -> Result<Ran> {
     let report = if end > 0.17 { "0.07, 0.17, 0.85" } else { "" };
     let report = if report.is_empty() { format!("{end:?}") } else { report.into() };
     compute(&format!(
@@ -62,21 +65,19 @@ pub fn slides(options: Options) -> Result<Rerun> {
     let grids: &[[usize; 2]] = if options.quick { &[[40, 20]] } else { &[[20, 10], [40, 20]] };
     for &[across, rows] in grids {
         for (name, front) in settings {
-            let finished = problem(across, rows, front, 0.85)?;
-            table.row(front_row(format!("{} × {}", across + 1, rows + 1), name, &finished));
+            let ran = problem(across, rows, front, 0.85)?;
+            table.row(front_row(format!("{} × {}", across + 1, rows + 1), name, &ran));
             if front.is_empty() && across == 40 {
-                let named = ["stefan-slides", "stefan-slides-front"].map(String::from);
-                pictures.extend(named.into_iter().zip(finished.pictures("The slides' front")));
+                pictures.push(("stefan-slides".into(), drawn(&ran.0, "The slides' front")?));
+                pictures.push(("stefan-slides-front".into(), ran.0.picture("The slides' front")));
             }
         }
     }
     // the states that the slides show: after 7 and 17 steps
     for (steps, end) in [(7, 0.07), (17, 0.17)] {
         for (name, title, front) in [("literal", "literal as far as given", LITERAL), ("ours", "(1,6,1)/8", "")] {
-            let [state, _] = problem(40, 20, front, end)?.pictures(&format!(
-                "The slides' front, {title}, after \
-                 {steps} steps"
-            ));
+            let (run, _) = problem(40, 20, front, end)?;
+            let state = drawn(&run, &format!("The slides' front, {title}, after {steps} steps"))?;
             pictures.push((format!("stefan-slides-{steps}-steps-{name}"), state));
         }
     }
@@ -99,10 +100,16 @@ fn notes(table: &mut Table) {
     );
 }
 
-fn front_row(size: String, name: &str, finished: &FrontFinished) -> Vec<String> {
-    let (h, n) = (&finished.state.front, finished.state.front.len() - 1);
-    let reports = &finished.summary.reports;
-    if let Some(failure) = &finished.failure {
+/// The mesh over the temperature at the end of a run.
+fn drawn(run: &FrontRun, title: &str) -> Result<Picture> {
+    let scene = run.scene()?;
+    Ok(draw(&format!("{title}, {}", run.caption(&scene)), &scene))
+}
+
+fn front_row(size: String, name: &str, (run, failure): &Ran) -> Vec<String> {
+    let (h, n) = (&run.course.state.front, run.course.state.front.len() - 1);
+    let reports = &run.course.reports;
+    if let Some(failure) = failure {
         let why = match failure {
             Error::Failed { failure, moment } => {
                 format!("{}{}", failure.name(), moment.map_or(String::new(), |m| format!(" in step {}", m.step)))
@@ -237,20 +244,18 @@ fn refined(
             8 * n,
             0.01 / (n * n) as f64
         );
-        let finished = compute(&text)?;
-        let report = finished.summary.reports.first().copied();
+        let (run, failure) = compute(&text)?;
+        let report = run.course.reports.first().copied();
         found.errors.push(report.and_then(|report| report.front.error_linf));
         found.temperature = report.and_then(|report| report.error).map_or(f64::NAN, |error| error.linf);
         if n == 2 && more.is_empty() {
             let name = format!("stefan-exact-{}", case.split(' ').next().unwrap_or(case));
-            let front: Vec<[f64; 2]> =
-                finished.columns.iter().zip(&finished.state.front).map(|(x, y)| [*x, *y]).collect();
-            let [_, over_time] = finished.pictures(&format!("Exact solution, {case}"));
-            let title = format!("Exact solution, {case}, t = {:.3}", finished.state.t);
-            pictures.push((name.clone(), draw(&title, "u", &finished.whole, &front)));
-            pictures.push((format!("{name}-front"), over_time));
+            let title = format!("Exact solution, {case}");
+            let at = format!("{title}, t = {:.3}", run.course.state.t);
+            pictures.push((name.clone(), draw(&at, &run.scene()?)));
+            pictures.push((format!("{name}-front"), run.picture(&title)));
         }
-        found.failure = found.failure.or(finished.failure);
+        found.failure = found.failure.or(failure);
     }
     Ok(found)
 }

@@ -2,8 +2,8 @@
 
 use crate::{Options, Rerun, Table};
 use driftmesh::error::Result;
-use driftmesh::output::{Curve, Figure, Picture};
-use driftmesh::study::{PoissonStudy, Solved, Source};
+use driftmesh::output::{Curve, Figure, Picture, draw};
+use driftmesh::study::{Kind, PoissonStudy, Solved, Source};
 use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;
 
@@ -65,7 +65,7 @@ pub fn run(options: Options) -> Result<Rerun> {
         |n: usize| format!("cells = [{}, {}]\ngrading = {{ toward = \"top\", power = 1.25 }}", n + 1, n * 4 / 5 + 1);
     let distorted = format!("{MODEL}distort = {{ perturb = 0.25, seed = 1 }}\n");
     let on = |title: &str, domain: &str, grid: &str, u: &str| {
-        study(domain, grid, u, KINDS[0].1)?.solve().map(|s| s.picture(title))
+        study(domain, grid, u, KINDS[0].1)?.solve().map(|solved| draw(title, &solved.scene()))
     };
     pictures.push((
         "laplacian-model-problem".into(),

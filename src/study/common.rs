@@ -1,0 +1,110 @@
+//! The tables that studies of all kinds have.
+
+use crate::error::{Error, Result};
+use crate::output::{CheckpointsAt, FramesAt};
+use crate::simulation::Schedule;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[study]`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// Letters, digits, `-`, `_` and `.`; names the run directory.
+    pub name: String,
+    /// What is studied.
+    pub kind: StudyKind,
+}
+
+impl Header {
+    /// Refuses a name that no directory can have.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub(super) fn check_name(&self) -> Result<()> {
+        let name = &self.name;
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if name.is_empty() || name.len() > 100 || name.starts_with('.') || !name.chars().all(plain) {
+            let rule = "must be 1 to 100 of the characters a-z A-Z 0-9 - _ . and not begin with a dot";
+            return Err(Error::invalid("study.name", format!("{name:?}"), rule));
+        }
+        Ok(())
+    }
+}
+
+/// What a study is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StudyKind {
+    /// A PDE in two dimensions on a moving mesh.
+    MovingMesh,
+    /// Poisson's equation on a mesh of any shape.
+    Poisson,
+    /// Two phases and the front between them.
+    Stefan,
+    /// A mesh on a line, and the Schwarz methods for it.
+    Equidistribution,
+}
+
+impl StudyKind {
+    /// The name of the kind in a study file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MovingMesh => "moving-mesh",
+            Self::Poisson => "poisson",
+            Self::Stefan => "stefan",
+            Self::Equidistribution => "equidistribution",
+        }
+    }
+}
+
+/// `[output]`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// When frames are written; about twenty of them where nothing is said.
+    pub frames: Option<FramesAt>,
+    /// When a checkpoint is written, from which a run that ends early goes on; every minute where nothing is said. A
+    /// study without time steps has none, and begins again.
+    pub checkpoint: CheckpointsAt,
+    /// Whether the frames become `animation.gif`.
+    pub animation: bool,
+    /// Whether the run ends with `report.html` and its plots.
+    pub report: bool,
+}
+
+/// Frames of a run in time where nothing is said.
+const FRAMES_BY_DEFAULT: usize = 20;
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { frames: None, checkpoint: CheckpointsAt::default(), animation: false, report: true }
+    }
+}
+
+impl Output {
+    /// Refuses settings out of range that do not depend on the rest of the study.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub(super) fn check(&self) -> Result<()> {
+        self.checkpoint.check().map_err(|error| error.within("output"))
+    }
+
+    /// When frames are written, about twenty times where nothing is said.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for settings out of range.
+    pub(super) fn frames_of(&self, schedule: &Schedule) -> Result<FramesAt> {
+        let [start, end] = [schedule.start(), schedule.end()];
+        let frames = self.frames.clone().unwrap_or_else(|| match schedule.steps() {
+            Some(steps) => FramesAt::Every(steps.div_ceil(FRAMES_BY_DEFAULT)),
+            None => {
+                let part = |n: usize| start + (end - start) * n as f64 / FRAMES_BY_DEFAULT as f64;
+                FramesAt::Times((1..FRAMES_BY_DEFAULT).map(part).collect())
+            }
+        });
+        frames.check([start, end]).map_err(|error| error.within("output"))?;
+        Ok(frames)
+    }
+}

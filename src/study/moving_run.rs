@@ -1,0 +1,230 @@
+//! Studies of kind `moving-mesh`: how they run, and what they leave.
+
+use super::MovingMesh;
+use super::kind::{Running, SpentBy};
+use super::rest::at_rest;
+use super::runner::Stage;
+use crate::error::{Error, Result, Unfit};
+use crate::geometry::{Mesh, compare};
+use crate::kept::{Kept, check_nodal};
+use crate::output::{Figures, Frames, FramesAt, History, RunDirectory, Spent, Summary};
+use crate::simulation::{
+    Checkpoint, Course, Event, Keeper, Observer, Record, Report, Retries, Scene, Seconds, Simulation, Snapshot, State,
+    WorkTotal,
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What `summary.json` says of a moving mesh.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct MovingFigures {
+    /// Steps and their cost.
+    pub work: WorkTotal,
+    /// Steps that were tried again.
+    pub safety: Retries,
+    /// One entry for each time of `time.report` that was reached.
+    pub reports: Vec<Report>,
+}
+
+/// Seconds of a moving mesh, by part.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct MovingParts {
+    /// Computing the density.
+    pub monitor: f64,
+    /// Estimating interface values.
+    pub interface: f64,
+    /// Solving the mesh equation, `interface` not included.
+    pub mesh: f64,
+    /// Solving the physics.
+    pub pde: f64,
+}
+
+impl Figures for MovingFigures {
+    type Parts = MovingParts;
+}
+
+/// A moving mesh while it runs.
+pub struct MovingRun {
+    study: MovingMesh,
+    simulation: Simulation,
+    /// The last good state; none before the mesh is adapted to the initial solution.
+    pub state: Option<State>,
+    /// What was found in the steps done, and what they cost.
+    pub record: Record,
+    /// What the loop of a checkpoint carries.
+    course: Option<Course>,
+    history: Option<History>,
+    meshes: Meshes,
+}
+
+impl MovingRun {
+    /// Before anything is computed.
+    pub(super) fn of(study: &MovingMesh) -> Result<Self> {
+        let (simulation, meshes, study) = (study.simulation()?, Meshes::of(study), study.clone());
+        let record = Record::default();
+        Ok(Self { study, simulation, state: None, record, course: None, history: None, meshes })
+    }
+
+    /// Takes the steps that are left.
+    fn steps(&mut self, state: &mut State, stage: &mut Stage<'_>) -> Result<()> {
+        let compares = self.study.compare.is_some();
+        let (watching, mut checkpoints) = stage.parts();
+        let mut observers: Vec<&mut dyn Observer> = Vec::new();
+        self.history.iter_mut().for_each(|history| observers.push(history));
+        observers.push(&mut self.meshes);
+        observers.extend(watching);
+        // much is left to do after the last step, too
+        checkpoints.iter_mut().for_each(|checkpoints| checkpoints.at_the_end = compares);
+        let keeper = checkpoints.map(|checkpoints| checkpoints as &mut dyn Keeper);
+        self.simulation.run_on(state, &mut self.record, &mut observers, keeper, self.course.take())
+    }
+
+    /// Runs the study with the generator of `[compare]`, leaves its frames beside those of this run, and adds to each
+    /// report how the meshes compare.
+    fn compare(&mut self, stage: &mut Stage<'_>) -> Result<()> {
+        let Some(reference) = self.study.reference() else { return Ok(()) };
+        let subdomains = reference.mesh.generator.subdomains();
+        let directory = stage.directory;
+        let mut frames = directory.map(|to| Frames::of_reference(to.path(), reference.frames(), subdomains));
+        let (mut theirs, mut ends) = (Meshes::of(&self.study), Ends(stage.observers()));
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut theirs, &mut ends];
+        frames.iter_mut().for_each(|frames| observers.push(frames));
+        let mut simulation = reference.simulation()?;
+        let mut state = reference.start(&simulation, &mut Record::default(), &mut observers)?;
+        simulation.run(&mut state, &mut Record::default(), &mut observers)?;
+        for report in &mut self.record.reports {
+            let at = |meshes: &Meshes| meshes.found.iter().find(|(t, _)| *t == report.t).map(|(_, mesh)| mesh.clone());
+            report.comparison = at(&self.meshes).zip(at(&theirs)).map(|(ours, theirs)| compare(&ours, &theirs));
+        }
+        Ok(())
+    }
+
+    fn spent(&self) -> SpentBy<Self> {
+        let Seconds { wall, cpu, monitor, interface, mesh, pde, output } = self.record.seconds;
+        Spent { wall, cpu, parts: MovingParts { monitor, interface, mesh, pde }, output }
+    }
+}
+
+impl Running for MovingRun {
+    type Figures = MovingFigures;
+    type Checkpoint = MovingCheckpoint;
+
+    fn go(&mut self, stage: &mut Stage<'_>) -> Result<()> {
+        let mut state = match self.state.take() {
+            Some(state) => state,
+            None => {
+                let start = self.study.start(&self.simulation, &mut self.record, &mut stage.observers())?;
+                self.history = stage.directory.map(|to| History::create(&to.path().join(HISTORY))).transpose()?;
+                start
+            }
+        };
+        let ended = self.steps(&mut state, stage);
+        stage.output = self.record.seconds.output;
+        let state = self.state.insert(state);
+        ended?;
+        self.record.warnings.extend(at_rest(&self.study, &self.simulation, state, &self.record)?);
+        let written = stage.directory.is_some();
+        stage.beside(|stage| self.compare(stage)).map_err(|error| match written {
+            true => Error::Compared(Box::new(error)),
+            false => error,
+        })
+    }
+
+    fn resume(
+        &mut self,
+        MovingCheckpoint(found): MovingCheckpoint,
+        directory: Option<&Path>,
+    ) -> Result<(SpentBy<Self>, Kept), Unfit> {
+        let mesh = self.study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
+        let Simulation { physics, schedule, safety, mover, .. } = &mut self.simulation;
+        let state = found.state(&mesh, physics.as_ref(), schedule, *safety)?;
+        mover.generator.resume(&mesh, &found.kept)?;
+        self.meshes = Meshes::resume(&self.study, &mesh, &found.kept)?;
+        let Checkpoint { record, course, kept, .. } = found;
+        self.history = directory.map(|to| History::resume(&to.join(HISTORY), &kept)).transpose()?;
+        (self.state, self.record, self.course) = (Some(state), record, Some(course));
+        Ok((self.spent(), kept))
+    }
+
+    fn frames(&self) -> (FramesAt, [usize; 2]) {
+        (self.study.frames(), self.study.mesh.generator.subdomains())
+    }
+
+    fn scenes(&self) -> Result<Vec<Scene>> {
+        let unknowns = self.simulation.physics.unknowns();
+        Ok(self.state.iter().map(|state| state.scene(&unknowns)).collect())
+    }
+
+    fn leave(&mut self, _directory: &RunDirectory) -> Result<()> {
+        self.history.iter_mut().try_for_each(History::flush)
+    }
+
+    fn tell(&self, summary: &mut Summary<MovingFigures>) {
+        let Record { work, safety, reports, warnings, .. } = self.record.clone();
+        summary.figures = MovingFigures { work, safety, reports };
+        (summary.seconds, summary.warnings) = (self.spent(), warnings);
+    }
+
+    fn warn(&mut self, warnings: Vec<String>) {
+        self.record.warnings.extend(warnings);
+    }
+}
+
+/// Everything that the steps of a run to come depend on, and what was found in those done.
+#[derive(Deserialize)]
+pub struct MovingCheckpoint(Checkpoint);
+
+/// Where the history of a run is.
+const HISTORY: &str = "history.csv";
+
+/// Keeps the meshes at the times of reports, where `[compare]` gives something to compare them with.
+struct Meshes {
+    at: Vec<f64>,
+    found: Vec<(f64, Mesh<2>)>,
+}
+
+impl Meshes {
+    fn of(study: &MovingMesh) -> Self {
+        let at = if study.compare.is_some() { study.time.report.clone() } else { Vec::new() };
+        Self { at, found: Vec::new() }
+    }
+
+    fn resume(study: &MovingMesh, mesh: &Mesh<2>, kept: &Kept) -> Result<Self, Unfit> {
+        let found: Vec<(f64, Vec<[f64; 2]>)> = kept.get("meshes")?;
+        let moved = |(t, x): (f64, Vec<[f64; 2]>)| {
+            check_nodal("mesh at a report", &x, mesh.lattice().len())?;
+            Ok((t, mesh.moved(x).map_err(|failure| Unfit::Damaged(failure.to_string()))?))
+        };
+        Ok(Self { found: found.into_iter().map(moved).collect::<Result<_, Unfit>>()?, ..Self::of(study) })
+    }
+}
+
+impl Observer for Meshes {
+    fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
+        if let Some(state) = snapshot.state()
+            && matches!(event, Event::Started | Event::Stepped)
+            && self.at.contains(&state.t)
+        {
+            self.found.push((state.t, state.mesh.clone()));
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, kept: &mut Kept) -> Result<()> {
+        kept.put("meshes", &self.found.iter().map(|(t, mesh)| (t, mesh.x())).collect::<Vec<_>>());
+        Ok(())
+    }
+}
+
+/// Ends the run of `[compare]` where those who watch the run itself ask for that.
+struct Ends<'a>(Vec<&'a mut dyn Observer>);
+
+impl Observer for Ends<'_> {
+    fn observe(&mut self, _event: Event, _snapshot: &Snapshot<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    fn interrupts(&self) -> bool {
+        self.0.iter().any(|watcher| watcher.interrupts())
+    }
+}

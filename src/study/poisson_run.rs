@@ -1,0 +1,314 @@
+//! Studies of kind `poisson`: how they are solved, and what is found.
+
+use super::kind::{Running, SpentBy};
+use super::poisson::{Data, PoissonStudy, SolverKind};
+use super::runner::Stage;
+use crate::error::{Failure, Result, Unfit};
+use crate::formula::Program;
+use crate::geometry::{Mesh, node_areas};
+use crate::kept::Kept;
+use crate::laplacian::{Laplacian, Poisson, Stencils, outward, unchecked};
+use crate::numerics::{larger, sum};
+use crate::output::{Ended, Failed, Figures, Summary};
+use crate::simulation::Scene;
+use crate::work::Work;
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// What `summary.json` says of Poisson's equation.
+#[derive(Debug, Clone, Serialize)]
+pub struct PoissonFigures {
+    /// What it cost.
+    pub work: Work,
+    /// Where the exact solution is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<PoissonError>,
+    /// Of the discrete Laplacian.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stencil: Option<StencilReport>,
+}
+
+/// Seconds of Poisson's equation, by part.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct PoissonParts {
+    /// Computing stencils.
+    pub stencils: f64,
+    /// Solving the system.
+    pub solve: f64,
+}
+
+impl Default for PoissonFigures {
+    /// One system is to be solved.
+    fn default() -> Self {
+        Self { work: Work { linear_solves: 1, ..Work::default() }, error: None, stencil: None }
+    }
+}
+
+impl Figures for PoissonFigures {
+    type Parts = PoissonParts;
+
+    const ENDED: fn(Failed) -> Ended = Ended::Failure;
+}
+
+/// Error against the exact solution, a node's area being a quarter of its cells'.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PoissonError {
+    /// Largest over the nodes.
+    pub linf: f64,
+    /// √(Σ e²·area / Σ area).
+    pub l2: f64,
+    /// √(Σ e²·area): the norm of the integral, which grows with the domain.
+    pub l2_integral: f64,
+}
+
+/// What is known of the stencils.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct StencilReport {
+    /// Stencils a second, on all threads.
+    pub points_per_second: f64,
+    /// Share of rows without a negative weight on a neighbour.
+    pub nonnegative_fraction: f64,
+    /// The highest degree that they differentiate exactly on this mesh.
+    pub exact_degree: Option<usize>,
+}
+
+/// A solution of Poisson's equation, with what is known of it.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// The mesh.
+    pub mesh: Mesh<2>,
+    /// The solution at its nodes.
+    pub u: Vec<f64>,
+    /// The exact solution there.
+    pub exact: Option<Vec<f64>>,
+    /// The discrete Laplacian.
+    pub stencils: Stencils,
+    /// Against the exact solution.
+    pub error: Option<PoissonError>,
+    /// Of the solver: without iterations where it is direct.
+    pub work: Work,
+    seconds: PoissonParts,
+}
+
+/// Nodes times passes: small meshes have their stencils computed several times, and the shortest time counts.
+const SMALL: usize = 100_000;
+/// The most passes beside the first one.
+const SMALL_PASSES: usize = 5;
+
+impl PoissonStudy {
+    /// Solves it.
+    ///
+    /// # Errors
+    /// As [`Kind::resolve`](super::Kind::resolve); [`Error::Failed`](crate::Error::Failed) where a formula has no
+    /// value, a stencil is degenerate or the system is singular.
+    pub fn solve(&self) -> Result<Solved> {
+        let mesh = self.mesh()?;
+        let data = self.data()?;
+        let (stencils, spent) = timed(&mesh, self.laplacian.laplacian()?)?;
+        let mut seconds = PoissonParts { stencils: spent, ..PoissonParts::default() };
+        let Values { source, side, exact } = self.values(&mesh, &stencils, &data)?;
+        let clock = Instant::now();
+        let problem = Poisson { source: &source, side: &side, neumann: self.neumann() };
+        let (u, work) = match self.solver.kind {
+            SolverKind::Lu => (problem.solve(&mesh, &stencils)?, Work { linear_solves: 1, ..Work::default() }),
+            SolverKind::Krylov => problem.iterate(&mesh, &stencils)?,
+        };
+        seconds.solve = clock.elapsed().as_secs_f64();
+        if let Some(k) = u.iter().position(|u| !u.is_finite()) {
+            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+            return Err(Failure::NonFinite { what: "the solution", value: u[k], node, x }.into());
+        }
+        let error = exact.as_ref().map(|exact| PoissonError::of(&mesh, &u, exact));
+        Ok(Solved { mesh, u, exact, stencils, error, work, seconds })
+    }
+
+    /// What the formulas give at the nodes: they need a value only where it counts.
+    fn values(&self, mesh: &Mesh<2>, stencils: &Stencils, data: &Data) -> Result<Values> {
+        let lattice = mesh.lattice();
+        let problem = Poisson { source: &[], side: &[], neumann: self.neumann() };
+        let mut counts = vec![false; lattice.len()];
+        for k in 0..stencils.patch().len() {
+            stencils.row(k).into_iter().flatten().for_each(|(index, _, source)| counts[index] |= source != 0.0);
+        }
+        let flows: Vec<bool> = (0..lattice.len()).map(|k| problem.neumann_side(lattice, k).is_some()).collect();
+        let given: Vec<bool> = (0..lattice.len()).map(|k| lattice.on_side(k) && !flows[k]).collect();
+        let known = match &data.exact {
+            Some(program) => {
+                let slopes: Vec<bool> = flows.iter().map(|flows| *flows && data.flux.is_none()).collect();
+                let sources: Vec<bool> = counts.iter().map(|counts| *counts && data.source.is_none()).collect();
+                let everywhere = vec![true; lattice.len()];
+                let needed = [&everywhere, &slopes, &slopes, &sources, &sources];
+                Some(values(mesh, "exact.u or a derivative of it", program, needed)?)
+            }
+            None => None,
+        };
+        let source = match &data.source {
+            Some(program) => values(mesh, "equation.source", program, [&counts])?.into_iter().map(|[f]| f).collect(),
+            None => known.iter().flatten().map(|[_, _, _, xx, yy]| xx + yy).collect::<Vec<f64>>(),
+        };
+        let mut side = match &data.boundary {
+            Some(program) => values(mesh, "equation.boundary", program, [&given])?.into_iter().map(|[u]| u).collect(),
+            None => known.iter().flatten().map(|v| v[0]).collect::<Vec<f64>>(),
+        };
+        let flux = data.flux.as_ref().map(|program| values(mesh, "equation.flux", program, [&flows])).transpose()?;
+        for index in lattice.sides() {
+            if let Some(at) = problem.neumann_side(lattice, index) {
+                let n = outward(mesh, index, at);
+                side[index] = match (&flux, &known) {
+                    (Some(flux), _) => flux[index][0],
+                    (None, known) => {
+                        known.as_ref().map_or(0.0, |known| n[0] * known[index][1] + n[1] * known[index][2])
+                    }
+                };
+            }
+        }
+        let exact = known.map(|known| known.iter().map(|v| v[0]).collect());
+        Ok(Values { source, side, exact })
+    }
+}
+
+/// Nodal values of the formulas of a study.
+struct Values {
+    source: Vec<f64>,
+    /// u on the sides; its normal derivative on Neumann sides.
+    side: Vec<f64>,
+    exact: Option<Vec<f64>>,
+}
+
+/// Stencils, and the seconds that they take.
+fn timed(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<(Stencils, f64)> {
+    let pass = || -> Result<(Stencils, f64)> {
+        let clock = Instant::now();
+        Ok((unchecked(mesh, laplacian)?, clock.elapsed().as_secs_f64()))
+    };
+    let mut found = pass()?;
+    // on a small mesh one pass tells the time of waking threads up
+    for _ in 0..SMALL_PASSES.min(SMALL / mesh.x().len()) {
+        let (stencils, seconds) = pass()?;
+        found = (stencils, seconds.min(found.1));
+    }
+    Ok(found)
+}
+
+impl PoissonError {
+    fn of(mesh: &Mesh<2>, u: &[f64], exact: &[f64]) -> Self {
+        let areas = node_areas(mesh);
+        let off = || u.iter().zip(exact).map(|(u, e)| u - e);
+        let linf = off().fold(0.0, larger);
+        // squares of what is large are not finite
+        let unit = if linf > 0.0 { linf } else { 1.0 };
+        let squares = sum(off().zip(&areas).map(|(e, area)| (e / unit).powi(2) * area));
+        let area = sum(areas.iter().copied());
+        Self { linf, l2: unit * (squares / area).sqrt(), l2_integral: unit * squares.sqrt() }
+    }
+}
+
+impl Solved {
+    /// The mesh with u, and with its error where that is known.
+    pub fn scene(&self) -> Scene {
+        let mut nodal = vec![("u".to_string(), self.u.clone())];
+        let off = |exact: &Vec<f64>| self.u.iter().zip(exact).map(|(u, e)| u - e).collect();
+        nodal.extend(self.exact.iter().map(|exact| ("error".into(), off(exact))));
+        Scene::of_mesh(0.0, 0, &self.mesh, nodal)
+    }
+
+    /// What is known of the stencils.
+    pub fn report(&self) -> StencilReport {
+        StencilReport {
+            points_per_second: self.stencils.patch().len() as f64 / self.seconds.stencils,
+            nonnegative_fraction: self.stencils.nonnegative_fraction(),
+            exact_degree: self.stencils.exact_degree(&self.mesh),
+        }
+    }
+
+    /// Stencils that come near to none, and kinds that are not exact for quadratics.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.work.direct_solves() > 0 {
+            let why = if self.work.direct_unstarted > 0 { "could not begin" } else { "did not converge" };
+            warnings.push(format!(
+                "the iteration of solver.kind = \"krylov\" {why}, and the direct solver took its place; set it to \
+                 \"lu\""
+            ));
+        }
+        let near = self.stencils.near_degenerate();
+        if let Some(worst) = near.iter().max_by(|a, b| a.condition.total_cmp(&b.condition)) {
+            let ([i, j], [x, y]) = (worst.node, worst.x);
+            warnings.push(format!(
+                "{} stencils are near-degenerate, worst at node ({i}, {j}), x = {x:.4}, y = {y:.4}: condition number \
+                 {:.1e}; \
+                 make the cells around it less flat",
+                near.len(),
+                worst.condition
+            ));
+        }
+        warnings
+    }
+}
+
+/// Poisson's equation, before and after it is solved.
+pub struct PoissonRun {
+    pub(super) study: PoissonStudy,
+    /// The solution; none before.
+    pub solved: Option<Solved>,
+}
+
+impl Running for PoissonRun {
+    type Figures = PoissonFigures;
+    type Checkpoint = ();
+
+    fn go(&mut self, _stage: &mut Stage<'_>) -> Result<()> {
+        self.solved = Some(self.study.solve()?);
+        Ok(())
+    }
+
+    fn resume(&mut self, (): (), _directory: Option<&Path>) -> Result<(SpentBy<Self>, Kept), Unfit> {
+        Err(Unfit::Foreign)
+    }
+
+    fn scenes(&self) -> Result<Vec<Scene>> {
+        Ok(self.solved.iter().map(Solved::scene).collect())
+    }
+
+    fn caption(&self, _scene: &Scene) -> String {
+        self.study.laplacian.kind.clone()
+    }
+
+    fn tell(&self, summary: &mut Summary<PoissonFigures>) {
+        if let Some(solved) = &self.solved {
+            let (work, error, stencil) = (solved.work, solved.error, Some(solved.report()));
+            summary.figures = PoissonFigures { work, error, stencil };
+            (summary.seconds.parts, summary.warnings) = (solved.seconds, solved.warnings());
+        }
+    }
+
+    /// Nothing is doubtful before it is solved.
+    fn warn(&mut self, _warnings: Vec<String>) {}
+}
+
+/// Formulas at every node, 0 where they have no value and need none.
+fn values<const K: usize>(
+    mesh: &Mesh<2>,
+    what: &str,
+    program: &Program<2, K>,
+    needed: [&Vec<bool>; K],
+) -> Result<Vec<[f64; K]>, Failure> {
+    let mut out = vec![[0.0; K]; mesh.x().len()];
+    program.eval_each(mesh.x(), &[], &mut out);
+    for (k, values) in out.iter_mut().enumerate() {
+        for (value, needed) in values.iter_mut().zip(needed) {
+            if !value.is_finite() && !needed[k] {
+                *value = 0.0;
+            }
+        }
+    }
+    match out.iter().position(|v| !v.iter().all(|v| v.is_finite())) {
+        None => Ok(out),
+        Some(k) => {
+            let value = out[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
+            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+            Err(Failure::Formula { what: what.into(), value, node, x, given: Vec::new() })
+        }
+    }
+}

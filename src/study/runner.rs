@@ -1,0 +1,287 @@
+//! The one runner: a study of any kind → run directory.
+
+use super::kind::{Kind, Running, SpentBy};
+use crate::error::{Error, Moment, Result, Unfit};
+use crate::kept::Kept;
+use crate::output::{Checkpoints, Frames, RunDirectory, Spent, Summary, draw, final_arrays};
+use crate::parallel::join;
+use crate::report;
+use crate::simulation::{Event, Observer, Scene, Snapshot};
+use crate::stopwatch::Stopwatch;
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// Where a run begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Begin {
+    /// At its start.
+    Anew,
+    /// At the newest checkpoint, and on to the bits of a run that nothing disturbed; at its start where there is none.
+    Resumed,
+}
+
+/// What a run left behind.
+#[derive(Debug)]
+pub struct Finished<R: Running> {
+    /// What `summary.json` holds.
+    pub summary: Summary<R::Figures>,
+    /// What ran, as far as it came: the last good state, and what was found on the way.
+    pub run: R,
+    /// Why the run ended early, if it did.
+    pub failure: Option<Error>,
+}
+
+/// Who watches a run, and what it leaves as it goes.
+pub struct Stage<'a> {
+    /// Where the run writes; nowhere if nothing is to be left.
+    pub(super) directory: Option<&'a RunDirectory>,
+    /// The event with which the run begins: [`Event::Started`] or [`Event::Resumed`].
+    pub(super) begins: Event,
+    frames: Option<Frames>,
+    watchers: Vec<&'a mut dyn Observer>,
+    checkpoints: Option<Checkpoints>,
+    clock: Stopwatch,
+    /// Seconds of watching and writing.
+    pub(super) output: f64,
+}
+
+impl<'a> Stage<'a> {
+    /// The stage of a run that leaves nothing.
+    fn bare() -> Self {
+        Self {
+            directory: None,
+            begins: Event::Started,
+            frames: None,
+            watchers: Vec::new(),
+            checkpoints: None,
+            clock: Stopwatch::start(),
+            output: 0.0,
+        }
+    }
+
+    /// Frames and watchers.
+    pub(super) fn observers(&mut self) -> Vec<&mut dyn Observer> {
+        self.parts().0
+    }
+
+    /// The same, and the checkpoints beside them.
+    pub(super) fn parts(&mut self) -> (Vec<&mut dyn Observer>, Option<&mut Checkpoints>) {
+        let mut observers: Vec<&mut dyn Observer> = Vec::new();
+        self.frames.iter_mut().for_each(|frames| observers.push(frames));
+        self.watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
+        (observers, self.checkpoints.as_mut())
+    }
+
+    /// Shows an event to all observers. Unless it is the end of the run, a checkpoint is written where one is due,
+    /// which `keep` makes of the seconds up to now and of what observers carry, and the run ends where an observer asks
+    /// for that.
+    ///
+    /// # Errors
+    /// What an observer returned; [`Error::Unwritable`]; [`Error::Interrupted`].
+    pub(super) fn show<P, C: Serialize>(
+        &mut self,
+        event: Event,
+        snapshot: &Snapshot<'_>,
+        parts: P,
+        keep: impl FnOnce(Spent<P>, Kept) -> Result<C>,
+    ) -> Result<()> {
+        let spent = self.spent(parts);
+        let (mut observers, checkpoints) = self.parts();
+        observers.iter_mut().try_for_each(|observer| observer.observe(event, snapshot))?;
+        if event == Event::Finished {
+            return Ok(());
+        }
+        let ends = observers.iter().any(|observer| observer.interrupts());
+        if let Some(checkpoints) = checkpoints
+            && (ends || checkpoints.is_due(snapshot.step))
+        {
+            let mut kept = Kept::default();
+            observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
+            checkpoints.write(snapshot.step, &keep(spent, kept)?)?;
+        }
+        match ends {
+            true => Err(Error::Interrupted(Moment { t: snapshot.t, step: snapshot.step })),
+            false => Ok(()),
+        }
+    }
+
+    /// Does something that is no computation, and counts its seconds as those of output.
+    pub(super) fn output<T>(&mut self, write: impl FnOnce(&mut Self) -> T) -> T {
+        let began = Instant::now();
+        let result = write(self);
+        self.output += began.elapsed().as_secs_f64();
+        result
+    }
+
+    /// Does something whose seconds count nowhere, such as another run that this one is compared with.
+    pub(super) fn beside<T>(&mut self, other: impl FnOnce(&mut Self) -> T) -> T {
+        let before = self.clock.elapsed();
+        let result = other(self);
+        self.clock = Stopwatch::start().after(before);
+        result
+    }
+
+    /// Seconds up to now, with those of the parts of the run.
+    pub(super) fn spent<P>(&self, parts: P) -> Spent<P> {
+        let [wall, cpu] = self.clock.elapsed();
+        Spent { wall, cpu, parts, output: self.output }
+    }
+
+    /// Seconds by the clock, over all parts of the run.
+    pub(super) fn wall(&self) -> f64 {
+        self.clock.wall()
+    }
+}
+
+/// See [`Kind::compute`].
+pub(super) fn compute<K: Kind>(study: &K) -> Result<(K::Run, Option<Error>)> {
+    let mut study = study.clone();
+    study.resolve()?;
+    let mut run = study.begin()?;
+    match run.go(&mut Stage::bare()) {
+        Err(error) if run.scenes().is_ok_and(|scenes| scenes.is_empty()) => Err(error),
+        outcome => Ok((run, outcome.err())),
+    }
+}
+
+/// See [`Kind::run`].
+pub(super) fn run<K: Kind>(
+    study: &K,
+    path: &Path,
+    begin: Begin,
+    watchers: &mut [&mut dyn Observer],
+) -> Result<Finished<K::Run>> {
+    let clock = Stopwatch::start();
+    let mut study = study.clone();
+    study.resolve()?;
+    let (mut run, warnings) = (study.begin()?, study.warnings()?);
+    let (header, output) = study.common();
+    let directory = RunDirectory::open(path)?;
+    let mut checkpoints = Checkpoints::new(path, output.checkpoint, &study.to_toml())?;
+    let resumed = match begin {
+        Begin::Anew => None,
+        Begin::Resumed => checkpoints.resume(|found| take_up(&study, path, found))?,
+    };
+    let mut stage = Stage::bare();
+    match resumed {
+        Some(((resumed, frames, before), refused)) => {
+            directory.clear_ended()?;
+            run = resumed;
+            run.warn(refused);
+            (stage.begins, stage.frames, stage.output) = (Event::Resumed, Some(frames), before.output);
+            stage.clock = clock.after([before.wall, before.cpu]);
+        }
+        None => {
+            directory.clear()?;
+            run.warn(warnings);
+            let (at, subdomains) = run.frames();
+            (stage.clock, stage.frames) = (clock, Some(Frames::create(path, at, subdomains)));
+        }
+    }
+    stage.directory = Some(&directory);
+    stage.checkpoints = Some(checkpoints);
+    watchers.iter_mut().for_each(|watcher| stage.watchers.push(*watcher));
+    let summary = Summary::running(&header.name, K::KIND.name());
+    directory.write_summary(&summary)?;
+    directory.write("study.toml", study.to_toml().as_bytes())?;
+    let failure = run.go(&mut stage).err();
+    end(&study, stage, &directory, Finished { summary, run, failure })
+}
+
+/// What runs, at a checkpoint, with the frames that were there by then and the seconds that it took.
+type TakenUp<R> = (R, Frames, SpentBy<R>);
+
+/// Takes up a checkpoint, and takes the files of the directory back to what they were then.
+fn take_up<K: Kind>(study: &K, path: &Path, found: <K::Run as Running>::Checkpoint) -> Result<TakenUp<K::Run>, Unfit> {
+    let mut run = begun(study)?;
+    let (before, kept) = run.resume(found, Some(path))?;
+    let (at, subdomains) = run.frames();
+    Ok((run, Frames::resume(path, at, subdomains, &kept)?, before))
+}
+
+fn begun<K: Kind>(study: &K) -> Result<K::Run, Unfit> {
+    study.begin().map_err(|error| Unfit::Damaged(error.to_string()))
+}
+
+/// See [`Study::decode`](super::Study::decode).
+pub(super) fn decode<K: Kind>(study: &K, bytes: &[u8]) -> Result<usize, Unfit> {
+    let checkpoints = Checkpoints::new(Path::new(""), study.common().1.checkpoint, &study.to_toml());
+    let (step, found) = checkpoints.map_err(|error| Unfit::Damaged(error.to_string()))?.read(bytes)?;
+    begun(study)?.resume(found, None)?;
+    Ok(step)
+}
+
+/// Ends a run: writes what is left of it, its summary, then the report and what else is drawn, then the summary again
+/// with what that took or failed with. What went wrong first is what is told.
+fn end<K: Kind>(
+    study: &K,
+    mut stage: Stage<'_>,
+    directory: &RunDirectory,
+    finished: Finished<K::Run>,
+) -> Result<Finished<K::Run>> {
+    let Finished { mut summary, mut run, failure } = finished;
+    let (last, left) = stage.output(|stage| leave(&mut run, stage, directory));
+    let failure = failure.or(left.err());
+    run.tell(&mut summary);
+    let note = |summary: &mut Summary<_>, failure: Option<&Error>, stage: &Stage<'_>| {
+        summary.note(failure, |error| study.remedy(error));
+        summary.seconds = stage.spent(summary.seconds.parts);
+    };
+    note(&mut summary, failure.as_ref(), &stage);
+    // what is on the disk is not called completed before all is there: there may be no space to take that back
+    let status = std::mem::replace(&mut summary.status, "running");
+    let written = directory.write_summary(&summary);
+    let drawn = stage.output(|_| written.and_then(|()| draw_all(study, directory, &run, last.as_ref(), status)));
+    let failure = failure.or(drawn.err());
+    note(&mut summary, failure.as_ref(), &stage);
+    let failure = failure.or(directory.write_summary(&summary).err());
+    let goes_on = failure.as_ref().is_some_and(Error::is_resumable);
+    let removed = stage.checkpoints.iter().filter(|_| !goes_on).try_for_each(Checkpoints::remove);
+    match failure.or(removed.err()) {
+        Some(error) if last.is_none() => Err(error),
+        failure => Ok(Finished { summary, run, failure }),
+    }
+}
+
+/// Writes what only a run of this kind leaves, and the frames that must not be missing. Returns the last scene, too.
+fn leave<R: Running>(run: &mut R, stage: &mut Stage<'_>, directory: &RunDirectory) -> (Option<Scene>, Result<()>) {
+    let left = run.leave(directory);
+    let scenes = match run.scenes() {
+        Ok(scenes) => scenes,
+        Err(error) => return (None, left.and(Err(error))),
+    };
+    let last = scenes.last().cloned();
+    let written = match &mut stage.frames {
+        Some(frames) => frames.write(scenes),
+        None => Ok(()),
+    };
+    (last, left.and(written))
+}
+
+/// Writes arrays and a picture of the last scene, beside the report.
+fn draw_all<K: Kind>(
+    study: &K,
+    directory: &RunDirectory,
+    run: &K::Run,
+    last: Option<&Scene>,
+    status: &str,
+) -> Result<()> {
+    let (header, output) = study.common();
+    let drawn = last.filter(|scene| scene.cells[1] > 0);
+    let drawn = drawn.map(|scene| (scene, format!("{}, {}", header.name, run.caption(scene))));
+    let picture = || match &drawn {
+        Some((scene, title)) => {
+            directory.write("final.npz", &final_arrays(scene))?;
+            draw(title, scene).write(directory.path(), "mesh")
+        }
+        None => Ok(()),
+    };
+    let reported = last.is_some() || study.has_steps();
+    let animated = output.animation && last.is_some();
+    let (picture, report) = join(picture, || match reported {
+        true => report::finish(directory.path(), output.report, animated, status),
+        false => Ok(()),
+    });
+    picture.and(report)
+}
