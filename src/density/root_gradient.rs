@@ -67,7 +67,7 @@ impl Monitor for RootGradient {
             (passes - 1.0).max(0.0)
         });
         smooth_widely(cells, lattice.periodic(), &mut rho, passes);
-        let nodal = at_nodes(lattice, &rho);
+        let nodal = at_nodes(lattice, rho);
         match nodal.iter().position(|rho| !rho.is_finite()) {
             None => Ok(nodal),
             Some(k) => Err(Failure::NonFinite {
@@ -109,7 +109,8 @@ impl Roots {
         // both diagonals of a cell, and twice its area
         let diagonals = |k: usize| (minus(x[k + m + 2], x[k]), minus(x[k + 1], x[k + m + 1]));
         let twice_area = |([px, py], [qx, qy]): ([f64; 2], [f64; 2])| px * qy - py * qx;
-        let mut roots = Vec::with_capacity(n * m);
+        // room for one a node, too
+        let mut roots = Vec::with_capacity((n + 1) * (m + 1));
         let mut steepest = 0.0;
         let background = sum(cells().map(|k| {
             let diagonals = diagonals(k);
@@ -133,26 +134,32 @@ impl Roots {
 /// How many layers the lattice lines along each axis meet: half of all that ρ, given by the cell, rises and falls along
 /// them over the sum of the largest ρ − 1 of each line, so that the lines through the strongest layers count most.
 fn layers(lattice: &Lattice<2>, rho: &[f64]) -> [f64; 2] {
-    let ([n, m], [wraps, wraps_across]) = (lattice.cells(), lattice.periodic());
-    // length and stride of the lines, how many there are, and the stride between them
-    [(n, m, m, 1, wraps), (m, 1, n, m, wraps_across)].map(|(length, stride, lines, across, wraps)| {
-        let (mut changes, mut highest) = (0.0, 0.0);
-        for line in 0..lines {
-            let at = |i: usize| rho[line * across + i * stride];
-            let (mut last, mut most) = (at(if wraps { length - 1 } else { 0 }), 1.0);
-            for i in 0..length {
-                changes += (at(i) - last).abs();
-                last = at(i);
-                most = f64::max(most, last);
-            }
-            highest += most - 1.0;
+    let ([n, m], wraps) = (lattice.cells(), lattice.periodic());
+    let row = |i: usize| &rho[i * m..(i + 1) * m];
+    let mut changes = [0.0; 2];
+    let mut across = vec![1.0; m];
+    let mut highest = [0.0; 2];
+    let mut below = row(if wraps[0] { n - 1 } else { 0 });
+    for i in 0..n {
+        let row = row(i);
+        let (mut last, mut along) = (row[if wraps[1] { m - 1 } else { 0 }], 1.0);
+        for ((rho, below), across) in row.iter().zip(below).zip(&mut across) {
+            changes[0] += (rho - below).abs();
+            changes[1] += (rho - last).abs();
+            last = *rho;
+            *across = f64::max(*across, *rho);
+            along = f64::max(along, *rho);
         }
-        if highest > 0.0 { 0.5 * changes / highest } else { 0.0 }
-    })
+        highest[1] += along - 1.0;
+        below = row;
+    }
+    highest[0] = across.iter().map(|rho| rho - 1.0).sum();
+    [0, 1].map(|d| if highest[d] > 0.0 { 0.5 * changes[d] / highest[d] } else { 0.0 })
 }
 
-/// The means of the cells around each node; beyond bounded sides stand the cells beside them again.
-fn at_nodes(lattice: &Lattice<2>, rho: &[f64]) -> Vec<f64> {
+/// The means of the cells around each node; beyond bounded sides stand the cells beside them again. In place, from the
+/// last row on: row i of the nodes begins where row i of the cells does, or later.
+fn at_nodes(lattice: &Lattice<2>, mut rho: Vec<f64>) -> Vec<f64> {
     let ([n, m], [rows, columns], periodic) = (lattice.cells(), lattice.nodes(), lattice.periodic());
     // the cells on both sides of node i along an axis of n cells
     let beside = |i: usize, n: usize, wraps: bool| match i {
@@ -161,14 +168,19 @@ fn at_nodes(lattice: &Lattice<2>, rho: &[f64]) -> Vec<f64> {
         i if i == n => [n - 1, n - 1],
         i => [i - 1, i],
     };
-    let columns: Vec<[usize; 2]> = (0..columns).map(|j| beside(j, m, periodic[1])).collect();
-    let mut nodal = Vec::with_capacity(lattice.len());
-    for i in 0..rows {
-        let [below, above] = beside(i, n, periodic[0]).map(|i| &rho[i * m..(i + 1) * m]);
-        let means = columns.iter().map(|&[c, d]| 0.25 * ((below[c] + above[d]) + (below[d] + above[c])));
-        nodal.extend(means);
+    let beside_column: Vec<[usize; 2]> = (0..columns).map(|j| beside(j, m, periodic[1])).collect();
+    let last_row = rho[(n - 1) * m..].to_vec();
+    let (mut below, mut above) = (last_row.clone(), last_row.clone());
+    rho.resize(lattice.len(), 0.0);
+    for i in (0..rows).rev() {
+        let cells = beside(i, n, periodic[0]);
+        for (row, i) in [&mut below, &mut above].into_iter().zip(cells) {
+            row.copy_from_slice(if i == n - 1 { &last_row } else { &rho[i * m..(i + 1) * m] });
+        }
+        let means = beside_column.iter().map(|&[c, d]| 0.25 * ((below[c] + above[d]) + (below[d] + above[c])));
+        rho[i * columns..(i + 1) * columns].iter_mut().zip(means).for_each(|(rho, mean)| *rho = mean);
     }
-    nodal
+    rho
 }
 
 fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
