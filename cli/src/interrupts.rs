@@ -32,8 +32,8 @@ impl Observer for Interrupts {
     }
 }
 
-/// A file that would grow past the limit of the shell (`ulimit -f`) is then an error of that file, not the silent end of
-/// the program.
+/// A file that would grow past the limit of the shell (`ulimit -f`) is then an error of that file, not the silent end
+/// of the program.
 pub fn outlive_file_limits() {
     #[cfg(unix)]
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));

@@ -1,5 +1,6 @@
 use crate::terminal::{say, use_threads};
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use driftmesh::Error;
 use driftmesh_reproduce::{Done, ITEMS, Item, Options, Rerun, page};
 use std::path::PathBuf;
@@ -9,7 +10,7 @@ use std::time::Instant;
 #[derive(Args)]
 pub struct Reproduce {
     /// What to rerun; everything where nothing is named.
-    #[arg(value_name = "ITEM", value_parser = clap::builder::PossibleValuesParser::new(ITEMS.iter().map(|item| item.name)))]
+    #[arg(value_name = "ITEM", value_parser = PossibleValuesParser::new(ITEMS.iter().map(|item| item.name)))]
     items: Vec<String>,
     /// Everything, and one page of it that stands alone: index.html in the directory.
     #[arg(long, conflicts_with = "items")]

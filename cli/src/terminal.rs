@@ -61,8 +61,8 @@ pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> Ex
     ExitCode::from(if error.is_failure() { 1 } else { 2 })
 }
 
-/// Makes the pool of threads, all cores where no number is given. The caller is one of them: handing each small piece of
-/// work to a pool beside it would cost more than the work.
+/// Makes the pool of threads, all cores where no number is given. The caller is one of them: handing each small piece
+/// of work to a pool beside it would cost more than the work.
 pub fn use_threads(threads: Option<u16>) -> driftmesh::Result<()> {
     let number = threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(number).use_current_thread().build_global();

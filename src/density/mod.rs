@@ -5,6 +5,7 @@
 mod arclength;
 mod following;
 mod given;
+mod need;
 mod noise;
 mod root_gradient;
 mod smoothing;
@@ -12,9 +13,9 @@ mod tables;
 
 pub use arclength::{Arclength, Strength};
 pub use given::Given;
+pub(crate) use need::need;
 pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
-pub(crate) use root_gradient::need;
 pub use smoothing::smooth;
 pub use tables::{ArclengthTable, GivenTable, RootGradientTable};
 

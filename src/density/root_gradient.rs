@@ -1,3 +1,4 @@
+use super::need::{missed_by_equal_cells, need, need_by_error};
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
 use crate::geometry::{Lattice, Mesh, check_length};
@@ -14,9 +15,10 @@ use crate::numerics::{larger, sum};
 /// root falls with the width as fast as its largest value grows. The background b is 0 where u is flat outside its
 /// layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes otherwise.
 ///
-/// The need s is 0 where u changes by less than 0.18 of its range over a uniform cell everywhere: equal cells resolve
-/// it. It is 1 where u changes by more than a quarter of its range over one somewhere. The largest ρ over the smallest
-/// is at most 10⁶.
+/// The need s is 0 where equal cells resolve u: where u changes by less than 0.18 of its range over a uniform cell
+/// everywhere, and linear interpolation between equal cells is off by less than 1.8 %. It is 1 where u changes by more
+/// than a quarter of its range over one somewhere, or the error is more than 2.4 %. The largest ρ over the smallest is
+/// at most 10⁶.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
@@ -26,10 +28,6 @@ pub struct RootGradient {}
 
 /// Share of the layer in the density.
 const BETA: f64 = 4.0;
-/// Changes of u over a uniform cell, as shares of its range, that equal cells resolve at most, and that take the whole
-/// density at least: a Gaussian is interpolated to 1 % of its range at the first and to 2 % at the second.
-const RESOLVED: f64 = 0.18;
-const UNRESOLVED: f64 = 0.25;
 /// The largest ρ over the smallest, before it is smoothed.
 const CONTRAST: f64 = 1e6;
 /// Passes of the filter on 41 × 41 nodes.
@@ -52,7 +50,11 @@ impl Monitor for RootGradient {
         if mean <= ROUNDING * background || steepest * range * longest <= ROUNDING * size {
             return even();
         }
-        let beta = BETA * need(steepest);
+        let need = match need(steepest) {
+            1.0 => 1.0,
+            by_slope => by_slope.max(need_by_error(missed_by_equal_cells(mesh, u) / range)),
+        };
+        let beta = BETA * need;
         if beta == 0.0 {
             return even();
         }
@@ -78,12 +80,6 @@ impl Monitor for RootGradient {
             }),
         }
     }
-}
-
-/// s where u changes by this share of its range over a uniform cell at most.
-pub(crate) fn need(share: f64) -> f64 {
-    let s = ((share - RESOLVED) / (UNRESOLVED - RESOLVED)).clamp(0.0, 1.0);
-    s * s * (3.0 - 2.0 * s)
 }
 
 /// √|∇u| of the cells of a mesh, u in units of its range so that squares of no unit overflow.

@@ -3,10 +3,10 @@ use super::Mesh;
 /// Interpolates a nodal field from one mesh to the nodes of another over the same lattice and box
 ///
 /// Every cell is divided into two triangles by its diagonal from (i, j) to (i+1, j+1), and the field is linear on each.
-/// The search for a node begins as many cells from the one with its index as the search for its neighbour ended, so that
-/// it costs a few tests, whatever the meshes are. On periodic axes the image next to that cell is searched for: the meshes may have drifted apart
-/// by any number of periods. Points outside a bounded box take the value at the nearest point of the cell where the
-/// search ends.
+/// The search for a node begins as many cells from the one with its index as the search for its neighbour ended, so
+/// that it costs a few tests, whatever the meshes are. On periodic axes the image next to that cell is searched for:
+/// the meshes may have drifted apart by any number of periods. Points outside a bounded box take the value at the
+/// nearest point of the cell where the search ends.
 ///
 /// # Example
 /// ```
@@ -74,8 +74,8 @@ impl Cells<'_> {
         (index, std::array::from_fn(|d| x[d] + [i, j][d].div_euclid(nodes[d] as isize) as f64 * extent[d]))
     }
 
-    /// The cell that holds `point`, and nodes and barycentric weights of the triangle that does; the search begins in cell
-    /// `start`.
+    /// The cell that holds `point`, and nodes and barycentric weights of the triangle that does; the search begins in
+    /// cell `start`.
     fn find(&self, point: [f64; 2], start: [isize; 2]) -> ([isize; 2], Triangle) {
         let cells = self.mesh.lattice().cells().map(|n| n as isize);
         let periodic = self.mesh.lattice().periodic();

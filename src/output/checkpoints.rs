@@ -121,8 +121,8 @@ impl Checkpoints {
         }
     }
 
-    /// Writes one over the older of the two, unless the newest is of the same step. Whatever happens meanwhile, the newer
-    /// of the two stays.
+    /// Writes one over the older of the two, unless the newest is of the same step. Whatever happens meanwhile, the
+    /// newer of the two stays.
     ///
     /// # Errors
     /// [`Error::Unwritable`].
@@ -137,8 +137,8 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Goes on from the newest checkpoint that `take_up` accepts; none where there is no file. What was refused before it
-    /// is told in words.
+    /// Goes on from the newest checkpoint that `take_up` accepts; none where there is no file. What was refused before
+    /// it is told in words.
     ///
     /// # Errors
     /// [`Error::Checkpoint`] where there are files, but none that will do.

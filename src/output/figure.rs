@@ -64,7 +64,8 @@ const FINE: u32 = 8;
 const STRETCHES: f64 = 150.0;
 /// More marks than this are small.
 const MANY: usize = 40;
-/// Size of the plot itself, of a row of the legend, and of what is beside its words, in pixels; a letter is so wide at most.
+/// Size of the plot itself, of a row of the legend, and of what is beside its words, in pixels; a letter is so wide at
+/// most.
 const PLOT: [f64; 2] = [508.0, 320.0];
 const ROW: f64 = 22.0;
 const BESIDE: f64 = 64.0;
@@ -87,8 +88,8 @@ const NARROW: f64 = 4.0;
 const MOST_POWERS: i32 = 9;
 
 impl Curve {
-    /// As few points as show the same, with their order along the bottom: of each narrow stretch its first and last, its
-    /// lowest and its highest.
+    /// As few points as show the same, with their order along the bottom: of each narrow stretch its first and last,
+    /// its lowest and its highest.
     pub(crate) fn outlined(mut self) -> Self {
         let ends = [self.points.first(), self.points.last()].map(|end| end.map_or(0.0, |p| p[0]));
         let stretch = |p: &[f64; 2]| ((p[0] - ends[0]) / (ends[1] - ends[0]) * STRETCHES).floor();
@@ -148,8 +149,8 @@ impl Figure {
         placed(0) && placed(1)
     }
 
-    /// From where to where an axis goes: around the points, and from mark to mark where it is logarithmic; further up where
-    /// a legend would find no free corner.
+    /// From where to where an axis goes: around the points, and from mark to mark where it is logarithmic; further up
+    /// where a legend would find no free corner.
     fn ends(&self, d: usize) -> [f64; 2] {
         let [low, high] = self.around(d);
         if d == 0 || !self.is_named() || self.free_corner().is_some() {
@@ -315,8 +316,8 @@ impl Figure {
     }
 }
 
-/// A drawing in which nothing has both a fill and a stroke, with the opacity of elements as that of their paint: it looks
-/// the same, and takes no layer for each of them.
+/// A drawing in which nothing has both a fill and a stroke, with the opacity of elements as that of their paint: it
+/// looks the same, and takes no layer for each of them.
 fn with_opacity_of_paint(svg: &str) -> String {
     let mut parts = svg.split(" opacity=\"");
     let mut out = parts.next().unwrap_or_default().to_string();
@@ -376,8 +377,8 @@ fn short(x: f64) -> String {
 mod tests {
     use super::*;
 
-    /// A single spike among ten thousand values is drawn, and a jump stands where it is, also where most values stand before
-    /// it.
+    /// A single spike among ten thousand values is drawn, and a jump stands where it is, also where most values stand
+    /// before it.
     #[test]
     fn an_outline_keeps_spikes_and_jumps() {
         let values = (0..10_000).map(|k| [k as f64, if k == 4321 { 50.0 } else { 1.0 }]);

@@ -98,6 +98,7 @@ struct Side<const B: usize> {
 struct Half<'a> {
     dt: f64,
     t: f64,
+    mesh: &'a Mesh<2>,
     cells: &'a DualCells,
     /// Positions, padded.
     x: &'a [[f64; 2]],
@@ -122,48 +123,46 @@ impl<const B: usize> FiniteVolumes<B> {
         let swept = old_cells.swept(&cells);
         let [width, height] = new.extent();
         let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), [[width, 0.0], [0.0, height]]));
-        // formulas hold in the box, so that nodes beyond a periodic side are seen at their images
-        let [seen_old, seen_new] = [(old, &x_old), (new, &x_new)].map(|(mesh, x)| inside(mesh, x));
-        let patch = *cells.patch();
-        let n = patch.pencil_len();
-        let places = |p: usize| (p * n..(p + 1) * n).zip(patch.pencil(p)..);
-
         let mut u = padded(lattice, start, [[0.0; B]; 2]);
-        let mut known = vec![[0.0; B]; patch.len()];
-        {
-            let half = Half { dt, t, cells: &old_cells, x: &x_old, swept: &swept };
-            let nodes = law.nodes(t, &seen_old, &u);
-            law.check(old, &u, &nodes)?;
-            let faces = half.faces(law, &nodes, &u);
-            parallel::for_each_row(&mut known, n, |p, known| {
-                for (known, (i, k)) in known.iter_mut().zip(places(p)) {
-                    let (leaving, area) = (half.leaving(&faces, k), half.cells.areas()[i]);
-                    let source = law.source(&nodes[k]).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * dt * s));
-                    *known = std::array::from_fn(|c| area * (u[k][c] + source[c]) - leaving[c]);
-                }
-            });
-        }
+        let before = Half { dt, t, mesh: old, cells: &old_cells, x: &x_old, swept: &swept };
+        let known = before.known(law, &u)?;
 
         // given values are set from the start
-        let s = patch.padded_strides()[0];
-        let sides: Vec<Side<B>> = lattice
-            .sides()
-            .map(|i| Side { i, k: (i / n + 1) * s + i % n + 1, given: law.side(t + dt, new.image(new.x()[i])) })
-            .collect();
+        let sides = sides(law, t + dt, new);
         for side in &sides {
             for (u, given) in u[side.k].iter_mut().zip(side.given) {
                 *u = given.unwrap_or(*u);
             }
         }
-        repeat_sides(&patch, &mut u);
+        repeat_sides(cells.patch(), &mut u);
+        let after = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x_new, swept: &swept };
+        let Solved { residual, work, stalled } = self.newton(law, &after, &known, &sides, &mut u)?;
 
+        let mut values = vec![[0.0; B]; cells.patch().len()];
+        for (i, k) in cells.patch().places().enumerate() {
+            values[i] = u[k];
+        }
+        // an unknown that is given nowhere has no flux through the sides
+        settle(&cells, &residual, &mut values, |c| sides.iter().all(|side| side.given[c].is_none()));
+        check_finite(law.names(), new, &values)?;
+        self.newest = Some((new.clone(), cells));
+        stalled.map_or(Ok((values, work)), Err)
+    }
+
+    /// Newton's method for the padded values `u` at the end of a time step, from what is `known` of its beginning.
+    fn newton<L: Law<B>>(
+        &mut self,
+        law: &L,
+        half: &Half<'_>,
+        known: &[[f64; B]],
+        sides: &[Side<B>],
+        u: &mut [[f64; B]],
+    ) -> Result<Solved<B>, Failure> {
+        let patch = *half.cells.patch();
+        let seen = inside(half.mesh, half.x);
         // unknowns may differ much in size, and one that is 0 takes the size of its first change
-        let largest_of = |values: &[[f64; B]]| -> [f64; B] {
-            std::array::from_fn(|c| values.iter().fold(0.0, |m, value| larger(m, value[c])))
-        };
-        let mut sizes = largest_of(&u);
+        let mut sizes = largest_of(u);
         let mut size = sizes.into_iter().fold(f64::MIN_POSITIVE, larger);
-        let half = Half { dt, t: t + dt, cells: &cells, x: &x_new, swept: &swept };
         let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
@@ -171,17 +170,11 @@ impl<const B: usize> FiniteVolumes<B> {
         let (mut round_off, tolerance) = (16.0 * f64::EPSILON, L::TOLERANCE);
         let mut at_first = f64::INFINITY;
         let stalled = loop {
-            let nodes = law.nodes(half.t, &seen_new, &u);
-            law.check(new, &u, &nodes)?;
-            let faces = half.faces(law, &nodes, &u);
-            parallel::for_each_row(&mut residual, n, |p, residual| {
-                for (residual, (i, k)) in residual.iter_mut().zip(places(p)) {
-                    let (leaving, area) = (half.leaving(&faces, k), half.cells.areas()[i]);
-                    let source = law.source(&nodes[k]).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * dt * s));
-                    *residual = std::array::from_fn(|c| (known[i][c] - leaving[c]) / area - (u[k][c] - source[c]));
-                }
-            });
-            for side in &sides {
+            let nodes = law.nodes(half.t, &seen, u);
+            law.check(half.mesh, u, &nodes)?;
+            let faces = half.faces(law, &nodes, u);
+            half.residual(law, (&nodes, &faces), known, u, &mut residual);
+            for side in sides {
                 for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
                     *residual = if given.is_some() { 0.0 } else { *residual };
                 }
@@ -205,22 +198,7 @@ impl<const B: usize> FiniteVolumes<B> {
                 let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
                 break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
             }
-            parallel::for_each_row(&mut matrix.rows, n, |p, rows| {
-                for (row, (i, k)) in rows.iter_mut().zip(places(p)) {
-                    *row = half.row(&faces, i, k);
-                    if let Some((_, derivative)) = law.source(&nodes[k]) {
-                        add(&mut row[0], -0.5 * dt, &derivative);
-                    }
-                }
-            });
-            for side in &sides {
-                let row = &mut matrix.rows[side.i];
-                fold_sides(lattice.beyond(side.i), row);
-                for c in (0..B).filter(|&c| side.given[c].is_some()) {
-                    row.iter_mut().for_each(|block| block[c] = [0.0; B]);
-                    row[0][c][c] = 1.0;
-                }
-            }
+            half.matrix(law, (&nodes, &faces), sides, &mut matrix);
             let stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
             round_off = 16.0 * f64::EPSILON * stiffest;
             let mut correction = vec![[0.0; B]; patch.padded_len()];
@@ -235,18 +213,30 @@ impl<const B: usize> FiniteVolumes<B> {
             for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
                 *u += correction;
             }
-            repeat_sides(&patch, &mut u);
+            repeat_sides(&patch, u);
         };
-        let mut values = vec![[0.0; B]; patch.len()];
-        for (i, k) in patch.places().enumerate() {
-            values[i] = u[k];
-        }
-        // an unknown that is given nowhere has no flux through the sides
-        settle(&cells, &residual, &mut values, |c| sides.iter().all(|side| side.given[c].is_none()));
-        check_finite(law.names(), new, &values)?;
-        self.newest = Some((new.clone(), cells));
-        stalled.map_or(Ok((values, work)), Err)
+        Ok(Solved { residual, work, stalled })
     }
+}
+
+/// Where Newton's method ended.
+struct Solved<const B: usize> {
+    residual: Vec<[f64; B]>,
+    work: Work,
+    /// Why it did not converge, where it did not.
+    stalled: Option<Failure>,
+}
+
+/// The largest absolute value of each unknown.
+fn largest_of<const B: usize>(values: &[[f64; B]]) -> [f64; B] {
+    std::array::from_fn(|c| values.iter().fold(0.0, |m, value| larger(m, value[c])))
+}
+
+/// The nodes on bounded sides, and the values given there at time t.
+fn sides<const B: usize, L: Law<B>>(law: &L, t: f64, mesh: &Mesh<2>) -> Vec<Side<B>> {
+    let m = mesh.lattice().nodes()[1];
+    let side = |i: usize| Side { i, k: (i / m + 1) * (m + 2) + i % m + 1, given: law.side(t, mesh.image(mesh.x()[i])) };
+    mesh.lattice().sides().map(side).collect()
 }
 
 /// Positions in the box, where those beyond a periodic side are replaced by their images.
@@ -272,7 +262,80 @@ fn settle<const B: usize>(
     }
 }
 
+/// Nodes and faces of one half of a time step, as a law sees them.
+type Seen<'a, N, const B: usize> = (&'a [N], &'a [[Face<B>; 2]]);
+
 impl Half<'_> {
+    /// What the beginning of a time step contributes to each dual cell: A (u + ½ Δt S) less half of what leaves it.
+    fn known<const B: usize, L: Law<B>>(&self, law: &L, u: &[[f64; B]]) -> Result<Vec<[f64; B]>, Failure> {
+        let nodes = law.nodes(self.t, &inside(self.mesh, self.x), u);
+        law.check(self.mesh, u, &nodes)?;
+        let faces = self.faces(law, &nodes, u);
+        let mut known = vec![[0.0; B]; self.cells.patch().len()];
+        self.for_each_node(&mut known, |known, i, k| {
+            let (leaving, area) = (self.leaving(&faces, k), self.cells.areas()[i]);
+            let source = self.source(law, &nodes[k]);
+            *known = std::array::from_fn(|c| area * (u[k][c] + source[c]) - leaving[c]);
+        });
+        Ok(known)
+    }
+
+    /// The residual of the equations at the end of a time step, divided by the areas of the cells.
+    fn residual<const B: usize, L: Law<B>>(
+        &self,
+        law: &L,
+        (nodes, faces): Seen<'_, L::Node, B>,
+        known: &[[f64; B]],
+        u: &[[f64; B]],
+        residual: &mut [[f64; B]],
+    ) {
+        self.for_each_node(residual, |residual, i, k| {
+            let (leaving, area) = (self.leaving(faces, k), self.cells.areas()[i]);
+            let source = self.source(law, &nodes[k]);
+            *residual = std::array::from_fn(|c| (known[i][c] - leaving[c]) / area - (u[k][c] - source[c]));
+        });
+    }
+
+    /// The derivative of −[`residual`](Self::residual) by u, and the identity for values that are given.
+    fn matrix<const B: usize, L: Law<B>>(
+        &self,
+        law: &L,
+        (nodes, faces): Seen<'_, L::Node, B>,
+        sides: &[Side<B>],
+        matrix: &mut BlockMatrix<2, 9, B>,
+    ) {
+        self.for_each_node(&mut matrix.rows, |row, i, k| {
+            *row = self.row(faces, i, k);
+            if let Some((_, derivative)) = law.source(&nodes[k]) {
+                add(&mut row[0], -0.5 * self.dt, &derivative);
+            }
+        });
+        for side in sides {
+            let row = &mut matrix.rows[side.i];
+            fold_sides(self.mesh.lattice().beyond(side.i), row);
+            for c in (0..B).filter(|&c| side.given[c].is_some()) {
+                row.iter_mut().for_each(|block| block[c] = [0.0; B]);
+                row[0][c][c] = 1.0;
+            }
+        }
+    }
+
+    /// ½ Δt S at a node.
+    fn source<const B: usize, L: Law<B>>(&self, law: &L, node: &L::Node) -> [f64; B] {
+        law.source(node).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * self.dt * s))
+    }
+
+    /// Calls `each` with the entry of every node, its index and its place in padded vectors, in parallel by rows.
+    fn for_each_node<T: Send>(&self, entries: &mut [T], each: impl Fn(&mut T, usize, usize) + Sync) {
+        let patch = self.cells.patch();
+        let n = patch.pencil_len();
+        parallel::for_each_row(entries, n, |p, entries| {
+            for (entry, (i, k)) in entries.iter_mut().zip((p * n..).zip(patch.pencil(p)..)) {
+                each(entry, i, k);
+            }
+        });
+    }
+
     /// All faces, each stored with the node below it. Those on bounded sides have no flux.
     fn faces<const B: usize, L: Law<B>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; 2]> {
         let patch = self.cells.patch();
@@ -427,164 +490,4 @@ fn add<const B: usize>(sum: &mut Block<B>, scale: f64, block: &Block<B>) {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-    use crate::geometry::Lattice;
-    use crate::physics::{Burgers, BurgersFlux, Convection, Physics};
-
-    /// A mesh of the unit square with every node up to 0.3 cells away from its uniform place, side nodes on their
-    /// sides.
-    fn random(cells: [usize; 2], periodic: [bool; 2], seed: u64) -> Mesh<2> {
-        let mesh = Mesh::uniform(Lattice::new(cells, periodic).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
-        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-        let x = (mesh.x().iter().enumerate()).map(|(k, x)| {
-            let sides = mesh.lattice().beyond(k);
-            std::array::from_fn(|d| {
-                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                let shift = 0.6 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) / cells[d] as f64;
-                x[d] + if sides[d].contains(&true) { 0.0 } else { shift }
-            })
-        });
-        mesh.moved(x.collect()).unwrap()
-    }
-
-    fn burgers(flux: BurgersFlux, initial: &str, boundary: Option<&str>) -> Burgers {
-        let mut burgers = Burgers::new(0.01, Convection::Flux).unwrap().from(initial, boundary).unwrap();
-        burgers.flux = flux;
-        burgers
-    }
-
-    const FLUXES: [BurgersFlux; 3] = [BurgersFlux::Product, BurgersFlux::Energy, BurgersFlux::Central];
-    const WAVE: &str = "1.5 + sin(2*pi*x)*cos(2*pi*y)";
-
-    /// Without viscosity, on a random mesh at rest, Σ A ln u changes only by round-off with the product flux, and Σ A
-    /// u² with the energy-conserving one; neither does with the other.
-    #[test]
-    fn each_flux_keeps_its_own_invariant() {
-        let mesh = random([13, 17], [true, true], 5);
-        let (cells, dt) = (DualCells::new(&mesh), 1.0);
-        let x = padded(mesh.lattice(), mesh.x(), [[1.0, 0.0], [0.0, 1.0]]);
-        let swept = cells.swept(&cells);
-        let rates = |flux: BurgersFlux| -> [f64; 2] {
-            let mut law = burgers(flux, WAVE, None);
-            law.viscosity = 0.0;
-            let u = law.initial(0.0, &mesh);
-            let u = padded(mesh.lattice(), u.values().as_chunks::<1>().0, [[0.0]; 2]);
-            let half = Half { dt, t: 0.0, cells: &cells, x: &x, swept: &swept };
-            let faces = half.faces(&law, &Law::nodes(&law, 0.0, &x, &u), &u);
-            let sum = |f: fn(f64) -> f64| cells.patch().places().map(|k| half.leaving(&faces, k)[0] * f(u[k][0])).sum();
-            [sum(|u| 1.0 / u), sum(|u| u)]
-        };
-        let [[log, not_square], [not_log, square]] = [BurgersFlux::Product, BurgersFlux::Energy].map(rates);
-        assert!(log.abs() < 1e-14 && square.abs() < 1e-14, "{log:e}, {square:e}");
-        assert!(not_square.abs() > 1e-6 && not_log.abs() > 1e-6, "{not_square:e}, {not_log:e}");
-    }
-
-    /// On meshes that jump about at random, a constant stays constant, and ∫u changes only by round-off.
-    #[test]
-    fn random_motion_keeps_constants_and_sums() {
-        for (flux, periodic) in
-            FLUXES.into_iter().flat_map(|flux| [[true, true], [false, true], [false, false]].map(|p| (flux, p)))
-        {
-            let all = periodic == [true, true];
-            for initial in ["0.7", WAVE] {
-                let mut physics = burgers(flux, initial, (!all).then_some(initial));
-                let mut mesh = random([9, 12], periodic, 1);
-                let mut u = physics.initial(0.0, &mesh);
-                let sum = physics.conserved(&mesh, &u);
-                for step in 2..8 {
-                    let new = random([9, 12], periodic, step);
-                    let motion = Motion { t: 0.0, dt: 1e-3, old: &mesh, new: &new };
-                    u = physics.step(motion, &u).unwrap().0;
-                    mesh = new;
-                }
-                if initial == "0.7" {
-                    let off = u.values().iter().fold(0.0_f64, |m, u| m.max((u - 0.7).abs()));
-                    assert!(off < 1e-14, "{flux:?} on {periodic:?}: off by {off:e}");
-                }
-                let drift = (physics.conserved(&mesh, &u) - sum) / sum;
-                assert!(!all || drift.abs() < 1e-14, "{flux:?}: drift {drift:e}");
-            }
-        }
-    }
-
-    /// The order in ε of what a Newton step leaves out
-    ///
-    /// ```text
-    /// max |R(u + ε v) − R(u) − ε J v| = O(ε^order)
-    /// ```
-    ///
-    /// R being the residual at the end of a step, J the matrix of [`FiniteVolumes::step`] and v random: 2 where J is
-    /// the derivative, and Newton's method converges quadratically; 1 where an entry of it is wrong.
-    pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
-        law: &L,
-        motion: Motion<'_>,
-        u: &[[f64; B]],
-    ) -> f64 {
-        let Motion { t, dt, old, new } = motion;
-        let (lattice, [width, height]) = (new.lattice(), new.extent());
-        let cells = DualCells::new(new);
-        let (patch, swept) = (*cells.patch(), DualCells::new(old).swept(&cells));
-        let x = padded(lattice, new.x(), [[width, 0.0], [0.0, height]]);
-        let seen = inside(new, &x);
-        let half = Half { dt, t: t + dt, cells: &cells, x: &x, swept: &swept };
-        let residual = |u: &[[f64; B]]| -> Vec<[f64; B]> {
-            let nodes = law.nodes(half.t, &seen, u);
-            let faces = half.faces(law, &nodes, u);
-            let at = |(i, k): (usize, usize)| {
-                let (leaving, area) = (half.leaving(&faces, k), cells.areas()[i]);
-                let source = law.source(&nodes[k]).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * dt * s));
-                std::array::from_fn(|c| leaving[c] / area + u[k][c] - source[c])
-            };
-            patch.places().enumerate().map(at).collect()
-        };
-        let mut u = padded(lattice, u, [[0.0; B]; 2]);
-        repeat_sides(&patch, &mut u);
-        let mut state = 7_u64;
-        let mut direction = u.clone();
-        for value in direction.as_flattened_mut() {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            *value = (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
-        }
-        repeat_sides(&patch, &mut direction);
-
-        let nodes = law.nodes(half.t, &seen, &u);
-        let faces = half.faces(law, &nodes, &u);
-        let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
-        for (row, (i, k)) in matrix.rows.iter_mut().zip(patch.places().enumerate()) {
-            *row = half.row(&faces, i, k);
-            if let Some((_, derivative)) = law.source(&nodes[k]) {
-                add(&mut row[0], -0.5 * dt, &derivative);
-            }
-        }
-        lattice.sides().for_each(|i| fold_sides(lattice.beyond(i), &mut matrix.rows[i]));
-        let mut product = vec![[0.0; B]; patch.padded_len()];
-        matrix.multiply(&direction, &mut product);
-
-        let start = residual(&u);
-        let left = |epsilon: f64| {
-            let ahead = u.iter().zip(&direction).map(|(u, v)| std::array::from_fn(|c| u[c] + epsilon * v[c]));
-            let ahead = residual(&ahead.collect::<Vec<[f64; B]>>());
-            let all = patch.places().enumerate().flat_map(|(i, k)| {
-                let (start, ahead, product) = (start[i], ahead[i], product[k]);
-                (0..B).map(move |c| ahead[c] - start[c] - epsilon * product[c])
-            });
-            all.fold(0.0, larger)
-        };
-        (left(4e-3) / left(1e-3)).log(4.0)
-    }
-
-    /// With every flux the matrix of Newton's method is the derivative of the residual, on a moving mesh with bounded
-    /// and periodic sides: what a step leaves out falls with the square of its length.
-    #[test]
-    fn newton_converges_quadratically() {
-        for (flux, periodic) in FLUXES.into_iter().flat_map(|flux| [[false, true], [true, false]].map(|p| (flux, p))) {
-            let [old, new] = [3, 4].map(|seed| random([8, 9], periodic, seed));
-            let physics = burgers(flux, WAVE, Some(WAVE));
-            let u = physics.initial(0.0, &old);
-            let motion = Motion { t: 0.0, dt: 2e-2, old: &old, new: &new };
-            let order = order_of_newton(&physics, motion, u.values().as_chunks::<1>().0);
-            assert!((order - 2.0).abs() < 0.1, "{flux:?} on {periodic:?}: order {order:.3}");
-        }
-    }
-}
+pub(super) mod tests;

@@ -29,8 +29,9 @@ fn noisy(simulation: &Simulation, state: &State) -> Option<String> {
     let share = noise(state.mesh.lattice(), &followed);
     (share > NOISE_WORTH_A_WARNING).then(|| {
         format!(
-            "noisy-density: {:.0} % of what the mesh follows goes up and down from node to node, so that it follows noise \
-             of the size of its cells; smooth it, name something smoother in `monitor.of`, or refine `grid.cells`",
+            "noisy-density: {:.0} % of what the mesh follows goes up and down from node to node, so that it follows \
+             noise of the size of its cells; smooth it, name something smoother in `monitor.of`, or refine \
+             `grid.cells`",
             100.0 * share
         )
     })
@@ -74,8 +75,8 @@ impl References {
         let off = (there - seen).abs();
         (off > LOSS * there && there > ROUNDING * size && (there - twice).abs() < 0.5 * off).then(|| {
             format!(
-                "`{name}`: the mesh at the start holds {} % of what its initial data hold (∫|{name} − m|, m its median): \
-                 what lies between its nodes is {}; {}",
+                "`{name}`: the mesh at the start holds {} % of what its initial data hold (∫|{name} − m|, m its \
+                 median): what lies between its nodes is {}; {}",
                 (1000.0 * seen / there).round() / 10.0,
                 if seen < there { "missed" } else { "taken for more than it is" },
                 remedy(simulation, state, &nodal)

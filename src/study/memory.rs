@@ -3,8 +3,8 @@
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Refuses a grid that needs more memory than this process may use: more than the machine has, than a container around it
-/// may have, or than `ulimit -v` allows.
+/// Refuses a grid that needs more memory than this process may use: more than the machine has, than a container around
+/// it may have, or than `ulimit -v` allows.
 ///
 /// The limits are read as Linux tells them; on other systems none is known, and nothing is refused.
 ///
@@ -102,7 +102,8 @@ mod tests {
         least(root.path()).map(|limit| (limit.bytes >> 20, limit.whose))
     }
 
-    /// A machine of 8 GiB; a group around the process has 2 GiB, whichever version tells it and however deep the process is.
+    /// A machine of 8 GiB; a group around the process has 2 GiB, whichever version tells it and however deep the
+    /// process is.
     #[test]
     fn the_lowest_of_all_limits_counts() {
         let machine = ("proc/meminfo", MACHINE);

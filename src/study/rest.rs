@@ -48,7 +48,8 @@ pub(super) fn at_rest(
         _ => return Ok(None),
     };
     Ok(Some(format!(
-        "the mesh does not move: no node went farther than {went:.2} cells, and the density at the end asks for {asks:.2}; {reason}"
+        "the mesh does not move: no node went farther than {went:.2} cells, and the density at the end asks \
+         for {asks:.2}; {reason}"
     )))
 }
 
@@ -73,12 +74,17 @@ fn held_back(study: &MovingMesh, record: &Record) -> String {
     } else {
         match study.mesh.relaxation {
             Relaxation::Auto if study.mesh.start == Some(StartMesh::Uniform) => {
-                "\"auto\" follows what moves and has no hurry on the way from equal cells; set `mesh.start` to \"adapted\"".into()
+                "\"auto\" follows what moves and has no hurry on the way from equal cells; set `mesh.start` to \
+                 \"adapted\""
+                    .into()
             }
             Relaxation::Auto => "\"auto\" follows what moves; give `mesh.relaxation` as a time to follow faster".into(),
             given => {
                 let tau = given.over(span / record.work.steps.max(1) as f64);
-                format!("with `mesh.relaxation` it follows in about τ = {tau:.3e}, and the run lasts {span:.3e}; lower it")
+                format!(
+                    "with `mesh.relaxation` it follows in about τ = {tau:.3e}, and the run lasts \
+                         {span:.3e}; lower it"
+                )
             }
         }
     }
@@ -111,7 +117,8 @@ fn flattened(study: &MovingMesh, simulation: &Simulation, state: &State, spread:
     let without = self::spread(&bare.density(&state.mesh, &followed, None)?);
     Ok(match without > NOT_FLAT {
         true => format!(
-            "its density is flat, largest over smallest {spread:.3}: `monitor.smoothing` = {smoothing} passes leave that of {without:.3}"
+            "its density is flat, largest over smallest {spread:.3}: `monitor.smoothing` = {smoothing} passes leave \
+             that of {without:.3}"
         ),
         false => format!("its density is flat, largest over smallest {spread:.3}: raise `monitor.strength`"),
     })

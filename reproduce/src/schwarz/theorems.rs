@@ -70,7 +70,7 @@ fn theorem_3_4() -> Result<Table> {
     let mut table = Table::new(
         "Theorem 3.4, that linearised Schwarz always converges, does not hold: overlap .48/.52, 100 cells, from the \
          uniform mesh",
-        &["M", "faces", "method", "ρ̃", "γ̃", "iterations to 1e-10", "smallest error of the last 100 of 600", "verdict"],
+        &["M", "faces", "method", "ρ̃", "γ̃", "iterations to 1e-10", "least error of the last 100 of 600", "verdict"],
     )
     .ruled("“holds” where the iteration converges within 600 iterations");
     let coarse = |coarse| Method::Classical { sweep: Sweep::Parallel, linearized: true, coarse };
