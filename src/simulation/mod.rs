@@ -27,7 +27,7 @@ use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
 use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality_and_integral};
 use crate::kept::Kept;
-use crate::meshing::{Interface, Relaxation};
+use crate::meshing::Interface;
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use crate::stopwatch::Stopwatch;
