@@ -4,18 +4,20 @@ use crate::numerics::larger;
 /// Changes of u over a uniform cell, as shares of its range, that equal cells resolve at most, and that take the whole
 /// density at least: a Gaussian is interpolated to 1 % of its range at the first and to 2 % at the second.
 const SLOPES: [f64; 2] = [0.18, 0.25];
-/// The same for errors of interpolation between equal cells. A jump by a third of the range counts by them where it is
-/// at a node, and is shared by two cells; the foot of a parabola of 15 cells does not.
-const ERRORS: [f64; 2] = [0.018, 0.024];
+/// The same for the bends of u in both directions within [`WINDOW`] nodes: a jump by J has the bends J where it is within
+/// a cell, and J/2 where it is at a node, so that two cells share it and no slope tells of it.
+const BENDS: [f64; 2] = [0.06, 0.09];
+/// Nodes in a row over which bends are added up: those of a jump are in four of them.
+const WINDOW: usize = 4;
 
 /// How much equal cells leave to be desired where u changes by this share of its range over one at most: from 0 to 1.
 pub(crate) fn need(share: f64) -> f64 {
     between(SLOPES, share)
 }
 
-/// The same where they are off by this share of the range.
-pub(super) fn need_by_error(share: f64) -> f64 {
-    between(ERRORS, share)
+/// The same where u bends by this share of its range in both directions within a few nodes.
+pub(super) fn need_by_bends(share: f64) -> f64 {
+    between(BENDS, share)
 }
 
 /// Rises from 0 to 1 between two values, with a slope that is 0 at both.
@@ -24,45 +26,51 @@ fn between([low, high]: [f64; 2], value: f64) -> f64 {
     s * s * (3.0 - 2.0 * s)
 }
 
-/// The largest error of linear interpolation of u between equal cells, as many as `mesh` has, as its nodes see it
+/// How much u bends both ways within a few nodes of a lattice line
 ///
 /// ```text
-/// max |λ|/8,   λ the eigenvalues of the Hessian matrix of u by x/h_x and y/h_y
+/// max over d and windows of min(Σ max(b, 0), Σ max(−b, 0)),   b = (δ_d²u − ∇u·δ_d²x)/(p q)
 /// ```
 ///
-/// over the nodes inside: h² |u_nn|/8 in a layer with normal n on square cells. The Hessian is H = J⁻ᵀ C J⁻¹, where
-/// C_ab = δ_aδ_b u − ∇u·δ_aδ_b x, J = (x_ξ, x_η), all differences central. Where a layer is thinner than a uniform cell
-/// it is more than such cells can be off.
-pub(super) fn missed_by_equal_cells(mesh: &Mesh<2>, u: &[f64]) -> f64 {
+/// b is the second derivative of u along the line, per uniform cell squared: δ_d² are second differences along axis d of the
+/// lattice, p and q the lengths of the two edges in uniform cells. A kink bends one way, smooth functions bend both ways only
+/// at their inflections, where they hardly bend: it is jumps and thin layers that this finds, however small a share of the
+/// range each of them is.
+pub(super) fn bends(mesh: &Mesh<2>, u: &[f64]) -> f64 {
     let (lattice, extent) = (mesh.lattice(), mesh.extent());
     let patch = Patch { origin: [0; 2], size: lattice.nodes(), wraps: lattice.periodic() };
     let per_cell = [0, 1].map(|d| lattice.cells()[d] as f64 / extent[d]);
     let x = padded(lattice, mesh.x(), [[extent[0], 0.0], [0.0, extent[1]]]);
     let u = padded(lattice, u.as_chunks::<1>().0, [[0.0]; 2]);
-    let [s, t] = patch.padded_strides();
-    // u, x and y less those at a node in the middle, in uniform cells
-    let from =
-        |k: usize, n: usize| [u[n][0] - u[k][0], (x[n][0] - x[k][0]) * per_cell[0], (x[n][1] - x[k][1]) * per_cell[1]];
-    let missed = |k: usize| {
-        let [left, right, below, above] = [k - s, k + s, k - t, k + t].map(|n| from(k, n));
-        let [p, a, b] = [0, 1, 2].map(|c| 0.5 * (right[c] - left[c]));
-        let [q, c, d] = [0, 1, 2].map(|c| 0.5 * (above[c] - below[c]));
-        let inverse = 1.0 / (a * d - b * c);
-        let gradient = [(p * d - q * b) * inverse, (q * a - p * c) * inverse];
-        let bent = |difference: [f64; 3]| difference[0] - gradient[0] * difference[1] - gradient[1] * difference[2];
-        let corners = [k + s + t, k - s - t, k + s - t, k - s + t].map(|n| from(k, n));
-        let along = bent([0, 1, 2].map(|c| right[c] + left[c]));
-        let up = bent([0, 1, 2].map(|c| above[c] + below[c]));
-        let across = bent([0, 1, 2].map(|c| 0.25 * (corners[0][c] + corners[1][c] - corners[2][c] - corners[3][c])));
-        // H = J⁻ᵀ C J⁻¹ with J⁻¹ = (d −c; −b a)/det
-        let squared = inverse * inverse;
-        let xx = squared * (d * d * along - 2.0 * b * d * across + b * b * up);
-        let yy = squared * (c * c * along - 2.0 * a * c * across + a * a * up);
-        let xy = squared * ((a * d + b * c) * across - c * d * along - a * b * up);
-        0.125 * (0.5 * (xx + yy).abs() + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt())
+    let strides = patch.padded_strides();
+    // u, x and y of one place less those of another, lengths in uniform cells
+    let less =
+        |n: usize, k: usize| [u[n][0] - u[k][0], (x[n][0] - x[k][0]) * per_cell[0], (x[n][1] - x[k][1]) * per_cell[1]];
+    let bend = |k: usize, axis: usize| {
+        let [[p, a, b], [q, c, d]] = strides.map(|s| less(k + s, k - s));
+        let determinant = a * d - b * c;
+        let gradient = [(p * d - q * b) / determinant, (q * a - p * c) / determinant];
+        let s = strides[axis];
+        let (above, below) = (less(k + s, k), less(k, k - s));
+        let second = [0, 1, 2].map(|c| above[c] - below[c]);
+        let length = |edge: [f64; 3]| edge[1].hypot(edge[2]);
+        (second[0] - gradient[0] * second[1] - gradient[1] * second[2]) / (length(above) * length(below))
     };
-    let inside = patch.places().enumerate().filter(|(i, _)| !lattice.on_side(*i));
-    inside.fold(0.0, |most, (_, k)| larger(most, missed(k)))
+    let [n, m] = patch.size;
+    let mut most = 0.0;
+    for (axis, lines, length) in [(0, m, n), (1, n, m)] {
+        let (s, across) = (strides[axis], strides[1 - axis]);
+        let sides = [0, 1].map(|d| if patch.wraps[d] { 0 } else { 1 });
+        for line in sides[1 - axis]..lines.saturating_sub(sides[1 - axis]) {
+            let mut window = [0.0; WINDOW];
+            for i in sides[axis]..length.saturating_sub(sides[axis]) {
+                window[i % WINDOW] = bend((line + 1) * across + (i + 1) * s, axis);
+                let [up, down] = window.iter().fold([0.0, 0.0], |[up, down], b| [up + b.max(0.0), down - b.min(0.0)]);
+                most = larger(most, f64::min(up, down));
+            }
+        }
+    }
+    most
 }
 
 #[cfg(test)]
@@ -70,59 +78,36 @@ mod tests {
     use super::*;
     use crate::geometry::Lattice;
 
-    /// A quadratic function of one axis is missed by h² |u″|/8, on equal cells and on any others along that axis, bent
-    /// or not across it, whatever the unit of length.
-    #[test]
-    fn the_error_of_a_quadratic_function_is_exact() {
-        for unit in [1.0, 1e-6] {
-            let mesh = Mesh::uniform(Lattice::bounded([20, 10]).unwrap(), [0.0; 2], [unit, unit]).unwrap();
-            let bent = mesh.x().iter().map(|&[x, y]| {
-                let (x, y) = (x / unit, y / unit);
-                [unit * (x + 0.8 * x * (1.0 - x) * (x - 0.5)), unit * (y + 0.3 * y * (1.0 - y) * x)]
-            });
-            for mesh in [mesh.clone(), mesh.moved(bent.collect()).unwrap()] {
-                let u: Vec<f64> = mesh.x().iter().map(|x| 3.0 * (x[0] / unit).powi(2) + 7.0 * x[1] / unit).collect();
-                let exact = 6.0 / (8.0 * 400.0);
-                let told = missed_by_equal_cells(&mesh, &u);
-                assert!((told / exact - 1.0).abs() < 1e-2, "{told:e} where it is {exact:e}");
-            }
-        }
+    fn told(mesh: &Mesh<2>, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let u: Vec<f64> = mesh.x().iter().map(|x| f(x[0], x[1])).collect();
+        bends(mesh, &u)
     }
 
-    /// A layer is missed by as much whichever way it lies, and a blob as wide by as much.
+    /// A jump by J bends by J each way within a cell, and by half of that at a node, whichever way it lies.
     #[test]
-    fn the_direction_of_a_layer_does_not_matter() {
-        let mesh = Mesh::uniform(Lattice::bounded([200, 200]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
-        let missed = |f: &dyn Fn(f64, f64) -> f64| {
-            let u: Vec<f64> = mesh.x().iter().map(|x| f(x[0] - 0.5, x[1] - 0.5)).collect();
-            missed_by_equal_cells(&mesh, &u)
-        };
-        let exact = 0.005_f64.powi(2) / (8.0 * 0.005);
-        let gauss = |r: f64| (-r * r / 0.01).exp();
-        for told in [
-            missed(&|x, _| gauss(x)),
-            missed(&|x, y| gauss(0.6 * x + 0.8 * y)),
-            missed(&|x, y| gauss(0.5_f64.sqrt() * (x + y))),
-            missed(&|x, y| gauss(x.hypot(y))),
-        ] {
-            assert!((told / exact - 1.0).abs() < 5e-3, "{told:e} where it is {exact:e}");
+    fn jumps_bend_both_ways() {
+        let mesh = Mesh::uniform(Lattice::bounded([40, 20]).unwrap(), [0.0; 2], [1.0, 0.1]).unwrap();
+        let step = |x: f64| f64::from(u8::from(x > 0.0)) + 0.5 * f64::from(u8::from(x == 0.0));
+        let staircase = |x: f64| [4.0, 16.0, 28.0].map(|at| step(x - at)).iter().sum::<f64>() / 3.0;
+        for (shift, exact) in [(0.5, 1.0 / 3.0), (0.0, 1.0 / 6.0)] {
+            let told = told(&mesh, |x, _| staircase((40.0 * x).round() - shift));
+            assert!((told - exact).abs() < 1e-9, "shifted by {shift}: {told} where it is {exact}");
         }
+        let told = told(&mesh, |_, y| staircase((200.0 * y).round() - 0.5));
+        assert!((told - 1.0 / 3.0).abs() < 1e-9, "{told}");
     }
 
-    /// The steps of a staircase count wherever they are in their cells; a tent that rises over 15 cells does not.
+    /// Linear functions bend nowhere, on any mesh, and neither kinks nor waves and blobs of twenty cells bend both ways.
     #[test]
-    fn every_step_of_a_staircase_counts() {
-        let mesh = Mesh::uniform(Lattice::bounded([40, 4]).unwrap(), [0.0; 2], [1.0, 0.1]).unwrap();
-        let told = |f: &dyn Fn(f64) -> f64| {
-            let u: Vec<f64> = mesh.x().iter().map(|x| f(x[0])).collect();
-            let slopes = u.iter().zip(&u[5..]).map(|(a, b)| (a - b).abs());
-            need(slopes.fold(0.0, f64::max)).max(need_by_error(missed_by_equal_cells(&mesh, &u)))
-        };
-        for shift in [0.0, 0.3, 0.5] {
-            let steps = |x: f64| [4.0, 16.0, 28.0].map(|at| 0.5 + 0.5 * (7.0 * (40.0 * x - at - shift)).tanh());
-            let told = told(&|x| steps(x).iter().sum::<f64>() / 3.0);
-            assert!(told > 0.2, "shifted by {shift}: {told}");
+    fn what_is_smooth_or_kinked_does_not() {
+        let mesh = Mesh::uniform(Lattice::bounded([40, 40]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+        let bent = mesh.x().iter().map(|&[x, y]| [x + 0.3 * x * (1.0 - x) * y, y + 0.3 * y * (1.0 - y) * x]);
+        let bent = mesh.moved(bent.collect()).unwrap();
+        assert!(told(&bent, |x, y| 3.0 * x - 2.0 * y) < 1e-12);
+        assert!(told(&mesh, |x, _| (1.0 - 4.0 * (x - 0.5).abs()).max(0.0)) < 1e-12);
+        for mesh in [&mesh, &bent] {
+            assert!(told(mesh, |x, _| 0.5 * (4.0 * std::f64::consts::PI * x).sin()) < BENDS[0]);
+            assert!(told(mesh, |x, y| (-((x - 0.5).powi(2) + (y - 0.5).powi(2)) / 0.02).exp()) < BENDS[0]);
         }
-        assert_eq!(told(&|x| (1.0 - (40.0 * x - 20.0).abs() / 15.0).max(0.0)), 0.0);
     }
 }

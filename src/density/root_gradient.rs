@@ -1,4 +1,4 @@
-use super::need::{missed_by_equal_cells, need, need_by_error};
+use super::need::{bends, need, need_by_bends};
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
 use crate::geometry::{Lattice, Mesh, check_length};
@@ -15,10 +15,10 @@ use crate::numerics::{larger, sum};
 /// root falls with the width as fast as its largest value grows. The background b is 0 where u is flat outside its
 /// layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes otherwise.
 ///
-/// The need s is 0 where equal cells resolve u: where u changes by less than 0.18 of its range over a uniform cell
-/// everywhere, and linear interpolation between equal cells is off by less than 1.8 %. It is 1 where u changes by more
-/// than a quarter of its range over one somewhere, or the error is more than 2.4 %. The largest ρ over the smallest is
-/// at most 10⁶.
+/// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
+/// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a quarter of
+/// its range over a uniform cell somewhere, or by more than 0.09 bends both ways. The largest ρ over the smallest is at
+/// most 10⁶.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
@@ -52,7 +52,7 @@ impl Monitor for RootGradient {
         }
         let need = match need(steepest) {
             1.0 => 1.0,
-            by_slope => by_slope.max(need_by_error(missed_by_equal_cells(mesh, u) / range)),
+            by_slope => by_slope.max(need_by_bends(bends(mesh, u) / range)),
         };
         let beta = BETA * need;
         if beta == 0.0 {
