@@ -4,8 +4,8 @@ use crate::numerics::larger;
 /// Changes of u over a uniform cell, as shares of its range, that equal cells resolve at most, and that take the whole
 /// density at least: a Gaussian is interpolated to 1 % of its range at the first and to 2 % at the second.
 const SLOPES: [f64; 2] = [0.18, 0.25];
-/// The same for the bends of u in both directions within [`WINDOW`] nodes: a jump by J has the bends J where it is within
-/// a cell, and J/2 where it is at a node, so that two cells share it and no slope tells of it.
+/// The same for the bends of u in both directions within [`WINDOW`] nodes: a jump by J has the bends J where it is
+/// within a cell, and J/2 where it is at a node, so that two cells share it and no slope tells of it.
 const BENDS: [f64; 2] = [0.06, 0.09];
 /// Nodes in a row over which bends are added up: those of a jump are in four of them.
 const WINDOW: usize = 4;
@@ -32,10 +32,9 @@ fn between([low, high]: [f64; 2], value: f64) -> f64 {
 /// max over d and windows of min(Σ max(b, 0), Σ max(−b, 0)),   b = (δ_d²u − ∇u·δ_d²x)/(p q)
 /// ```
 ///
-/// b is the second derivative of u along the line, per uniform cell squared: δ_d² are second differences along axis d of the
-/// lattice, p and q the lengths of the two edges in uniform cells. A kink bends one way, smooth functions bend both ways only
-/// at their inflections, where they hardly bend: it is jumps and thin layers that this finds, however small a share of the
-/// range each of them is.
+/// b is the second derivative of u along the line, per uniform cell squared: δ_d² are second differences along axis d
+/// of the lattice, p and q the lengths of the two edges in uniform cells. A kink bends one way, smooth functions bend
+/// both ways only at their inflections, where they hardly bend: it is jumps and thin layers that this finds.
 pub(super) fn bends(mesh: &Mesh<2>, u: &[f64]) -> f64 {
     let (lattice, extent) = (mesh.lattice(), mesh.extent());
     let patch = Patch { origin: [0; 2], size: lattice.nodes(), wraps: lattice.periodic() };
@@ -97,7 +96,8 @@ mod tests {
         assert!((told - 1.0 / 3.0).abs() < 1e-9, "{told}");
     }
 
-    /// Linear functions bend nowhere, on any mesh, and neither kinks nor waves and blobs of twenty cells bend both ways.
+    /// Linear functions bend nowhere, on any mesh, and neither kinks nor waves and blobs of twenty cells bend both
+    /// ways.
     #[test]
     fn what_is_smooth_or_kinked_does_not() {
         let mesh = Mesh::uniform(Lattice::bounded([40, 40]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();

@@ -16,9 +16,9 @@ use crate::numerics::{larger, sum};
 /// layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes otherwise.
 ///
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
-/// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a quarter of
-/// its range over a uniform cell somewhere, or by more than 0.09 bends both ways. The largest ρ over the smallest is at
-/// most 10⁶.
+/// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
+/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. The largest ρ over the
+/// smallest is at most 10⁶.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
