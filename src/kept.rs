@@ -39,6 +39,23 @@ pub(crate) fn encoded(value: &impl Serialize) -> Vec<u8> {
     rmp_serde::to_vec_named(value).expect("writing plain data to memory cannot fail")
 }
 
+/// Nodal vectors as plain numbers: an array whose length is not known by itself is none to serde.
+pub(crate) mod nodal {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    pub fn serialize<S: Serializer, const K: usize>(values: &[[f64; K]], serializer: S) -> Result<S::Ok, S::Error> {
+        values.as_flattened().serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>, const K: usize>(deserializer: D) -> Result<Vec<[f64; K]>, D::Error> {
+        let plain = Vec::<f64>::deserialize(deserializer)?;
+        match plain.as_chunks::<K>() {
+            (values, []) => Ok(values.to_vec()),
+            _ => Err(D::Error::custom(format!("{} numbers are no vectors of {K}", plain.len()))),
+        }
+    }
+}
+
 /// Refuses an array that does not hold one finite entry for each node.
 pub(crate) fn check_nodal<const K: usize>(what: &str, values: &[[f64; K]], nodes: usize) -> Result<(), Unfit> {
     if values.len() != nodes {

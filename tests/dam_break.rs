@@ -16,7 +16,7 @@ struct Passed {
 
 impl Observer for Passed {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let state = snapshot.state().unwrap();
+        let state = snapshot.state::<2>().unwrap();
         let mut sums = [0.0; 4];
         for (area, [h, u, v]) in DualCells::new(&state.mesh).areas().iter().zip(state.u.values().as_chunks::<3>().0) {
             let density = [*h, h * u, h * v, 0.5 * h * (u * u + v * v) + 0.5 * h * h];

@@ -528,7 +528,7 @@ impl driftmesh::simulation::Observer for Impatient {
         _event: driftmesh::simulation::Event,
         snapshot: &driftmesh::simulation::Snapshot<'_>,
     ) -> driftmesh::Result<()> {
-        let state = snapshot.state().unwrap();
+        let state = snapshot.state::<2>().unwrap();
         match state.step {
             3 => Err(Error::Interrupted(driftmesh::error::Moment { t: state.t, step: state.step })),
             _ => Ok(()),

@@ -19,7 +19,7 @@ struct Times(Vec<f64>);
 
 impl Observer for Times {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        check_unfolded(&snapshot.state().unwrap().mesh)?;
+        check_unfolded(&snapshot.state::<2>().unwrap().mesh)?;
         if event != Event::Finished {
             self.0.push(snapshot.t);
         }

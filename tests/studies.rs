@@ -17,7 +17,7 @@ struct Node {
 
 impl Observer for Node {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let mesh = &snapshot.state().unwrap().mesh;
+        let mesh = &snapshot.state::<2>().unwrap().mesh;
         self.history.push((snapshot.t, mesh.x()[mesh.lattice().index([10, 10])][0]));
         Ok(())
     }
@@ -341,7 +341,7 @@ struct Substances {
 
 impl Observer for Substances {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        for values in snapshot.state().unwrap().u.values().as_chunks::<2>().0 {
+        for values in snapshot.state::<2>().unwrap().u.values().as_chunks::<2>().0 {
             self.lowest = std::array::from_fn(|c| self.lowest[c].min(values[c]));
             self.highest = std::array::from_fn(|c| self.highest[c].max(values[c]));
         }
@@ -377,9 +377,9 @@ struct Pair {
 
 impl Observer for Pair {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> driftmesh::Result<()> {
-        let areas = DualCells::new(&snapshot.state().unwrap().mesh).areas().to_vec();
+        let areas = DualCells::new(&snapshot.state::<2>().unwrap().mesh).areas().to_vec();
         let total = |c: usize| {
-            areas.iter().zip(snapshot.state().unwrap().u.component(c)).map(|(area, u)| area * u).sum::<f64>()
+            areas.iter().zip(snapshot.state::<2>().unwrap().u.component(c)).map(|(area, u)| area * u).sum::<f64>()
         };
         self.history.push([total(0), total(1)]);
         Ok(())

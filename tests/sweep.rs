@@ -111,7 +111,7 @@ struct Watch;
 
 impl Observer for Watch {
     fn observe(&mut self, _event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        let state = snapshot.state().unwrap();
+        let state = snapshot.state::<2>().unwrap();
         assert_sound(&state.mesh);
         assert!(state.u.values().iter().all(|u| u.is_finite()), "u is not finite at t = {}", state.t);
         Ok(())

@@ -1,5 +1,5 @@
 use crate::terminal;
-use driftmesh::simulation::{Event, Observer, Snapshot, State};
+use driftmesh::simulation::{Event, Observer, Snapshot};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
@@ -67,7 +67,7 @@ impl Observer for Progress {
         Ok(())
     }
 
-    fn adapting(&mut self, _state: &State) -> driftmesh::Result<()> {
+    fn adapting(&mut self, _t: f64) -> driftmesh::Result<()> {
         let (steps, told) = &mut self.adapting;
         *steps += 1;
         let words = || format!("adapting the mesh to the initial solution: step {steps}");

@@ -1,7 +1,7 @@
 use crate::errors::raised;
 use crate::threads::{BRIEFLY, Ended, PATIENCE, calls, interruptible};
 use driftmesh::output::{RunDirectory, Standing};
-use driftmesh::simulation::{Event, Observer, Snapshot, State};
+use driftmesh::simulation::{Event, Observer, Snapshot};
 use driftmesh::study::{Begin, Source, Study};
 use driftmesh::{Error, Result};
 use pyo3::prelude::*;
@@ -33,8 +33,8 @@ impl Observer for Watcher {
         Ok(())
     }
 
-    fn adapting(&mut self, state: &State) -> Result<()> {
-        *self.0.progress() = Some((0.0, state.t, state.step));
+    fn adapting(&mut self, t: f64) -> Result<()> {
+        *self.0.progress() = Some((0.0, t, 0));
         Ok(())
     }
 

@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 pub struct Arclength {
     /// How α is chosen.
     pub strength: Strength,
-    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    /// Passes of the filter (1 2 1)/4 along each axis.
     pub smoothing: usize,
 }
 
@@ -72,11 +72,11 @@ impl Arclength {
     }
 }
 
-impl Monitor for Arclength {
-    fn density(&self, mesh: &Mesh<2>, u: &[f64], gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
+impl<const D: usize> Monitor<D> for Arclength {
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
         self.check().map_err(Failure::refusing)?;
         check_length(mesh.lattice(), "what the mesh follows", u.len())?;
-        let differenced: Vec<[f64; 2]>;
+        let differenced: Vec<[f64; D]>;
         let gradient = match gradient {
             Some(exact) => {
                 check_length(mesh.lattice(), "the gradient of what the mesh follows", exact.len())?;
@@ -87,7 +87,7 @@ impl Monitor for Arclength {
                 &differenced
             }
         };
-        let slope2: Vec<f64> = gradient.iter().map(|[gx, gy]| gx * gx + gy * gy).collect();
+        let slope2: Vec<f64> = gradient.iter().map(|g| g.iter().map(|g| g * g).sum()).collect();
         let alpha = match self.strength {
             Strength::Absolute(alpha) => alpha,
             Strength::Relative(strength) => {
@@ -99,12 +99,10 @@ impl Monitor for Arclength {
         smooth(mesh.lattice(), &mut rho, self.smoothing)?;
         match rho.iter().position(|r| !r.is_finite()) {
             None => Ok(rho),
-            Some(k) => Err(Failure::NonFinite {
-                what: "the mesh density",
-                value: rho[k],
-                node: mesh.lattice().node(k),
-                x: mesh.x()[k],
-            }),
+            Some(k) => {
+                let (node, x) = mesh.told(k);
+                Err(Failure::NonFinite { what: "the mesh density", value: rho[k], node, x })
+            }
         }
     }
 }

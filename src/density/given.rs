@@ -7,7 +7,7 @@ use crate::geometry::{Mesh, check_length, check_positive};
 /// It must be positive everywhere; `smoothing` passes of the filter [`smooth`] follow.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Given {
-    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    /// Passes of the filter (1 2 1)/4 along each axis.
     pub smoothing: usize,
 }
 
@@ -24,8 +24,8 @@ impl Given {
     }
 }
 
-impl Monitor for Given {
-    fn density(&self, mesh: &Mesh<2>, u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
+impl<const D: usize> Monitor<D> for Given {
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
         self.check().map_err(Failure::refusing)?;
         check_length(mesh.lattice(), "the density", u.len())?;
         check_positive(mesh, "the mesh density", u)?;

@@ -20,7 +20,7 @@ pub use smoothing::smooth;
 pub use tables::{ArclengthTable, GivenTable, RootGradientTable};
 
 use crate::error::{Failure, Result};
-use crate::geometry::{Field, Mesh};
+use crate::geometry::{Cells, Field, Mesh};
 use crate::kind::kinds;
 use crate::numerics::difference::Gradient;
 use following::Following;
@@ -29,19 +29,19 @@ use following::Following;
 const MAX_SMOOTHING: usize = 1000;
 
 /// Where a mesh should be fine, decided from the solution on the mesh it has.
-pub trait Monitor: Send {
+pub trait Monitor<const D: usize = 2>: Send {
     /// ρ at every node from one value of u a node, both in lattice order; with ∇u where it is known exactly, so that it
     /// need not be differenced.
     ///
     /// # Errors
     /// [`Failure::NonFinite`] names the first node where ρ is not a finite number.
-    fn density(&self, mesh: &Mesh<2>, u: &[f64], gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure>;
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure>;
 
     /// The u of [`density`](Self::density), from all unknowns: the first one where nothing else is said.
     ///
     /// # Errors
     /// [`Failure::Formula`] names the first node where it is not a finite number.
-    fn followed(&self, _t: f64, _mesh: &Mesh<2>, unknowns: &Field) -> Result<Vec<f64>, Failure> {
+    fn followed(&self, _t: f64, _mesh: &Mesh<D>, unknowns: &Field) -> Result<Vec<f64>, Failure> {
         Ok(unknowns.component(0).collect())
     }
 }
@@ -96,9 +96,12 @@ impl MonitorKind {
     ///
     /// # Errors
     /// [`Error::Formula`](crate::Error::Formula) where `of` is no formula of the unknowns, x, y and t.
-    pub fn into_monitor(self, unknowns: &[String]) -> Result<Box<dyn Monitor>> {
+    pub fn into_monitor<const D: usize>(self, unknowns: &[String]) -> Result<Box<dyn Monitor<D>>>
+    where
+        Mesh<D>: Cells<D>,
+    {
         let of = self.of().filter(|of| Some(*of) != unknowns.first().map(String::as_str)).map(String::from);
-        let monitor: Box<dyn Monitor> = match self {
+        let monitor: Box<dyn Monitor<D>> = match self {
             Self::RootGradientTable(_) => Box::new(RootGradient::default()),
             Self::ArclengthTable(arclength) => Box::new(arclength.density()),
             Self::GivenTable(given) => Box::new(given.density()),

@@ -1,4 +1,5 @@
-use crate::geometry::{Mesh, Patch, padded};
+use crate::geometry::{Mesh, Patch, diagonal, length, padded, strides};
+use crate::numerics::difference::scaled_gradient;
 use crate::numerics::larger;
 
 /// Changes of u over a uniform cell, as shares of its range, that equal cells resolve at most, and that take the whole
@@ -35,41 +36,47 @@ fn between([low, high]: [f64; 2], value: f64) -> f64 {
 /// b is the second derivative of u along the line, per uniform cell squared: δ_d² are second differences along axis d
 /// of the lattice, p and q the lengths of the two edges in uniform cells. A kink bends one way, smooth functions bend
 /// both ways only at their inflections, where they hardly bend: it is jumps and thin layers that this finds.
-pub(super) fn bends(mesh: &Mesh<2>, u: &[f64]) -> f64 {
+pub(super) fn bends<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> f64 {
     let (lattice, extent) = (mesh.lattice(), mesh.extent());
-    let patch = Patch { origin: [0; 2], size: lattice.nodes(), wraps: lattice.periodic() };
-    let per_cell = [0, 1].map(|d| lattice.cells()[d] as f64 / extent[d]);
-    let x = padded(lattice, mesh.x(), [[extent[0], 0.0], [0.0, extent[1]]]);
-    let u = padded(lattice, u.as_chunks::<1>().0, [[0.0]; 2]);
+    let patch = Patch { origin: [0; D], size: lattice.nodes(), wraps: lattice.periodic() };
+    let per_cell: [f64; D] = std::array::from_fn(|d| lattice.cells()[d] as f64 / extent[d]);
+    let x = padded(lattice, mesh.x(), diagonal(extent));
+    let u = padded(lattice, u.as_chunks::<1>().0, [[0.0]; D]);
     let strides = patch.padded_strides();
-    // u, x and y of one place less those of another, lengths in uniform cells
-    let less =
-        |n: usize, k: usize| [u[n][0] - u[k][0], (x[n][0] - x[k][0]) * per_cell[0], (x[n][1] - x[k][1]) * per_cell[1]];
+    // the way from one place to another in uniform cells, and the change of u
+    let way = |k: usize, n: usize| -> [f64; D] { std::array::from_fn(|d| (x[n][d] - x[k][d]) * per_cell[d]) };
+    let change = |k: usize, n: usize| u[n][0] - u[k][0];
     let bend = |k: usize, axis: usize| {
-        let [[p, a, b], [q, c, d]] = strides.map(|s| less(k + s, k - s));
-        let determinant = a * d - b * c;
-        let gradient = [(p * d - q * b) / determinant, (q * a - p * c) / determinant];
+        let (scaled, determinant) =
+            scaled_gradient(strides.map(|s| way(k - s, k + s)), strides.map(|s| change(k - s, k + s)));
         let s = strides[axis];
-        let (above, below) = (less(k + s, k), less(k, k - s));
-        let second = [0, 1, 2].map(|c| above[c] - below[c]);
-        let length = |edge: [f64; 3]| edge[1].hypot(edge[2]);
-        (second[0] - gradient[0] * second[1] - gradient[1] * second[2]) / (length(above) * length(below))
+        let (below, above) = (way(k - s, k), way(k, k + s));
+        let second = change(k, k + s) - change(k - s, k);
+        let second = (0..D).fold(second, |sum, d| sum - scaled[d] / determinant * (above[d] - below[d]));
+        second / (length(above) * length(below))
     };
-    let [n, m] = patch.size;
+    let sides = patch.wraps.map(|wraps| usize::from(!wraps));
     let mut most = 0.0;
-    for (axis, lines, length) in [(0, m, n), (1, n, m)] {
-        let (s, across) = (strides[axis], strides[1 - axis]);
-        let sides = [0, 1].map(|d| if patch.wraps[d] { 0 } else { 1 });
-        for line in sides[1 - axis]..lines.saturating_sub(sides[1 - axis]) {
+    for axis in 0..D {
+        let within = |d: usize| sides[d]..patch.size[d].saturating_sub(sides[d]);
+        for line in lines(patch.size, axis).filter(|line| (0..D).all(|d| d == axis || within(d).contains(&line[d]))) {
+            let first: usize = (0..D).map(|d| (line[d] + 1) * strides[d]).sum();
             let mut window = [0.0; WINDOW];
-            for i in sides[axis]..length.saturating_sub(sides[axis]) {
-                window[i % WINDOW] = bend((line + 1) * across + (i + 1) * s, axis);
+            for i in within(axis) {
+                window[i % WINDOW] = bend(first + i * strides[axis], axis);
                 let [up, down] = window.iter().fold([0.0, 0.0], |[up, down], b| [up + b.max(0.0), down - b.min(0.0)]);
                 most = larger(most, f64::min(up, down));
             }
         }
     }
     most
+}
+
+/// The first nodes of all lines along an axis.
+fn lines<const D: usize>(size: [usize; D], axis: usize) -> impl Iterator<Item = [usize; D]> {
+    let across: [usize; D] = std::array::from_fn(|d| if d == axis { 1 } else { size[d] });
+    let strides = strides(across);
+    (0..across.iter().product()).map(move |k| std::array::from_fn(|d| k / strides[d] % across[d]))
 }
 
 #[cfg(test)]

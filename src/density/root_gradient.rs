@@ -1,7 +1,7 @@
 use super::need::{bends, need, need_by_bends};
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
-use crate::geometry::{Lattice, Mesh, check_length};
+use crate::geometry::{Cells, Lattice, Mesh, check_length, strides};
 use crate::numerics::{larger, sum};
 
 /// The root of the slope, over its mean: no number to set
@@ -38,8 +38,11 @@ const FEW: f64 = 2.0;
 /// Differences of u below this share of its size are rounding.
 const ROUNDING: f64 = 1e-10;
 
-impl Monitor for RootGradient {
-    fn density(&self, mesh: &Mesh<2>, u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
+impl<const D: usize> Monitor<D> for RootGradient
+where
+    Mesh<D>: Cells<D>,
+{
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
         let lattice = mesh.lattice();
         check_length(lattice, "what the mesh follows", u.len())?;
         let even = || Ok(vec![1.0; lattice.len()]);
@@ -63,21 +66,19 @@ impl Monitor for RootGradient {
         roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
         let mut rho = roots;
         let (cells, layers) = (lattice.cells(), layers(lattice, &rho));
-        let passes = [0, 1].map(|d| {
+        let passes = std::array::from_fn(|d| {
             let passes = (PASSES * ((cells[d] + 1) as f64 / 41.0).powi(2)).round() * (FEW / layers[d].max(FEW)).powi(2);
             // from cells to nodes is one of them
             (passes - 1.0).max(0.0)
         });
         smooth_widely(cells, lattice.periodic(), &mut rho, passes);
-        let nodal = at_nodes(lattice, rho);
+        let nodal = Mesh::<D>::at_nodes(lattice, rho);
         match nodal.iter().position(|rho| !rho.is_finite()) {
             None => Ok(nodal),
-            Some(k) => Err(Failure::NonFinite {
-                what: "the mesh density",
-                value: nodal[k],
-                node: lattice.node(k),
-                x: mesh.x()[k],
-            }),
+            Some(k) => {
+                let (node, x) = mesh.told(k);
+                Err(Failure::NonFinite { what: "the mesh density", value: nodal[k], node, x })
+            }
         }
     }
 }
@@ -95,92 +96,50 @@ struct Roots {
 }
 
 impl Roots {
-    fn of(mesh: &Mesh<2>, u: &[f64], range: f64) -> Self {
-        let lattice = mesh.lattice();
-        let ([n, m], x, values) = (lattice.cells(), mesh.closed(), lattice.closed(u));
-        let unit = if range > 0.0 { range } else { 1.0 };
-        let [width, height] = mesh.extent();
-        let h = [width / n as f64, height / m as f64];
-        let cells = || (0..n).flat_map(|i| i * (m + 1)..i * (m + 1) + m);
-        // both diagonals of a cell, and twice its area
-        let diagonals = |k: usize| (minus(x[k + m + 2], x[k]), minus(x[k + 1], x[k + m + 1]));
-        let twice_area = |([px, py], [qx, qy]): ([f64; 2], [f64; 2])| px * qy - py * qx;
+    fn of<const D: usize>(mesh: &Mesh<D>, u: &[f64], range: f64) -> Self
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let (lattice, unit) = (mesh.lattice(), if range > 0.0 { range } else { 1.0 });
+        let box_volume: f64 = mesh.extent().iter().product();
         // room for one a node, too
-        let mut roots = Vec::with_capacity((n + 1) * (m + 1));
+        let mut roots = Vec::with_capacity(lattice.cells().map(|n| n + 1).iter().product());
         let mut steepest = 0.0;
-        let background = sum(cells().map(|k| {
-            let diagonals = diagonals(k);
-            let ([px, py], [qx, qy]) = diagonals;
-            let (p, q) = ((values[k + m + 2] - values[k]) / unit, (values[k + 1] - values[k + m + 1]) / unit);
-            let twice = twice_area(diagonals);
-            let (gx, gy) = (h[0] * (p * qy - q * py), h[1] * (q * px - p * qx));
-            let slope = (gx * gx + gy * gy).sqrt() / twice;
+        let background = sum(mesh.slopes(u, unit).map(|(slope, volume)| {
             steepest = larger(steepest, slope);
             let root = slope.sqrt();
             roots.push(root);
-            0.5 * twice * root.sqrt().sqrt()
+            volume * root.sqrt().sqrt()
         }));
-        let background = (background / (width * height)).powi(4);
-        let areas = cells().map(|k| 0.5 * twice_area(diagonals(k)));
-        let above = sum(roots.iter().zip(areas).map(|(root, area)| (root - background).max(0.0) * area));
-        Self { roots, background, mean: above / (width * height), steepest }
+        let background = (background / box_volume).powi(4);
+        let above = sum(roots.iter().zip(mesh.volumes()).map(|(root, volume)| (root - background).max(0.0) * volume));
+        Self { roots, background, mean: above / box_volume, steepest }
     }
 }
 
 /// How many layers the lattice lines along each axis meet: half of all that ρ, given by the cell, rises and falls along
 /// them over the sum of the largest ρ − 1 of each line, so that the lines through the strongest layers count most.
-fn layers(lattice: &Lattice<2>, rho: &[f64]) -> [f64; 2] {
-    let ([n, m], wraps) = (lattice.cells(), lattice.periodic());
-    let row = |i: usize| &rho[i * m..(i + 1) * m];
-    let mut changes = [0.0; 2];
-    let mut across = vec![1.0; m];
-    let mut highest = [0.0; 2];
-    let mut below = row(if wraps[0] { n - 1 } else { 0 });
-    for i in 0..n {
-        let row = row(i);
-        let (mut last, mut along) = (row[if wraps[1] { m - 1 } else { 0 }], 1.0);
-        for ((rho, below), across) in row.iter().zip(below).zip(&mut across) {
-            changes[0] += (rho - below).abs();
-            changes[1] += (rho - last).abs();
-            last = *rho;
-            *across = f64::max(*across, *rho);
-            along = f64::max(along, *rho);
+fn layers<const D: usize>(lattice: &Lattice<D>, rho: &[f64]) -> [f64; D] {
+    let (cells, wraps) = (lattice.cells(), lattice.periodic());
+    let steps = strides(cells);
+    std::array::from_fn(|axis| {
+        let (n, s) = (cells[axis], steps[axis]);
+        let mut changes = 0.0;
+        let mut highest = vec![1.0; rho.len() / n];
+        // lines along the axis lie side by side in blocks of n times s cells
+        for (block, highest) in rho.chunks_exact(n * s).zip(highest.chunks_exact_mut(s)) {
+            let mut below = &block[if wraps[axis] { (n - 1) * s } else { 0 }..][..s];
+            for row in block.chunks_exact(s) {
+                for ((rho, below), highest) in row.iter().zip(below).zip(&mut *highest) {
+                    changes += (rho - below).abs();
+                    *highest = f64::max(*highest, *rho);
+                }
+                below = row;
+            }
         }
-        highest[1] += along - 1.0;
-        below = row;
-    }
-    highest[0] = across.iter().map(|rho| rho - 1.0).sum();
-    [0, 1].map(|d| if highest[d] > 0.0 { 0.5 * changes[d] / highest[d] } else { 0.0 })
-}
-
-/// The means of the cells around each node; beyond bounded sides stand the cells beside them again. In place, from the
-/// last row on: row i of the nodes begins where row i of the cells does, or later.
-fn at_nodes(lattice: &Lattice<2>, mut rho: Vec<f64>) -> Vec<f64> {
-    let ([n, m], [rows, columns], periodic) = (lattice.cells(), lattice.nodes(), lattice.periodic());
-    // the cells on both sides of node i along an axis of n cells
-    let beside = |i: usize, n: usize, wraps: bool| match i {
-        0 if wraps => [n - 1, 0],
-        0 => [0, 0],
-        i if i == n => [n - 1, n - 1],
-        i => [i - 1, i],
-    };
-    let beside_column: Vec<[usize; 2]> = (0..columns).map(|j| beside(j, m, periodic[1])).collect();
-    let last_row = rho[(n - 1) * m..].to_vec();
-    let (mut below, mut above) = (last_row.clone(), last_row.clone());
-    rho.resize(lattice.len(), 0.0);
-    for i in (0..rows).rev() {
-        let cells = beside(i, n, periodic[0]);
-        for (row, i) in [&mut below, &mut above].into_iter().zip(cells) {
-            row.copy_from_slice(if i == n - 1 { &last_row } else { &rho[i * m..(i + 1) * m] });
-        }
-        let means = beside_column.iter().map(|&[c, d]| 0.25 * ((below[c] + above[d]) + (below[d] + above[c])));
-        rho[i * columns..(i + 1) * columns].iter_mut().zip(means).for_each(|(rho, mean)| *rho = mean);
-    }
-    rho
-}
-
-fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] - b[0], a[1] - b[1]]
+        let highest: f64 = highest.iter().map(|rho| rho - 1.0).sum();
+        if highest > 0.0 { 0.5 * changes / highest } else { 0.0 }
+    })
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 use super::quality::{cross, minus};
-use super::{Lattice, Mesh, Patch};
+use super::{Cells, Lattice, Mesh, Patch, diagonal};
 use crate::parallel;
 
 /// Finite-volume geometry of a mesh: the dual cell of every node
@@ -26,21 +26,66 @@ use crate::parallel;
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct DualCells {
-    patch: Patch<2>,
-    centres: Vec<[f64; 2]>,
-    normals: Vec<[[f64; 2]; 2]>,
-    areas: Vec<f64>,
+pub struct DualCells<const D: usize = 2> {
+    pub(super) patch: Patch<D>,
+    pub(super) centres: Vec<[f64; D]>,
+    pub(super) normals: Vec<[[f64; D]; D]>,
+    pub(super) areas: Vec<f64>,
 }
 
-impl DualCells {
+impl<const D: usize> DualCells<D> {
     /// The dual cells of a mesh.
-    pub fn new(mesh: &Mesh<2>) -> Self {
+    pub fn new(mesh: &Mesh<D>) -> Self
+    where
+        Mesh<D>: Cells<D>,
+    {
+        mesh.dual_cells()
+    }
+
+    /// The patch of all nodes, those on bounded sides included.
+    pub fn patch(&self) -> &Patch<D> {
+        &self.patch
+    }
+
+    /// Areas of the cells, in lattice order; lengths in one dimension.
+    pub fn areas(&self) -> &[f64] {
+        &self.areas
+    }
+
+    /// N of the face above each node along each axis, padded; in one dimension 1.
+    pub fn normals(&self) -> &[[[f64; D]; D]] {
+        &self.normals
+    }
+
+    /// The areas that the faces sweep in the direction of N on the way to `later`, the dual cells of another mesh over
+    /// the same lattice. They are padded like [`normals`](Self::normals).
+    ///
+    /// ```text
+    /// s = d × ½ (t + t′),   d = the mean displacement of the two ends of the face
+    /// ```
+    ///
+    /// Exact where the nodes move in straight lines: the area of a cell grows by what its faces sweep outward. This is
+    /// the geometric conservation law.
+    ///
+    /// # Source
+    /// Thomas and Lombard, *Geometric conservation law and its application to flow computations on moving grids*
+    /// (1979).
+    pub fn swept(&self, later: &Self) -> Vec<[f64; D]>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        debug_assert_eq!(self.patch, later.patch);
+        Mesh::<D>::swept(self, later)
+    }
+}
+
+impl DualCells<2> {
+    pub(super) fn of_plane(mesh: &Mesh<2>) -> Self {
         let (lattice, extent) = (mesh.lattice(), mesh.extent());
         let ([n, m], wraps) = (lattice.nodes(), lattice.periodic());
         let patch = Patch { origin: [0; 2], size: [n, m], wraps };
         let s = m + 2;
-        let x = padded(lattice, mesh.x(), [[extent[0], 0.0], [0.0, extent[1]]]);
+        let x = padded(lattice, mesh.x(), diagonal(extent));
 
         let mut centres = vec![[0.0; 2]; x.len()];
         parallel::for_each_row(&mut centres[..(n + 1) * s], s, |p, row| {
@@ -75,36 +120,7 @@ impl DualCells {
         Self { patch, centres, normals, areas }
     }
 
-    /// The patch of all nodes, those on bounded sides included.
-    pub fn patch(&self) -> &Patch<2> {
-        &self.patch
-    }
-
-    /// Areas of the cells, in lattice order.
-    pub fn areas(&self) -> &[f64] {
-        &self.areas
-    }
-
-    /// N of the faces above each node along ξ and η, padded.
-    pub fn normals(&self) -> &[[[f64; 2]; 2]] {
-        &self.normals
-    }
-
-    /// The areas that the faces sweep in the direction of N on the way to `later`, the dual cells of another mesh over
-    /// the same lattice. They are padded like [`normals`](Self::normals).
-    ///
-    /// ```text
-    /// s = d × ½ (t + t′),   d = the mean displacement of the two ends of the face
-    /// ```
-    ///
-    /// Exact where the nodes move in straight lines: the area of a cell grows by what its faces sweep outward. This is
-    /// the geometric conservation law.
-    ///
-    /// # Source
-    /// Thomas and Lombard, *Geometric conservation law and its application to flow computations on moving grids*
-    /// (1979).
-    pub fn swept(&self, later: &Self) -> Vec<[f64; 2]> {
-        debug_assert_eq!(self.patch, later.patch);
+    pub(super) fn swept_in_plane(&self, later: &Self) -> Vec<[f64; 2]> {
         let ([n, m], s) = (self.patch.size, self.patch.size[1] + 2);
         let moved = |k: usize| minus(later.centres[k], self.centres[k]);
         let mut swept = vec![[0.0; 2]; self.normals.len()];
@@ -132,21 +148,33 @@ impl DualCells {
 /// Nodal values with a ring around them, padded like [`DualCells::patch`]. Across a periodic axis the ring holds
 /// images, to which `jump[d]` is added for each turn around axis d; beyond a bounded side it repeats the values of the
 /// side.
-pub fn padded<const K: usize>(lattice: &Lattice<2>, values: &[[f64; K]], jump: [[f64; K]; 2]) -> Vec<[f64; K]> {
-    let ([n, m], wraps) = (lattice.nodes(), lattice.periodic());
-    // the node at a padded place, and how many turns around the axis lead there
-    let along = |d: usize, place: usize, n: usize| {
-        let above = place + n - 1;
-        if wraps[d] { (above % n, (above / n) as f64 - 1.0) } else { (place.clamp(1, n) - 1, 0.0) }
+pub fn padded<const D: usize, const K: usize>(
+    lattice: &Lattice<D>,
+    values: &[[f64; K]],
+    jump: [[f64; K]; D],
+) -> Vec<[f64; K]> {
+    let (nodes, strides, wraps) = (lattice.nodes(), lattice.strides(), lattice.periodic());
+    // the node at each padded place along an axis, and how many turns around the axis lead there
+    let along = |d: usize| {
+        let n = nodes[d];
+        (0..n + 2).map(move |place| {
+            let above = place + n - 1;
+            if wraps[d] { (above % n, (above / n) as f64 - 1.0) } else { (place.clamp(1, n) - 1, 0.0) }
+        })
     };
-    let mut out = Vec::with_capacity((n + 2) * (m + 2));
-    for p in 0..n + 2 {
-        let (i, right) = along(0, p, n);
-        for q in 0..m + 2 {
-            let (j, up) = along(1, q, m);
-            let value = values[i * m + j];
-            out.push(std::array::from_fn(|c| value[c] + (right * jump[0][c] + up * jump[1][c])));
-        }
+    let last: Vec<(usize, [f64; K])> = along(D - 1).map(|(i, turns)| (i, jump[D - 1].map(|j| turns * j))).collect();
+    let mut rows = vec![(0, [0.0; K])];
+    for d in 0..D - 1 {
+        let shifted = |(first, by): (usize, [f64; K])| {
+            along(d)
+                .map(move |(i, turns)| (first + i * strides[d], std::array::from_fn(|c| by[c] + turns * jump[d][c])))
+        };
+        rows = rows.into_iter().flat_map(shifted).collect();
+    }
+    let mut out = Vec::with_capacity(rows.len() * last.len());
+    for (first, by) in rows {
+        let row = last.iter().map(|(i, over)| std::array::from_fn(|c| values[first + i][c] + (by[c] + over[c])));
+        out.extend(row);
     }
     out
 }

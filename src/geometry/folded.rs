@@ -1,6 +1,7 @@
 //! Folded cells, in any number of dimensions.
 
 use super::Mesh;
+use super::determinant::determinant;
 use super::lattice::strides;
 use super::mesh::first_two;
 use crate::error::Failure;
@@ -73,15 +74,4 @@ fn corner_volume<const D: usize>(x: &[[f64; D]], at: usize, corner: usize, steps
         let (a, b) = if upper { (x[at - steps[d]], x[at]) } else { (x[at], x[at + steps[d]]) };
         std::array::from_fn(|c| b[c] - a[c])
     }))
-}
-
-/// The determinant of up to three rows.
-fn determinant<const D: usize>(rows: [[f64; D]; D]) -> f64 {
-    let cross = |a: usize, b: usize, c: usize, d: usize| rows[a][c] * rows[b][d] - rows[a][d] * rows[b][c];
-    match D {
-        1 => rows[0][0],
-        2 => cross(0, 1, 0, 1),
-        3 => rows[0][0] * cross(1, 2, 1, 2) - rows[0][1] * cross(1, 2, 0, 2) + rows[0][2] * cross(1, 2, 0, 1),
-        _ => unreachable!("meshes have one to three axes"),
-    }
 }

@@ -142,6 +142,11 @@ impl<const D: usize> Lattice<D> {
     }
 }
 
+/// A diagonal matrix: what x jumps by on a turn around each axis, from the periods.
+pub(crate) fn diagonal<const D: usize>(values: [f64; D]) -> [[f64; D]; D] {
+    std::array::from_fn(|d| std::array::from_fn(|c| if c == d { values[d] } else { 0.0 }))
+}
+
 /// Strides of a box of nodes, last axis fastest.
 pub(crate) fn strides<const D: usize>(size: [usize; D]) -> [usize; D] {
     let mut strides = [1; D];

@@ -1,33 +1,7 @@
 use super::Mesh;
 
-/// Interpolates a nodal field from one mesh to the nodes of another over the same lattice and box
-///
-/// Every cell is divided into two triangles by its diagonal from (i, j) to (i+1, j+1), and the field is linear on each.
-/// The search for a node begins as many cells from the one with its index as the search for its neighbour ended, so
-/// that it costs a few tests, whatever the meshes are. On periodic axes the image next to that cell is searched for:
-/// the meshes may have drifted apart by any number of periods. Points outside a bounded box take the value at the
-/// nearest point of the cell where the search ends.
-///
-/// # Example
-/// ```
-/// use driftmesh::geometry::{interpolate, Lattice, Mesh};
-/// let a = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 1.0])?;
-/// let b = a.moved(a.x().iter().map(|&[x, y]| [x * x, y]).collect())?;
-/// // a linear field is carried exactly
-/// let f: Vec<f64> = a.x().iter().map(|[x, y]| 1.0 + 2.0 * x - y).collect();
-/// let g = interpolate(&a, &f, &b);
-/// for (g, [x, y]) in g.iter().zip(b.x()) {
-///     assert!((g - (1.0 + 2.0 * x - y)).abs() < 1e-14);
-/// }
-/// # Ok::<(), driftmesh::Error>(())
-/// ```
-///
-/// # Panics
-/// If the two meshes have different lattices or `values` has not one value a node.
-pub fn interpolate(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
-    assert_eq!(from.lattice(), to.lattice(), "both meshes need the same lattice");
-    assert_eq!(values.len(), from.lattice().len(), "one value a node");
-    let cells = Cells { mesh: from };
+pub(super) fn interpolate_in_plane(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
+    let cells = Search { mesh: from };
     let lattice = from.lattice();
     // by how many cells the last node was off its own, and the first node of the last row
     let (mut off, mut off_in_row) = ([0; 2], [0; 2]);
@@ -45,8 +19,8 @@ pub fn interpolate(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
 
 /// The cell of a mesh, by its lowest corner, that holds each of some points. The search begins in the cell of the point
 /// before, so that neighbouring points cost a few tests each.
-pub(crate) fn cells_of(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -> Vec<[usize; 2]> {
-    let cells = Cells { mesh };
+pub(super) fn cells_in_plane(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -> Vec<[usize; 2]> {
+    let cells = Search { mesh };
     let mut near = [0; 2];
     let cell = |point| {
         let (cell, (nodes, _)) = cells.find(point, near);
@@ -57,13 +31,13 @@ pub(crate) fn cells_of(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 2]>) -
 }
 
 /// The cells of a mesh by signed index, which on a periodic axis counts beyond the box.
-struct Cells<'a> {
+struct Search<'a> {
     mesh: &'a Mesh<2>,
 }
 
 type Triangle = ([usize; 3], [f64; 3]);
 
-impl Cells<'_> {
+impl Search<'_> {
     fn corner(&self, [i, j]: [isize; 2]) -> (usize, [f64; 2]) {
         let lattice = self.mesh.lattice();
         let nodes = lattice.nodes();
@@ -159,7 +133,7 @@ fn outside(point: [f64; 2], p: [f64; 2], q: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Lattice;
+    use crate::geometry::{Lattice, interpolate};
 
     /// A linear field survives the way between two strongly different meshes, also where the search is long.
     #[test]

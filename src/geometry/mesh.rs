@@ -234,6 +234,6 @@ impl<const D: usize> Mesh<D> {
 }
 
 /// The first two of some numbers, filled up with 0 where there are fewer.
-pub(super) fn first_two<T: Copy + Default>(values: &[T]) -> [T; 2] {
+pub(crate) fn first_two<T: Copy + Default>(values: &[T]) -> [T; 2] {
     [0, 1].map(|d| values.get(d).copied().unwrap_or_default())
 }

@@ -1,7 +1,5 @@
 use super::Mesh;
 use super::field::largest;
-use super::nodal::check_length;
-use crate::error::Failure;
 use std::ops::Range;
 
 /// How good a mesh is
@@ -10,7 +8,7 @@ use std::ops::Range;
 /// Q(K) = ½ tr(JᵀJ) / √det(JᵀJ) ≥ 1,   J = the averaged edge vectors of cell K
 /// ```
 ///
-/// Q is 1 exactly for a square cell; stretching and shearing raise it.
+/// Q is 1 exactly for a square cell; stretching and shearing raise it. In one dimension it is 1.
 ///
 /// # Source
 /// (3.4) of Bihlo, Haynes and Walsh, *Stochastic domain decomposition for time dependent adaptive mesh generation*
@@ -142,15 +140,7 @@ fn uniform_jacobian(mesh: &Mesh<2>) -> f64 {
     w * h / (n * m) as f64
 }
 
-/// Areas of the cells, in lattice order.
-pub fn cell_areas(mesh: &Mesh<2>) -> Vec<f64> {
-    let mut areas = Vec::with_capacity(mesh.lattice().cells().iter().product());
-    for_each_cell(mesh, |_, _, corners| areas.push(area(corners)));
-    areas
-}
-
-/// The area of each node: a quarter of every cell around it. These add up to the area of the box.
-pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
+pub(super) fn node_areas_in_plane(mesh: &Mesh<2>) -> Vec<f64> {
     let lattice = mesh.lattice();
     let nodes = lattice.nodes();
     let mut areas = vec![0.0; lattice.len()];
@@ -168,28 +158,8 @@ pub fn node_areas(mesh: &Mesh<2>) -> Vec<f64> {
     areas
 }
 
-/// All quality figures of a mesh under a density `rho`, one value a node.
-///
-/// # Errors
-/// [`Failure::WrongLength`] where `rho` has not one value a node.
-///
-/// # Example
-/// ```
-/// use driftmesh::geometry::{quality, Lattice, Mesh};
-/// // cells of 1 × 2: Q = ½ (1 + 4) / 2 = 1.25
-/// let mesh = Mesh::uniform(Lattice::bounded([3, 3])?, [0.0, 0.0], [3.0, 6.0])?;
-/// let q = quality(&mesh, &vec![1.0; 16])?;
-/// assert!((q.q_max - 1.25).abs() < 1e-14);
-/// assert!((q.equidistribution - 1.0).abs() < 1e-14);
-/// # Ok::<(), driftmesh::Error>(())
-/// ```
-pub fn quality(mesh: &Mesh<2>, rho: &[f64]) -> Result<Quality, Failure> {
-    check_length(mesh.lattice(), "the density", rho.len())?;
-    Ok(quality_and_integral(mesh, rho, rho).0)
-}
-
 /// The quality figures, and the integral of nodal values: over each cell, its area times the mean at its corners.
-pub(crate) fn quality_and_integral(mesh: &Mesh<2>, rho: &[f64], values: &[f64]) -> (Quality, f64) {
+pub(super) fn quality_in_plane(mesh: &Mesh<2>, rho: &[f64], values: &[f64]) -> (Quality, f64) {
     let lattice = mesh.lattice();
     let (rho, values) = (lattice.closed(rho), lattice.closed(values));
     pulp::Arch::new().dispatch(AllCells { mesh, rho: &rho, values: &values })
@@ -272,42 +242,7 @@ impl Column {
     }
 }
 
-/// Quality of a mesh relative to that of a reference over the same lattice.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Comparison {
-    /// Largest Q of the reference over largest Q of the mesh.
-    pub r_max: f64,
-    /// Mean Q of the reference over mean Q of the mesh.
-    pub r_mean: f64,
-    /// Largest ratio, over the cells, of Q in the reference to Q in the mesh.
-    pub cell_max: f64,
-    /// Root mean square, over the nodes, of the distance between the two meshes.
-    pub mesh_rms: f64,
-}
-
-/// Compares a mesh with a reference.
-///
-/// # Source
-/// Section 3.7 of Bihlo, Haynes and Walsh (2015).
-///
-/// # Panics
-/// If the two meshes have different lattices.
-pub fn compare(mesh: &Mesh<2>, reference: &Mesh<2>) -> Comparison {
-    assert_eq!(mesh.lattice(), reference.lattice(), "both meshes need the same lattice");
-    let [ours, theirs] = [mesh, reference].map(cell_qualities);
-    let max = |q: &[f64]| q.iter().copied().fold(0.0, f64::max);
-    let mean = |q: &[f64]| q.iter().sum::<f64>() / q.len() as f64;
-    let distances = mesh.x().iter().zip(reference.x()).map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
-    Comparison {
-        r_max: max(&theirs) / max(&ours),
-        r_mean: mean(&theirs) / mean(&ours),
-        cell_max: theirs.iter().zip(&ours).map(|(t, o)| t / o).fold(0.0, f64::max),
-        mesh_rms: (distances.sum::<f64>() / mesh.x().len() as f64).sqrt(),
-    }
-}
-
-/// Smallest corner Jacobian of every cell over that of the uniform mesh, in lattice order.
-pub fn cell_jacobians(mesh: &Mesh<2>) -> Vec<f64> {
+pub(super) fn jacobians_in_plane(mesh: &Mesh<2>) -> Vec<f64> {
     let uniform = uniform_jacobian(mesh);
     let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
     for_each_cell(mesh, |_, _, corners| {
@@ -316,8 +251,7 @@ pub fn cell_jacobians(mesh: &Mesh<2>) -> Vec<f64> {
     all
 }
 
-/// Q of every cell, in lattice order.
-pub fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
+pub(super) fn qualities_in_plane(mesh: &Mesh<2>) -> Vec<f64> {
     let mut all = Vec::with_capacity(mesh.lattice().cells().iter().product());
     for_each_cell(mesh, |_, _, corners| all.push(Edges::of(corners).shape()[0]));
     all
@@ -326,7 +260,7 @@ pub fn cell_qualities(mesh: &Mesh<2>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Lattice, check_unfolded};
+    use crate::geometry::{Lattice, cell_areas, check_unfolded, node_areas, quality};
 
     fn square(cells: usize) -> Mesh<2> {
         Mesh::uniform(Lattice::bounded([cells, cells]).unwrap(), [0.0, 0.0], [1.0, 1.0]).unwrap()
@@ -361,7 +295,7 @@ mod tests {
             let moved = moved.unwrap();
             let values: Vec<f64> = moved.x().iter().map(|[x, y]| 1.0 + x * x + 3.0 * y).collect();
             let sum: f64 = node_areas(&moved).iter().zip(&values).map(|(area, value)| area * value).sum();
-            assert!((quality_and_integral(&moved, &values, &values).1 - sum).abs() < 1e-13 * sum, "{periodic:?}");
+            assert!((moved.quality_and_integral(&values, &values).1 - sum).abs() < 1e-13 * sum, "{periodic:?}");
         }
     }
 

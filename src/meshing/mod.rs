@@ -22,7 +22,7 @@ pub use stochastic::{
     Estimate, Estimates, Estimator, EstimatorKind, GridWalk, Interpolation, MonteCarlo, Placement, Problem,
     ResidualWalk, Stochastic, Strip, Strips,
 };
-pub use whole::Whole;
+pub use whole::{Movable, Whole};
 
 use crate::error::{Failure, Result, Unfit};
 use crate::geometry::{Lattice, Mesh};

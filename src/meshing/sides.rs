@@ -1,7 +1,7 @@
 use super::mmpde::cell_means;
 use super::{Form, Mmpde};
 use crate::error::{Failure, Result};
-use crate::geometry::{Lattice, Mesh, Patch, strides};
+use crate::geometry::{Lattice, Mesh, Patch, diagonal, strides};
 use crate::numerics::linear::{LinearSolver, Robust};
 use crate::work::Work;
 
@@ -143,10 +143,6 @@ fn at_ends<const D: usize>(
 /// The period that is added to positions on wrapping around each axis.
 pub(super) fn jump<const D: usize>(mesh: &Mesh<D>) -> [[f64; D]; D] {
     diagonal(mesh.extent())
-}
-
-fn diagonal<const D: usize>(values: [f64; D]) -> [[f64; D]; D] {
-    std::array::from_fn(|d| std::array::from_fn(|c| if c == d { values[d] } else { 0.0 }))
 }
 
 /// The largest coordinate along each axis.

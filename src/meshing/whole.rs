@@ -1,7 +1,7 @@
 use super::sides::{jump, size};
 use super::{MeshGenerator, Mmpde, Moved, move_sides};
 use crate::error::{Failure, Result, Unfit};
-use crate::geometry::{Mesh, Patch};
+use crate::geometry::{Cells, Mesh, Patch};
 use crate::kept::{Kept, check_nodal};
 use crate::numerics::linear::{LinearSolver, Pcg, Robust, SparseLu};
 use schemars::JsonSchema;
@@ -133,6 +133,24 @@ impl<const D: usize> Whole<D> {
 }
 
 /// The implementation for D dimensions, with stars of S = 2D + 1 points: Rust cannot compute S from D.
+/// Meshes that can be moved to rest: lines and those in the plane.
+pub trait Movable<const D: usize>: Cells<D> {
+    /// [`Whole::to`] for meshes of this dimension.
+    fn whole(closeness: f64) -> Box<dyn MeshGenerator<D>>;
+}
+
+impl Movable<1> for Mesh<1> {
+    fn whole(closeness: f64) -> Box<dyn MeshGenerator<1>> {
+        Box::new(Whole::to(closeness))
+    }
+}
+
+impl Movable<2> for Mesh<2> {
+    fn whole(closeness: f64) -> Box<dyn MeshGenerator<2>> {
+        Box::new(Whole::to(closeness))
+    }
+}
+
 macro_rules! generator {
     ($D:literal, $S:literal, $direct:ident) => {
         impl MeshGenerator<$D> for Whole<$D> {

@@ -1,8 +1,8 @@
 use crate::error::{Failure, Result, Unfit};
-use crate::geometry::{DualCells, Mesh, check_unfolded};
-use crate::kept::check_nodal;
+use crate::geometry::{Cells, DualCells, Mesh, check_unfolded, diagonal, dot, length};
+use crate::kept::{check_nodal, nodal};
 use crate::meshing::{Relaxation, STEPS_TO_BEGIN_WITH};
-use crate::numerics::difference::{Metrics, derivative};
+use crate::numerics::difference::{Metrics, derivative, scaled_gradient};
 use crate::numerics::sum;
 use serde::{Deserialize, Serialize};
 
@@ -18,24 +18,27 @@ use serde::{Deserialize, Serialize};
 ///
 /// Corrections within what the mesh equation is solved to, a hundredth of the shortest edge, change nothing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Gait {
-    velocity: Vec<[f64; 2]>,
-    correction: Vec<[f64; 2]>,
+pub struct Gait<const D: usize = 2> {
+    #[serde(with = "nodal")]
+    velocity: Vec<[f64; D]>,
+    #[serde(with = "nodal")]
+    correction: Vec<[f64; D]>,
     steps: f64,
     /// How much of the last steps turned back: a mean that forgets.
     unrest: f64,
     /// The density that moved the mesh last: a mean over steps.
     rho: Vec<f64>,
     /// The last step; none before the first.
-    last: Option<Last>,
+    last: Option<Last<D>>,
 }
 
 /// A step of a mesh, for what the next one finds of its density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Last {
+struct Last<const D: usize> {
     took: f64,
     /// Where each node went.
-    way: Vec<[f64; 2]>,
+    #[serde(with = "nodal")]
+    way: Vec<[f64; D]>,
     /// What the mesh follows, at its start.
     u: Vec<f64>,
 }
@@ -69,21 +72,21 @@ const SINGULAR: f64 = 1e-3;
 /// Shares of the velocity that are tried: nodes that were made to run into each other stop.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
-impl Gait {
+impl<const D: usize> Gait<D> {
     /// Of a mesh that has stood still so far.
-    pub fn at_rest(mesh: &Mesh<2>) -> Self {
-        let still = vec![[0.0; 2]; mesh.x().len()];
+    pub fn at_rest(mesh: &Mesh<D>) -> Self {
+        let still = vec![[0.0; D]; mesh.x().len()];
         let steps = STEPS_TO_BEGIN_WITH;
         Self { velocity: still.clone(), correction: still, steps, unrest: 0.0, rho: Vec::new(), last: None }
     }
 
     /// Velocity with which each node is predicted to go on.
-    pub fn velocity(&self) -> &[[f64; 2]] {
+    pub fn velocity(&self) -> &[[f64; D]] {
         &self.velocity
     }
 
     /// From the predicted mesh of the last step to the one that it led to, node by node; zeros before the first.
-    pub fn correction(&self) -> &[[f64; 2]] {
+    pub fn correction(&self) -> &[[f64; D]] {
         &self.correction
     }
 
@@ -110,21 +113,21 @@ impl Gait {
     /// over this step, `share` how much of the velocity is kept, and `chooses` is true where τ is the mover's own.
     pub(super) fn after(
         &self,
-        predicted: &Predicted,
-        mesh: &Mesh<2>,
+        predicted: &Predicted<D>,
+        mesh: &Mesh<D>,
         [rho, u]: [Vec<f64>; 2],
         [gain, share]: [f64; 2],
         dt: f64,
         chooses: bool,
     ) -> Self {
         let pairs = mesh.x().iter().zip(predicted.mesh.x());
-        let correction: Vec<[f64; 2]> = pairs.map(|(x, from)| [0, 1].map(|d| x[d] - from[d])).collect();
+        let correction: Vec<[f64; D]> = pairs.map(|(x, from)| std::array::from_fn(|d| x[d] - from[d])).collect();
         let mut velocity = predicted.velocity.clone();
         for (v, e) in velocity.iter_mut().zip(&correction) {
-            (0..2).for_each(|d| v[d] = share * (v[d] + gain * e[d] / dt));
+            (0..D).for_each(|d| v[d] = share * (v[d] + gain * e[d] / dt));
         }
         let mut steps = self.steps;
-        let most = correction.iter().map(|e| e[0].hypot(e[1])).fold(0.0, f64::max);
+        let most = correction.iter().map(|e| length(*e)).fold(0.0, f64::max);
         let edge = mesh.shortest_edge();
         let c = if most > SOLVED_TO * edge { cosine(&correction, &self.correction) } else { 0.0 };
         let turned = c < TURNS_BACK && most > SEEN * edge;
@@ -140,7 +143,7 @@ impl Gait {
             }
         }
         let ways = predicted.velocity.iter().zip(&correction);
-        let way = ways.map(|(v, e)| [0, 1].map(|d| dt * v[d] + e[d])).collect();
+        let way = ways.map(|(v, e)| std::array::from_fn(|d| dt * v[d] + e[d])).collect();
         Self { velocity, correction, steps, unrest, rho, last: Some(Last { took: dt, way, u }) }
     }
 
@@ -149,45 +152,34 @@ impl Gait {
     /// Where u is carried along at c, what a node finds changes by δu = (d − c Δt)·∇u over a step in which it goes by
     /// d: c is the best fit to the last step. Nothing else decides on a rigid shift of a periodic mesh, which leaves
     /// any density as equidistributed as it was.
-    fn drift(&self, mesh: &Mesh<2>, u: &[f64]) -> [f64; 2] {
+    fn drift(&self, mesh: &Mesh<D>, u: &[f64]) -> [f64; D]
+    where
+        Mesh<D>: Cells<D>,
+    {
         let periodic = mesh.lattice().periodic();
         let Some(Last { took, way, u: before }) = self.last.as_ref().filter(|last| last.u.len() == u.len()) else {
-            return [0.0; 2];
+            return [0.0; D];
         };
         let middle: Vec<f64> = u.iter().zip(before).map(|(a, b)| 0.5 * (a + b)).collect();
         let gradient = Metrics::new(mesh).gradient(&middle);
         let cells = DualCells::new(mesh);
         // normal equations of Σ A (g·s − (d·g − δu))², lengths in uniform cells
-        let h = [0, 1].map(|d| mesh.extent()[d] / mesh.lattice().cells()[d] as f64);
-        let (mut matrix, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
+        let extent = mesh.extent();
+        let h: [f64; D] = std::array::from_fn(|d| extent[d] / mesh.lattice().cells()[d] as f64);
+        let (mut matrix, mut right) = ([[0.0; D]; D], [0.0; D]);
         for (k, (g, area)) in gradient.iter().zip(cells.areas()).enumerate() {
-            let found = way[k][0] * g[0] + way[k][1] * g[1] - (u[k] - before[k]);
-            let g = [g[0] * h[0], g[1] * h[1]];
-            for d in 0..2 {
-                right[d] += area * g[d] * found;
-                (0..2).for_each(|e| matrix[d][e] += area * g[d] * g[e]);
+            let found = dot(way[k], *g) - (u[k] - before[k]);
+            for d in 0..D {
+                let own = g[d] * h[d];
+                right[d] += area * own * found;
+                (0..D).for_each(|e| matrix[d][e] += area * own * (g[e] * h[e]));
             }
         }
-        let [[a, b], [_, d]] = matrix;
-        let determinant = a * d - b * b;
-        // u that hardly changes along an axis tells nothing of a shift there
-        let told = [a, d].map(|own| own > SINGULAR * (a + d));
-        let shift = match [periodic[0] && told[0], periodic[1] && told[1]] {
-            [true, true] if determinant > SINGULAR * (a + d) * (a + d) => {
-                [(d * right[0] - b * right[1]) / determinant, (a * right[1] - b * right[0]) / determinant]
-            }
-            // nor does u that hardly changes along a line, but across it
-            [true, true] => right.map(|r| r / (a + d)),
-            [true, false] => [right[0] / a, 0.0],
-            [false, true] => [0.0, right[1] / d],
-            [false, false] => [0.0; 2],
-        };
-        let shift = [shift[0] * h[0], shift[1] * h[1]];
-        let extent = mesh.extent();
-        [0, 1].map(|d| {
+        let shift = shift(matrix, right, periodic);
+        std::array::from_fn(|d| {
             let mean = sum(way.iter().map(|way| way[d])) / way.len() as f64;
             match periodic[d] {
-                true => shift[d].clamp(mean - FARTHEST * extent[d], mean + FARTHEST * extent[d]) / took,
+                true => (shift[d] * h[d]).clamp(mean - FARTHEST * extent[d], mean + FARTHEST * extent[d]) / took,
                 false => 0.0,
             }
         })
@@ -219,11 +211,30 @@ impl Gait {
     }
 }
 
+/// The solution of the normal equations of a shift along the periodic axes; 0 along axes that tell nothing of it.
+fn shift<const D: usize>(mut matrix: [[f64; D]; D], mut right: [f64; D], periodic: [bool; D]) -> [f64; D] {
+    let trace = (1..D).fold(matrix[0][0], |sum, d| sum + matrix[d][d]);
+    // u that hardly changes along an axis tells nothing of a shift there
+    let told: [bool; D] = std::array::from_fn(|d| periodic[d] && matrix[d][d] > SINGULAR * trace);
+    for d in (0..D).filter(|&d| !told[d]) {
+        (right[d], matrix[d]) = (0.0, std::array::from_fn(|e| if e == d { 1.0 } else { 0.0 }));
+        (0..D).filter(|&e| e != d).for_each(|e| matrix[e][d] = 0.0);
+    }
+    let (scaled, determinant) = scaled_gradient(matrix, right);
+    let axes = told.into_iter().filter(|told| *told).count();
+    // nor does u that hardly changes along a line, but across it
+    let singular = axes > 1 && determinant <= SINGULAR * trace.powi(axes as i32);
+    std::array::from_fn(|d| match singular {
+        true => right[d] / trace,
+        false => scaled[d] / determinant,
+    })
+}
+
 /// The cosine between two fields of vectors; 0 where one of them is zero.
-fn cosine(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
-    let product = |a: &[[f64; 2]], b: &[[f64; 2]]| sum(a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]));
+fn cosine<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
+    let product = |a: &[[f64; D]], b: &[[f64; D]]| sum(a.iter().zip(b).map(|(a, b)| dot(*a, *b)));
     // lengths may be of any unit
-    let norm = |a: &[[f64; 2]]| product(a, a).sqrt();
+    let norm = |a: &[[f64; D]]| product(a, a).sqrt();
     let size = norm(a) * norm(b);
     if size > 0.0 { product(a, b) / size } else { 0.0 }
 }
@@ -233,34 +244,32 @@ fn cosine(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
 /// The nodes of a periodic mesh may run through what they follow for ever, v = x_ξ δ, and stay equidistributed: nothing
 /// brings them back, and a prediction that learns from them would make them run ever faster. The part of v − drift
 /// along x_ξ, by its mean over the nodes, is taken out.
-fn go_along(mesh: &Mesh<2>, velocity: &mut [[f64; 2]], drift: [f64; 2]) {
-    let (lattice, extent) = (mesh.lattice(), mesh.extent());
-    for d in (0..2).filter(|&d| lattice.periodic()[d]) {
-        let mut jump = [0.0; 2];
-        jump[d] = extent[d];
-        let along = derivative(lattice, mesh.x(), d, jump);
+fn go_along<const D: usize>(mesh: &Mesh<D>, velocity: &mut [[f64; D]], drift: [f64; D]) {
+    let (lattice, jump) = (mesh.lattice(), diagonal(mesh.extent()));
+    for d in (0..D).filter(|&d| lattice.periodic()[d]) {
+        let along = derivative(lattice, mesh.x(), d, jump[d]);
         let pairs = velocity.iter().zip(&along);
-        let shares = pairs.map(|(v, a)| {
-            let relative = [v[0] - drift[0], v[1] - drift[1]];
-            (relative[0] * a[0] + relative[1] * a[1]) / (a[0] * a[0] + a[1] * a[1])
-        });
+        let shares = pairs.map(|(v, a)| dot(std::array::from_fn(|d| v[d] - drift[d]), *a) / dot(*a, *a));
         let mean = sum(shares) / velocity.len() as f64;
-        velocity.iter_mut().zip(&along).for_each(|(v, a)| (0..2).for_each(|d| v[d] -= mean * a[d]));
+        velocity.iter_mut().zip(&along).for_each(|(v, a)| (0..D).for_each(|d| v[d] -= mean * a[d]));
     }
 }
 
 /// The mesh as it would go on by itself, from which the mesh equation then starts.
 #[derive(Debug, Clone)]
-pub(crate) struct Predicted {
-    pub mesh: Mesh<2>,
-    velocity: Vec<[f64; 2]>,
+pub(crate) struct Predicted<const D: usize> {
+    pub mesh: Mesh<D>,
+    velocity: Vec<[f64; D]>,
     /// Of the gait.
     steps: f64,
 }
 
-impl Predicted {
+impl<const D: usize> Predicted<D> {
     /// Where a mesh is after `dt`; the same mesh where the gain is 0.
-    pub(super) fn after(mesh: &Mesh<2>, gait: &Gait, u: &[f64], gain: f64, dt: f64) -> Result<Self, Failure> {
+    pub(super) fn after(mesh: &Mesh<D>, gait: &Gait<D>, u: &[f64], gain: f64, dt: f64) -> Result<Self, Failure>
+    where
+        Mesh<D>: Cells<D>,
+    {
         let mut going = gait.velocity.clone();
         // corrections are as large in short steps as in long ones: what was learnt from them says nothing of a much
         // longer one
@@ -271,14 +280,14 @@ impl Predicted {
             go_along(mesh, &mut going, gait.drift(mesh, u));
         }
         for share in SHARES.into_iter().filter(|_| gain > 0.0) {
-            let velocity: Vec<[f64; 2]> = going.iter().map(|v| v.map(|v| share * v)).collect();
-            let moved = mesh.x().iter().zip(&velocity).map(|(x, v)| [0, 1].map(|d| x[d] + dt * v[d]));
+            let velocity: Vec<[f64; D]> = going.iter().map(|v| v.map(|v| share * v)).collect();
+            let moved = mesh.x().iter().zip(&velocity).map(|(x, v)| std::array::from_fn(|d| x[d] + dt * v[d]));
             let mesh = mesh.moved(moved.collect())?;
             if check_unfolded(&mesh).is_ok() {
                 return Ok(Self { mesh, velocity, steps: gait.steps });
             }
         }
-        Ok(Self { mesh: mesh.clone(), velocity: vec![[0.0; 2]; gait.velocity.len()], steps: gait.steps })
+        Ok(Self { mesh: mesh.clone(), velocity: vec![[0.0; D]; gait.velocity.len()], steps: gait.steps })
     }
 
     /// τ where it is measured in time steps of `scale`.

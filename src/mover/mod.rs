@@ -9,7 +9,7 @@ pub use retries::{Care, Retries};
 pub use start::{Ending, Start, adapted, steps_to_rest};
 
 use crate::error::{Failure, Result};
-use crate::geometry::{Mesh, check_length, check_unfolded};
+use crate::geometry::{Cells, Mesh, check_length, check_unfolded, interpolate};
 use crate::meshing::{Interface, MeshGenerator, Mmpde, Moved, Relaxation};
 use crate::work::Work;
 pub(crate) use gait::Predicted;
@@ -42,9 +42,9 @@ pub(crate) use gait::Predicted;
 /// assert!(gait.correction().iter().all(|e| e[0].hypot(e[1]) < 1e-3 / 20.0));
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
-pub struct Mover {
+pub struct Mover<const D: usize = 2> {
     /// How the mesh equation is solved.
-    pub generator: Box<dyn MeshGenerator>,
+    pub generator: Box<dyn MeshGenerator<D>>,
     /// The mesh equation, with its τ.
     pub equation: Mmpde,
     /// How far a step that fails is tried again.
@@ -63,11 +63,11 @@ pub struct Followed<'a> {
 
 /// A step of a [`Mover`].
 #[derive(Debug, Clone)]
-pub struct Step {
+pub struct Step<const D: usize = 2> {
     /// The mesh, and what it cost.
-    pub moved: Moved,
+    pub moved: Moved<D>,
     /// What the next step goes on from.
-    pub gait: Gait,
+    pub gait: Gait<D>,
     /// Tries that failed.
     pub retries: Retries,
 }
@@ -85,14 +85,17 @@ pub(crate) struct Stride {
     pub share: f64,
 }
 
-impl Mover {
+impl<const D: usize> Mover<D>
+where
+    Mesh<D>: Cells<D>,
+{
     /// The recipe that needs no number: the conservative form, τ and prediction by the mover itself.
-    pub fn new(generator: impl MeshGenerator + 'static) -> Self {
+    pub fn new(generator: impl MeshGenerator<D> + 'static) -> Self {
         Self::by(Box::new(generator), Mmpde::default())
     }
 
     /// Moves by this generator and equation.
-    pub fn by(generator: Box<dyn MeshGenerator>, equation: Mmpde) -> Self {
+    pub fn by(generator: Box<dyn MeshGenerator<D>>, equation: Mmpde) -> Self {
         Self { generator, equation, care: Care::default() }
     }
 
@@ -100,7 +103,13 @@ impl Mover {
     ///
     /// # Errors
     /// A [`Failure`]: the mesh is folded, or would be whatever is tried, or its equation is not solved.
-    pub fn step(&mut self, mesh: &Mesh<2>, gait: &Gait, followed: Followed<'_>, dt: f64) -> Result<Step, Failure> {
+    pub fn step(
+        &mut self,
+        mesh: &Mesh<D>,
+        gait: &Gait<D>,
+        followed: Followed<'_>,
+        dt: f64,
+    ) -> Result<Step<D>, Failure> {
         let Followed { u, rho } = followed;
         check_length(mesh.lattice(), "what the mesh follows", u.len())?;
         check_length(mesh.lattice(), "the density", rho.len())?;
@@ -115,7 +124,13 @@ impl Mover {
     }
 
     /// Where the mesh goes by itself.
-    pub(crate) fn predict(&self, mesh: &Mesh<2>, gait: &Gait, u: &[f64], stride: Stride) -> Result<Predicted, Failure> {
+    pub(crate) fn predict(
+        &self,
+        mesh: &Mesh<D>,
+        gait: &Gait<D>,
+        u: &[f64],
+        stride: Stride,
+    ) -> Result<Predicted<D>, Failure> {
         let prediction = if self.generator.moves() { self.equation.relaxation.prediction() } else { 0.0 };
         Predicted::after(mesh, gait, u, prediction * stride.dt / stride.scale, stride.dt)
     }
@@ -124,11 +139,11 @@ impl Mover {
     /// it failed with at first.
     pub(crate) fn relax(
         &mut self,
-        predicted: &Predicted,
+        predicted: &Predicted<D>,
         rho: &[f64],
         stride: Stride,
         retries: &mut Retries,
-    ) -> Result<Moved, Failure> {
+    ) -> Result<Moved<D>, Failure> {
         let tau = predicted.tau(self.equation.relaxation, stride.scale);
         let equation = Mmpde { relaxation: Relaxation::Time(tau), ..self.equation };
         let generator = self.generator.as_mut();
@@ -148,12 +163,12 @@ impl Mover {
     /// What the next step goes on from; `made` are the density that moved the mesh, and the u that it was made of.
     pub(crate) fn learn(
         &self,
-        gait: &Gait,
-        predicted: &Predicted,
-        mesh: &Mesh<2>,
+        gait: &Gait<D>,
+        predicted: &Predicted<D>,
+        mesh: &Mesh<D>,
         made: [Vec<f64>; 2],
         stride: Stride,
-    ) -> Gait {
+    ) -> Gait<D> {
         let gains = [self.equation.relaxation.prediction() * stride.dt / stride.scale, stride.share];
         let chooses = self.equation.relaxation == Relaxation::Auto;
         gait.after(predicted, mesh, made, gains, stride.dt, chooses)
@@ -161,20 +176,23 @@ impl Mover {
 }
 
 /// `parts` equal parts of a step of the mesh equation, ρ carried onto the mesh of each by interpolation.
-fn relaxed(
-    generator: &mut dyn MeshGenerator,
+fn relaxed<const D: usize>(
+    generator: &mut dyn MeshGenerator<D>,
     equation: &Mmpde,
-    start: &Mesh<2>,
+    start: &Mesh<D>,
     rho: &[f64],
     dt: f64,
     parts: usize,
-) -> Result<Moved, Failure> {
+) -> Result<Moved<D>, Failure>
+where
+    Mesh<D>: Cells<D>,
+{
     let mut work = Work::default();
     let mut seconds = 0.0;
-    let mut last: Option<Moved> = None;
+    let mut last: Option<Moved<D>> = None;
     for part in 0..parts {
         let mesh = last.as_ref().map_or(start, |moved| &moved.mesh);
-        let carried = if part == 0 { None } else { Some(crate::geometry::interpolate(start, rho, mesh)) };
+        let carried = if part == 0 { None } else { Some(interpolate(start, rho, mesh)) };
         let moved = generator.step(equation, mesh, carried.as_deref().unwrap_or(rho), dt / parts as f64)?;
         work += moved.work;
         seconds += moved.interface.map_or(0.0, |i| i.seconds);

@@ -66,7 +66,11 @@ impl Care {
 }
 
 /// A density after further passes of the filter.
-pub(super) fn smoother<'a>(mesh: &Mesh<2>, rho: &'a [f64], passes: usize) -> Result<Cow<'a, [f64]>, Failure> {
+pub(super) fn smoother<'a, const D: usize>(
+    mesh: &Mesh<D>,
+    rho: &'a [f64],
+    passes: usize,
+) -> Result<Cow<'a, [f64]>, Failure> {
     if passes == 0 {
         return Ok(Cow::Borrowed(rho));
     }

@@ -1,14 +1,14 @@
 use super::{Followed, Gait, Mover};
 use crate::density::Monitor;
 use crate::error::Result;
-use crate::geometry::{Mesh, check_unfolded, interpolate};
-use crate::meshing::{Form, Mmpde, Relaxation, Whole};
+use crate::geometry::{Mesh, check_unfolded, interpolate, strides};
+use crate::meshing::{Form, Mmpde, Movable, Relaxation};
 
 /// A mesh that was adapted to a density at the start.
 #[derive(Debug, Clone)]
-pub struct Start {
+pub struct Start<const D: usize = 2> {
     /// The mesh.
-    pub mesh: Mesh<2>,
+    pub mesh: Mesh<D>,
     /// Whether it stands still.
     pub end: Ending,
     /// τ over the time step in the end: with fewer it would not have come to rest, or would have taken longer.
@@ -44,18 +44,24 @@ const AT_REST: f64 = 4e-3;
 ///
 /// # Errors
 /// What `followed` returns, which gives u and the density of a mesh.
-pub fn adapted(
-    mesh: Mesh<2>,
+pub fn adapted<const D: usize>(
+    mesh: Mesh<D>,
     form: Form,
-    mut followed: impl FnMut(&Mesh<2>) -> Result<(Vec<f64>, Vec<f64>)>,
-) -> Result<Start> {
+    mut followed: impl FnMut(&Mesh<D>) -> Result<(Vec<f64>, Vec<f64>)>,
+) -> Result<Start<D>>
+where
+    Mesh<D>: Movable<D>,
+{
     from_coarser(mesh, form, &mut followed)
 }
 
 /// u and ρ on a mesh.
-pub(crate) type FollowedOn<'a> = &'a mut dyn FnMut(&Mesh<2>) -> Result<(Vec<f64>, Vec<f64>)>;
+pub(crate) type FollowedOn<'a, const D: usize> = &'a mut dyn FnMut(&Mesh<D>) -> Result<(Vec<f64>, Vec<f64>)>;
 
-fn from_coarser(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
+fn from_coarser<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
+where
+    Mesh<D>: Movable<D>,
+{
     let cells = mesh.lattice().cells();
     let coarse = cells.map(|n| if n > COARSE { n.div_ceil(2) } else { n });
     if coarse == cells {
@@ -67,7 +73,15 @@ fn from_coarser(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<S
 
 /// The fewest time steps in τ with which a mesh rests on `values`, given at the nodes of `mesh` and carried by
 /// interpolation, as far as [`adapted`] can tell from equal cells; nothing where it does not come to rest.
-pub fn steps_to_rest(mesh: &Mesh<2>, form: Form, monitor: &dyn Monitor, values: &[f64]) -> Option<f64> {
+pub fn steps_to_rest<const D: usize>(
+    mesh: &Mesh<D>,
+    form: Form,
+    monitor: &dyn Monitor<D>,
+    values: &[f64],
+) -> Option<f64>
+where
+    Mesh<D>: Movable<D>,
+{
     let uniform = Mesh::uniform(*mesh.lattice(), mesh.lower(), mesh.upper()).ok()?;
     let start = to_rest(uniform, form, &mut |on| {
         let u = interpolate(mesh, values, on);
@@ -78,9 +92,12 @@ pub fn steps_to_rest(mesh: &Mesh<2>, form: Form, monitor: &dyn Monitor, values: 
 }
 
 /// The same, on this mesh alone.
-fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start> {
+fn to_rest<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
+where
+    Mesh<D>: Movable<D>,
+{
     let equation = Mmpde { relaxation: Relaxation::Auto, form };
-    let mut mover = Mover::by(Box::new(Whole::to(0.1 * AT_REST)), equation);
+    let mut mover = Mover::by(Mesh::whole(0.1 * AT_REST), equation);
     let mut gait = Gait::at_rest(&mesh);
     let mut mesh = mesh;
     for _ in 0..MOST_STEPS {
@@ -102,16 +119,17 @@ fn to_rest(mesh: Mesh<2>, form: Form, followed: FollowedOn<'_>) -> Result<Start>
 }
 
 /// True where an edge that is much shorter than a uniform cell holds a fifth of the range of u.
-fn jumps(mesh: &Mesh<2>, u: &[f64]) -> bool {
+fn jumps<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> bool {
     let lattice = mesh.lattice();
     let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());
-    let size = mesh.extent().iter().zip(cells).map(|(extent, n)| extent / n as f64).collect::<Vec<_>>();
+    let size: [f64; D] = std::array::from_fn(|d| mesh.extent()[d] / cells[d] as f64);
     let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
-    let strides = [cells[1] + 1, 1];
-    (0..2).any(|d| {
-        let rows = (0..x.len()).filter(|k| if d == 0 { k / strides[0] < cells[0] } else { k % strides[0] < cells[1] });
-        rows.map(|k| (k, k + strides[d])).any(|(a, b)| {
-            let way = (0..2).map(|c| ((x[b][c] - x[a][c]) / size[c]).powi(2)).sum::<f64>().sqrt();
+    let nodes = cells.map(|n| n + 1);
+    let strides = strides(nodes);
+    (0..D).any(|d| {
+        let below = (0..x.len()).filter(|k| k / strides[d] % nodes[d] < cells[d]);
+        below.map(|k| (k, k + strides[d])).any(|(a, b)| {
+            let way = (0..D).map(|c| ((x[b][c] - x[a][c]) / size[c]).powi(2)).sum::<f64>().sqrt();
             (u[b] - u[a]).abs() > JUMP * (high - low) && way < THIN
         })
     })

@@ -1,6 +1,6 @@
 //! Second-order differences on the lattice, and the metrics of a mesh that follow from them.
 
-use crate::geometry::{Lattice, Mesh};
+use crate::geometry::{Lattice, Mesh, cofactors, diagonal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -99,43 +99,48 @@ impl Gradient {
     }
 }
 
-/// Nodal metrics of a two-dimensional mesh
+/// Nodal metrics of a mesh
 ///
 /// ```text
-/// J = x_ξ y_η − x_η y_ξ,   u_x = (u_ξ y_η − u_η y_ξ) / J,   u_y = (u_η x_ξ − u_ξ x_η) / J
+/// ∇u = Σ_d C_d ∂u/∂ξ_d / J,   J = det(∂x/∂ξ),   C its cofactors
 /// ```
+///
+/// In the plane J = x_ξ y_η − x_η y_ξ, u_x = (u_ξ y_η − u_η y_ξ)/J and u_y = (u_η x_ξ − u_ξ x_η)/J.
 #[derive(Debug, Clone)]
-pub struct Metrics {
-    lattice: Lattice<2>,
-    x_xi: Vec<[f64; 2]>,
-    x_eta: Vec<[f64; 2]>,
+pub struct Metrics<const D: usize = 2> {
+    lattice: Lattice<D>,
+    /// ∂x/∂ξ_d at all nodes, for each axis d.
+    tangents: [Vec<[f64; D]>; D],
 }
 
-impl Metrics {
+impl<const D: usize> Metrics<D> {
     /// Metrics at all nodes, by [`derivative`].
-    pub fn new(mesh: &Mesh<2>) -> Self {
-        let [w, h] = mesh.extent();
-        let lattice = *mesh.lattice();
-        Self {
-            lattice,
-            x_xi: derivative(&lattice, mesh.x(), 0, [w, 0.0]),
-            x_eta: derivative(&lattice, mesh.x(), 1, [0.0, h]),
-        }
+    pub fn new(mesh: &Mesh<D>) -> Self {
+        let (lattice, jump) = (*mesh.lattice(), diagonal(mesh.extent()));
+        let tangents = std::array::from_fn(|d| derivative(&lattice, mesh.x(), d, jump[d]));
+        Self { lattice, tangents }
     }
 
     /// ∇u at all nodes from nodal values.
-    pub fn gradient(&self, u: &[f64]) -> Vec<[f64; 2]> {
+    pub fn gradient(&self, u: &[f64]) -> Vec<[f64; D]> {
         let u = u.as_chunks::<1>().0;
-        let u_xi = derivative(&self.lattice, u, 0, [0.0]);
-        let u_eta = derivative(&self.lattice, u, 1, [0.0]);
-        (self.x_xi.iter().zip(&self.x_eta))
-            .zip(u_xi.iter().zip(&u_eta))
-            .map(|((a, b), ([p], [q]))| {
-                let j = 1.0 / (a[0] * b[1] - b[0] * a[1]);
-                [(p * b[1] - q * a[1]) * j, (q * a[0] - p * b[0]) * j]
-            })
-            .collect()
+        let slopes: [_; D] = std::array::from_fn(|d| derivative(&self.lattice, u, d, [0.0]));
+        let at = |k: usize| {
+            let along = std::array::from_fn(|d| self.tangents[d][k]);
+            let (scaled, determinant) = scaled_gradient(along, std::array::from_fn(|d| slopes[d][k][0]));
+            let inverse = 1.0 / determinant;
+            scaled.map(|g| g * inverse)
+        };
+        (0..u.len()).map(at).collect()
     }
+}
+
+/// J ∇u and J, from the changes of place and of u along D directions.
+#[inline(always)]
+pub(crate) fn scaled_gradient<const D: usize>(along: [[f64; D]; D], changes: [f64; D]) -> ([f64; D], f64) {
+    let cofactors = cofactors(along);
+    let product = |c: usize, of: [f64; D]| (1..D).fold(of[0] * cofactors[0][c], |sum, d| sum + of[d] * cofactors[d][c]);
+    (std::array::from_fn(|c| product(c, changes)), product(0, along.map(|tangent| tangent[0])))
 }
 
 #[cfg(test)]

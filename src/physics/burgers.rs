@@ -294,7 +294,7 @@ impl Physics for Burgers {
     }
 
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
-        let start = nodal::<1>(motion, u)?;
+        let start = nodal::<2, 1>(motion, u)?;
         if self.convection == Convection::Flux {
             let mut volumes = std::mem::take(&mut self.volumes);
             let stepped = volumes.step(self, motion, start);

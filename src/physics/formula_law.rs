@@ -244,7 +244,7 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
     }
 
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
-        let start = nodal::<B>(motion, u)?;
+        let start = nodal::<2, B>(motion, u)?;
         let end = motion.t + motion.dt;
         self.check_sides(end, motion.new)?;
         let mut volumes = std::mem::take(&mut self.volumes);

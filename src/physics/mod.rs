@@ -17,35 +17,35 @@ pub use uniform::UniformBurgers;
 
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake};
-use crate::geometry::{Field, Mesh, node_areas};
+use crate::geometry::{Cells, Field, Mesh, node_areas};
 use crate::kind::kinds;
 use crate::numerics::sum;
 use crate::work::Work;
 
 /// One time step on a mesh that moves during it.
 #[derive(Debug, Clone, Copy)]
-pub struct Motion<'a> {
+pub struct Motion<'a, const D: usize = 2> {
     /// Time at the start.
     pub t: f64,
     /// Length of the step.
     pub dt: f64,
     /// The mesh at t.
-    pub old: &'a Mesh<2>,
+    pub old: &'a Mesh<D>,
     /// The mesh at t + dt.
-    pub new: &'a Mesh<2>,
+    pub new: &'a Mesh<D>,
 }
 
 /// A partial differential equation that can be advanced on a moving mesh.
-pub trait Physics: Send {
+pub trait Physics<const D: usize = 2>: Send {
     /// Names of the unknowns.
     fn unknowns(&self) -> Vec<String>;
 
     /// The initial solution, at time t on a mesh.
-    fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field;
+    fn initial(&self, t: f64, mesh: &Mesh<D>) -> Field;
 
     /// The value of each unknown at a point of a bounded side, if it is given there; empty if no unknown is given
     /// anywhere.
-    fn side_values(&self, _t: f64, _x: [f64; 2]) -> Vec<Option<f64>> {
+    fn side_values(&self, _t: f64, _x: [f64; D]) -> Vec<Option<f64>> {
         Vec::new()
     }
 
@@ -53,7 +53,7 @@ pub trait Physics: Send {
     ///
     /// # Errors
     /// A [`Failure`] where the step cannot be solved; [`Failure::NonFinite`] where its result is not finite.
-    fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure>;
+    fn step(&mut self, motion: Motion<'_, D>, u: &Field) -> Result<(Field, Work), Failure>;
 
     /// Whether the solution is given for every time and place, so that nothing is carried from mesh to mesh.
     fn is_given(&self) -> bool {
@@ -61,17 +61,20 @@ pub trait Physics: Send {
     }
 
     /// ∇ of the first unknown at all nodes, if it is known exactly.
-    fn gradient(&self, _t: f64, _mesh: &Mesh<2>) -> Option<Vec<[f64; 2]>> {
+    fn gradient(&self, _t: f64, _mesh: &Mesh<D>) -> Option<Vec<[f64; D]>> {
         None
     }
 
     /// The integral of the first unknown, with the areas for which a conservative scheme conserves it.
-    fn conserved(&self, mesh: &Mesh<2>, u: &Field) -> f64 {
+    fn conserved(&self, mesh: &Mesh<D>, u: &Field) -> f64
+    where
+        Mesh<D>: Cells<D>,
+    {
         sum(node_areas(mesh).iter().zip(u.component(0)).map(|(area, u)| area * u))
     }
 
     /// The exact solution, if there is one, for the unknowns in [`known`](Self::known).
-    fn exact(&self, _t: f64, _mesh: &Mesh<2>) -> Option<Field> {
+    fn exact(&self, _t: f64, _mesh: &Mesh<D>) -> Option<Field> {
         None
     }
 
@@ -84,7 +87,7 @@ pub trait Physics: Send {
     ///
     /// # Errors
     /// A [`Failure`] that names the place.
-    fn check(&self, _t: f64, _mesh: &Mesh<2>, _u: &Field) -> Result<(), Failure> {
+    fn check(&self, _t: f64, _mesh: &Mesh<D>, _u: &Field) -> Result<(), Failure> {
         Ok(())
     }
 }
@@ -165,7 +168,7 @@ fn mistaken(key: &str, text: &str, mistake: Mistake) -> Error {
 
 /// The values of a solution at the start of a step, K for each node. Solution and both meshes must have the same
 /// lattice.
-fn nodal<'a, const K: usize>(motion: Motion<'_>, u: &'a Field) -> Result<&'a [[f64; K]], Failure> {
+fn nodal<'a, const D: usize, const K: usize>(motion: Motion<'_, D>, u: &'a Field) -> Result<&'a [[f64; K]], Failure> {
     let (lattice, expected) = (motion.new.lattice(), motion.new.lattice().len());
     let (nodes, rest) = u.values().as_chunks::<K>();
     if motion.old.lattice() != lattice {
@@ -178,12 +181,16 @@ fn nodal<'a, const K: usize>(motion: Motion<'_>, u: &'a Field) -> Result<&'a [[f
 }
 
 /// Refuses values that are not finite.
-fn check_finite<const K: usize>(what: [&'static str; K], mesh: &Mesh<2>, values: &[[f64; K]]) -> Result<(), Failure> {
+fn check_finite<const D: usize, const K: usize>(
+    what: [&'static str; K],
+    mesh: &Mesh<D>,
+    values: &[[f64; K]],
+) -> Result<(), Failure> {
     match values.as_flattened().iter().position(|v| !v.is_finite()) {
         None => Ok(()),
         Some(place) => {
             let (k, c) = (place / K, place % K);
-            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+            let (node, x) = mesh.told(k);
             Err(Failure::NonFinite { what: what[c], value: values[k][c], node, x })
         }
     }

@@ -1,5 +1,5 @@
 use crate::error::Result;
-use crate::geometry::{Mesh, interpolate};
+use crate::geometry::{Cells, Mesh, interpolate, length, strides};
 use crate::numerics::larger;
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,10 @@ impl Benefit {
     ///
     /// # Errors
     /// Where the box makes no mesh of equal cells.
-    pub(super) fn of(mesh: &Mesh<2>, u: &[f64]) -> Result<Self> {
+    pub(super) fn of<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> Result<Self>
+    where
+        Mesh<D>: Cells<D>,
+    {
         let equal = Mesh::uniform(*mesh.lattice(), mesh.lower(), mesh.upper())?;
         let there = interpolate(mesh, u, &equal);
         let back = interpolate(&equal, &there, mesh);
@@ -32,17 +35,18 @@ impl Benefit {
 }
 
 /// A quarter of what values are off when they are interpolated from both neighbours on a line of the lattice.
-fn left_out(mesh: &Mesh<2>, u: &[f64]) -> f64 {
+fn left_out<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> f64 {
     let lattice = mesh.lattice();
     let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());
-    let strides = [cells[1] + 1, 1];
+    let nodes = cells.map(|n| n + 1);
+    let strides = strides(nodes);
     let mut off = 0.0;
     for k in 0..u.len() {
-        let node = [k / strides[0], k % strides[0]];
-        for d in (0..2).filter(|&d| node[d] > 0 && node[d] < cells[d]) {
+        let node: [usize; D] = std::array::from_fn(|d| k / strides[d] % nodes[d]);
+        for d in (0..D).filter(|&d| node[d] > 0 && node[d] < cells[d]) {
             let (below, above) = (k - strides[d], k + strides[d]);
-            let length = |a: usize, b: usize| (x[a][0] - x[b][0]).hypot(x[a][1] - x[b][1]);
-            let (first, second) = (length(k, below), length(above, k));
+            let edge = |a: usize, b: usize| length::<D>(std::array::from_fn(|d| x[a][d] - x[b][d]));
+            let (first, second) = (edge(k, below), edge(above, k));
             let between = (second * u[below] + first * u[above]) / (first + second);
             off = larger(off, 0.25 * (u[k] - between));
         }

@@ -4,13 +4,13 @@ use super::pace::Pace;
 use super::{Record, Safety, Schedule, State};
 use crate::error::{Result, Unfit};
 use crate::geometry::{Field, Mesh, check_unfolded};
-use crate::kept::{Kept, check_nodal};
+use crate::kept::{Kept, check_nodal, nodal};
 use crate::mover::Gait;
 use crate::physics::Physics;
 use serde::{Deserialize, Serialize};
 
 /// Where the checkpoints of a run go.
-pub(crate) trait Keeper {
+pub(crate) trait Keeper<const D: usize = 2> {
     /// Whether one is to be kept after a step, or after the last.
     fn due(&self, step: usize, last: bool) -> bool;
 
@@ -18,7 +18,7 @@ pub(crate) trait Keeper {
     ///
     /// # Errors
     /// What hinders that.
-    fn keep(&mut self, checkpoint: &Checkpoint) -> Result<()>;
+    fn keep(&mut self, checkpoint: &Checkpoint<D>) -> Result<()>;
 }
 
 /// What the loop carries from step to step beside state and record.
@@ -32,13 +32,14 @@ pub(crate) struct Course {
 
 /// Everything that the steps of a run to come depend on, and what was found in those done.
 #[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct Checkpoint {
+pub(crate) struct Checkpoint<const D: usize = 2> {
     t: f64,
     pub step: usize,
-    x: Vec<[f64; 2]>,
+    #[serde(with = "nodal")]
+    x: Vec<[f64; D]>,
     u: Vec<f64>,
     rho: Vec<f64>,
-    gait: Gait,
+    gait: Gait<D>,
     own_change: f64,
     pub record: Record,
     pub course: Course,
@@ -46,8 +47,8 @@ pub(crate) struct Checkpoint {
     pub kept: Kept,
 }
 
-impl Checkpoint {
-    pub fn of(state: &State, record: Record, course: Course, kept: Kept) -> Self {
+impl<const D: usize> Checkpoint<D> {
+    pub fn of(state: &State<D>, record: Record, course: Course, kept: Kept) -> Self {
         let State { t, step, mesh, u, rho, gait, own_change } = state;
         Self {
             t: *t,
@@ -66,11 +67,11 @@ impl Checkpoint {
     /// The state, if one of the study can be so. `mesh` is any of its meshes.
     pub fn state(
         &self,
-        mesh: &Mesh<2>,
-        physics: &dyn Physics,
+        mesh: &Mesh<D>,
+        physics: &dyn Physics<D>,
         schedule: &Schedule,
         safety: Safety,
-    ) -> Result<State, Unfit> {
+    ) -> Result<State<D>, Unfit> {
         let damaged = |reason: String| Err(Unfit::Damaged(reason));
         let (nodes, components) = (mesh.lattice().len(), physics.unknowns().len());
         let Self { t, step, x, u, rho, gait, own_change, course, .. } = self;

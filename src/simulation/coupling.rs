@@ -1,7 +1,7 @@
 use super::{Record, Schedule, Simulation, State, journey, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Field, Mesh, check_unfolded};
+use crate::geometry::{Cells, Field, Mesh, check_unfolded};
 use crate::meshing::{Interface, Relaxation};
 use crate::mover::{Predicted, Retries, Stride};
 use crate::numerics::larger;
@@ -57,16 +57,16 @@ impl Coupling {
     }
 
     /// Whether two meshes are the same for its tolerance.
-    fn same(&self, a: &Mesh<2>, b: &Mesh<2>) -> bool {
+    fn same<const D: usize>(&self, a: &Mesh<D>, b: &Mesh<D>) -> bool {
         let longest = a.extent().into_iter().fold(0.0, f64::max);
-        let off = |(a, b): (&[f64; 2], &[f64; 2])| larger((a[0] - b[0]).abs(), a[1] - b[1]);
+        let off = |(a, b): (&[f64; D], &[f64; D])| (0..D).fold(0.0, |m, d| larger(m, a[d] - b[d]));
         self.tolerance > 0.0 && a.x().iter().zip(b.x()).map(off).fold(0.0, larger) <= self.tolerance * longest
     }
 }
 
 /// One step, and what it cost.
-pub(super) struct Advanced {
-    pub state: State,
+pub(super) struct Advanced<const D: usize> {
+    pub state: State<D>,
     pub work: Work,
     pub interface: Option<Interface>,
     /// Error of the step in each unknown, where it was asked for.
@@ -90,12 +90,15 @@ pub(super) struct Stretch {
 ///
 /// # Errors
 /// What the mesh failed with at first, when all that safety allows was tried, or what the physics failed with.
-pub(super) fn attempt(
-    simulation: &mut Simulation,
-    state: &State,
+pub(super) fn attempt<const D: usize>(
+    simulation: &mut Simulation<D>,
+    state: &State<D>,
     stretch: Stretch,
     record: &mut Record,
-) -> Result<Advanced, Failure> {
+) -> Result<Advanced<D>, Failure>
+where
+    Mesh<D>: Cells<D>,
+{
     let Stretch { t, dt, scale, estimated } = stretch;
     let Simulation { physics, monitor, mover, coupling, safety, schedule } = simulation;
     mover.care = safety.care();
@@ -109,8 +112,8 @@ pub(super) fn attempt(
     let predicted = timed(&mut seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
     // a mesh whose way nobody has set goes no faster than is good for the solution
     let guarded = mover.equation.relaxation == Relaxation::Auto && !physics.is_given();
-    type Round = (Mesh<2>, Field, Option<Vec<f64>>, Vec<f64>, f64);
-    let mut latest: Option<Round> = None;
+    type Round<const D: usize> = (Mesh<D>, Field, Option<Vec<f64>>, Vec<f64>, f64);
+    let mut latest: Option<Round<D>> = None;
     for _ in 0..coupling.iterations {
         let mut retries = Retries::default();
         let mixed = state.gait.mixed(&rho, mover.equation.relaxation);
@@ -158,13 +161,22 @@ pub(super) fn attempt(
 }
 
 /// The mesh as far on its way as is good for the solution, and which share of the way that is.
-fn held_back(state: &State, predicted: &Predicted, mesh: Mesh<2>, dt: f64, schedule: &Schedule) -> (Mesh<2>, f64) {
+fn held_back<const D: usize>(
+    state: &State<D>,
+    predicted: &Predicted<D>,
+    mesh: Mesh<D>,
+    dt: f64,
+    schedule: &Schedule,
+) -> (Mesh<D>, f64)
+where
+    Mesh<D>: Cells<D>,
+{
     let from = &predicted.mesh;
     let share = journey::allowed(state, from, &mesh, dt, schedule.end() - schedule.start());
     if share == 1.0 {
         return (mesh, 1.0);
     }
-    let between = from.x().iter().zip(mesh.x()).map(|(a, b)| [0, 1].map(|d| a[d] + share * (b[d] - a[d])));
+    let between = from.x().iter().zip(mesh.x()).map(|(a, b)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d])));
     match from.moved(between.collect()) {
         Ok(held) if check_unfolded(&held).is_ok() => (held, share),
         _ => (from.clone(), 0.0),
@@ -177,9 +189,9 @@ fn held_back(state: &State, predicted: &Predicted, mesh: Mesh<2>, dt: f64, sched
 /// All steppers are trapezoidal: their error over a step is of the third order, that of two halves a quarter of it, and
 /// so a third of the difference. Formulas of several steps would be cheaper, but the nodes turn from step to step, and
 /// the bends would count as errors.
-fn stepped(
-    physics: &mut dyn Physics,
-    motion: Motion<'_>,
+fn stepped<const D: usize>(
+    physics: &mut dyn Physics<D>,
+    motion: Motion<'_, D>,
     u: &Field,
     estimated: bool,
 ) -> Result<(Field, Work, Option<Vec<f64>>), Failure> {
@@ -189,7 +201,7 @@ fn stepped(
     }
     let Motion { t, dt, old, new } = motion;
     let half = 0.5 * dt;
-    let between = old.x().iter().zip(new.x()).map(|(a, b)| [0, 1].map(|d| 0.5 * (a[d] + b[d])));
+    let between = old.x().iter().zip(new.x()).map(|(a, b)| std::array::from_fn(|d| 0.5 * (a[d] + b[d])));
     let middle = old.moved(between.collect())?;
     check_unfolded(&middle)?;
     let (first, cost) = physics.step(Motion { t, dt: half, old, new: &middle }, u)?;
@@ -203,11 +215,11 @@ fn stepped(
 
 /// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that
 /// is known exactly.
-pub(super) fn density(
-    physics: &dyn Physics,
-    monitor: &dyn Monitor,
+pub(super) fn density<const D: usize>(
+    physics: &dyn Physics<D>,
+    monitor: &dyn Monitor<D>,
     t: f64,
-    mesh: &Mesh<2>,
+    mesh: &Mesh<D>,
     u: &Field,
 ) -> Result<Vec<f64>, Failure> {
     let values = monitor.followed(t, mesh, u)?;

@@ -2,7 +2,7 @@
 
 use super::{Simulation, State};
 use crate::density::{NOISE_WORTH_A_WARNING, noise};
-use crate::geometry::{Field, Lattice, Mesh, cells_of, node_areas};
+use crate::geometry::{Cells, Field, Lattice, Mesh, node_areas};
 use crate::numerics::{larger, sum};
 
 /// Share of the content of an unknown whose loss is told.
@@ -17,11 +17,14 @@ const MOST_NODES: usize = 1 << 20;
 
 /// Warnings of a density that is noise at the cell scale, and of each unknown of which the mesh misses something at the
 /// start.
-pub(super) fn doubts(simulation: &Simulation, state: &State) -> Vec<String> {
+pub(super) fn doubts<const D: usize>(simulation: &Simulation<D>, state: &State<D>) -> Vec<String>
+where
+    Mesh<D>: Cells<D>,
+{
     noisy(simulation, state).into_iter().chain(missed(simulation, state)).collect()
 }
 
-fn noisy(simulation: &Simulation, state: &State) -> Option<String> {
+fn noisy<const D: usize>(simulation: &Simulation<D>, state: &State<D>) -> Option<String> {
     if !simulation.mover.generator.moves() {
         return None;
     }
@@ -38,9 +41,14 @@ fn noisy(simulation: &Simulation, state: &State) -> Option<String> {
 }
 
 /// What the mesh misses of each unknown at the start: of its content, or of what is too small to matter for that.
-fn missed(simulation: &Simulation, state: &State) -> Vec<String> {
+fn missed<const D: usize>(simulation: &Simulation<D>, state: &State<D>) -> Vec<String>
+where
+    Mesh<D>: Cells<D>,
+{
     let nodes: usize = state.mesh.lattice().cells().iter().product();
-    let Some(finer) = (2..=FINER).rev().step_by(2).find(|f| f * f * nodes <= MOST_NODES) else { return Vec::new() };
+    let Some(finer) = (2..=FINER).rev().step_by(2).find(|f: &usize| f.pow(D as u32) * nodes <= MOST_NODES) else {
+        return Vec::new();
+    };
     let names = simulation.physics.unknowns();
     let lost = References::new(simulation, state, finer);
     let lost = names.iter().enumerate().map(|(c, name)| lost.as_ref()?.lost(simulation, state, c, name));
@@ -49,25 +57,28 @@ fn missed(simulation: &Simulation, state: &State) -> Vec<String> {
 }
 
 /// The initial data on equal cells, a few times smaller than those of the mesh, and on cells twice as large.
-struct References {
-    finer: (Mesh<2>, Field),
-    coarser: (Mesh<2>, Field),
+struct References<const D: usize> {
+    finer: (Mesh<D>, Field),
+    coarser: (Mesh<D>, Field),
 }
 
-impl References {
-    fn new(simulation: &Simulation, state: &State, finer: usize) -> Option<Self> {
+impl<const D: usize> References<D>
+where
+    Mesh<D>: Cells<D>,
+{
+    fn new(simulation: &Simulation<D>, state: &State<D>, finer: usize) -> Option<Self> {
         let at = |finer| initial_on_equal_cells(simulation, state, finer);
         Some(Self { finer: at(finer)?, coarser: at(finer / 2)? })
     }
 
     /// The content of an unknown is ∫|u − m|, m its median over the domain. Where it on the finer cells and on the
     /// coarser ones differ as much as it and that of the mesh do, nothing is known.
-    fn lost(&self, simulation: &Simulation, state: &State, c: usize, name: &str) -> Option<String> {
+    fn lost(&self, simulation: &Simulation<D>, state: &State<D>, c: usize, name: &str) -> Option<String> {
         let nodal: Vec<f64> = state.u.component(c).collect();
         let values: Vec<f64> = self.finer.1.component(c).collect();
         let size = values.iter().fold(0.0, |m, u| larger(m, *u)) * of_box(&state.mesh);
         let median = median(values);
-        let content = |mesh: &Mesh<2>, u: &Field| {
+        let content = |mesh: &Mesh<D>, u: &Field| {
             sum(node_areas(mesh).into_iter().zip(u.component(c)).map(|(area, u)| area * (u - median).abs()))
         };
         let [there, twice] = [&self.finer, &self.coarser].map(|(mesh, u)| content(mesh, u));
@@ -87,7 +98,10 @@ impl References {
 
 /// What is small and lies between the nodes: a value within a cell that is far outside of those at the nodes around it.
 /// It is looked for within every cell, and on equal cells, since a blob may be smaller than what divides a wide cell.
-fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<String>> {
+fn hidden<const D: usize>(simulation: &Simulation<D>, state: &State<D>, finer: usize) -> Vec<Option<String>>
+where
+    Mesh<D>: Cells<D>,
+{
     let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
     let cells = lattice.cells();
     let Ok(within) = mesh.resampled(cells.map(|n| finer * n)) else { return Vec::new() };
@@ -98,7 +112,7 @@ fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<St
     let mut looked = vec![(simulation.physics.initial(state.t, &within), (0..within.x().len()).map(own).collect())];
     let mut places = vec![within];
     if let Some((equal, data)) = initial_on_equal_cells(simulation, state, finer) {
-        looked.push((data, cells_of(mesh, equal.x().iter().copied())));
+        looked.push((data, mesh.holding(equal.x().iter().copied())));
         places.push(equal);
     }
     let names = simulation.physics.unknowns();
@@ -108,11 +122,11 @@ fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<St
         let looks = looked.iter().zip(&places);
         let all = looks.map(|((data, cells), places)| worst(lattice, &nodal, data, c, cells, places));
         let (off, x, value, [least, most]) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let [x, y] = mesh.image(x);
         (off > HIDDEN * (high - low)).then(|| {
             format!(
-                "`{name}`: between the nodes of the mesh at the start, at x = {x:.6}, y = {y:.6}, its initial data are \
-                 {value:.3e}, and {least:.3e} to {most:.3e} at the nodes around: the mesh does not see that; {}",
+                "`{name}`: between the nodes of the mesh at the start, at {}, its initial data are {value:.3e}, and \
+                 {least:.3e} to {most:.3e} at the nodes around: the mesh does not see that; {}",
+                named(mesh.image(x)),
                 remedy(simulation, state, &nodal)
             )
         })
@@ -122,15 +136,15 @@ fn hidden(simulation: &Simulation, state: &State, finer: usize) -> Vec<Option<St
 
 /// The value of some data that is farthest beyond those at the nodes around its cell: by how much, where, and what both
 /// are.
-fn worst(
-    lattice: &Lattice<2>,
+fn worst<const D: usize>(
+    lattice: &Lattice<D>,
     nodal: &[f64],
     data: &Field,
     c: usize,
-    cells: &[[usize; 2]],
-    places: &Mesh<2>,
-) -> (f64, [f64; 2], f64, [f64; 2]) {
-    let mut worst = (f64::NEG_INFINITY, [0.0; 2], 0.0, [0.0; 2]);
+    cells: &[[usize; D]],
+    places: &Mesh<D>,
+) -> (f64, [f64; D], f64, [f64; 2]) {
+    let mut worst = (f64::NEG_INFINITY, [0.0; D], 0.0, [0.0; 2]);
     for ((value, &cell), &x) in data.component(c).zip(cells).zip(places.x()) {
         let around @ [least, most] = around(lattice, nodal, cell);
         let off = (least - value).max(value - most);
@@ -142,18 +156,24 @@ fn worst(
 }
 
 /// The least and the largest value at the corners of a cell and the nodes next to them.
-fn around(lattice: &Lattice<2>, nodal: &[f64], cell: [usize; 2]) -> [f64; 2] {
+fn around<const D: usize>(lattice: &Lattice<D>, nodal: &[f64], cell: [usize; D]) -> [f64; 2] {
     let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
     let place = |d: usize, step: usize| match periodic[d] {
         true => (cell[d] + nodes[d] + step - 1) % nodes[d],
         false => (cell[d] + step).saturating_sub(1).min(nodes[d] - 1),
     };
-    let all = (0..4).flat_map(|i| (0..4).map(move |j| [i, j]));
-    ends(all.map(|[i, j]| nodal[lattice.index([place(0, i), place(1, j)])]))
+    let all = (0..4_usize.pow(D as u32)).map(|k| std::array::from_fn(|d| place(d, k >> (2 * (D - 1 - d)) & 3)));
+    ends(all.map(|node| nodal[lattice.index(node)]))
+}
+
+/// A place in words: "x = 1.000000, y = 2.000000".
+fn named<const D: usize>(x: [f64; D]) -> String {
+    let words = ["x", "y", "z"].iter().zip(x).map(|(axis, x)| format!("{axis} = {x:.6}"));
+    words.collect::<Vec<_>>().join(", ")
 }
 
 /// What makes a mesh see an unknown at the start.
-fn remedy(simulation: &Simulation, state: &State, nodal: &[f64]) -> &'static str {
+fn remedy<const D: usize>(simulation: &Simulation<D>, state: &State<D>, nodal: &[f64]) -> &'static str {
     let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u);
     match followed.is_ok_and(|followed| followed == nodal) {
         true => "refine `grid.cells`, or make it wider",
@@ -166,7 +186,11 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(u), high.max(u)])
 }
 
-fn initial_on_equal_cells(simulation: &Simulation, state: &State, finer: usize) -> Option<(Mesh<2>, Field)> {
+fn initial_on_equal_cells<const D: usize>(
+    simulation: &Simulation<D>,
+    state: &State<D>,
+    finer: usize,
+) -> Option<(Mesh<D>, Field)> {
     let of = &state.mesh;
     let lattice = Lattice::new(of.lattice().cells().map(|n| finer * n), of.lattice().periodic()).ok()?;
     let mesh = Mesh::uniform(lattice, of.lower(), of.upper()).ok()?;
@@ -174,7 +198,7 @@ fn initial_on_equal_cells(simulation: &Simulation, state: &State, finer: usize) 
     u.values().iter().all(|u| u.is_finite()).then_some((mesh, u))
 }
 
-fn of_box(mesh: &Mesh<2>) -> f64 {
+fn of_box<const D: usize>(mesh: &Mesh<D>) -> f64 {
     mesh.extent().iter().product()
 }
 

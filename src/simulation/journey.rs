@@ -2,7 +2,7 @@
 
 use super::State;
 use crate::density::need;
-use crate::geometry::{DualCells, Field, Mesh, padded};
+use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
@@ -28,19 +28,25 @@ const INTERPOLATION: f64 = 0.2;
 /// be takes its time: over a run it adds no more than a share of the error that equal cells have. Where the solution
 /// changes by itself, a mesh that follows may add a share of that change, unless equal cells resolve it: there is no
 /// hurry on the way back to them.
-pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span: f64) -> f64 {
+pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
+where
+    Mesh<D>: Cells<D>,
+{
     let (begin, end) = (DualCells::new(from), DualCells::new(to));
     let swept = begin.swept(&end);
     let patch = *begin.patch();
     let strides = patch.padded_strides();
     let metrics = Metrics::new(&state.mesh);
     let lattice = state.mesh.lattice();
-    let h = [0, 1].map(|d| state.mesh.extent()[d] / lattice.cells()[d] as f64);
+    let h: [f64; D] = std::array::from_fn(|d| state.mesh.extent()[d] / lattice.cells()[d] as f64);
     let unknowns: Vec<(Vec<f64>, f64, f64)> = (0..state.u.components())
         .map(|c| (state.u.component(c).collect::<Vec<f64>>(), range(&state.u, c)))
         .filter(|(_, range)| *range > 0.0)
         .map(|(values, range)| {
-            let slopes = metrics.gradient(&values).into_iter().map(|g| (g[0] * h[0]).hypot(g[1] * h[1]));
+            let slopes = metrics
+                .gradient(&values)
+                .into_iter()
+                .map(|g| length(std::array::from_fn::<f64, D, _>(|d| g[d] * h[d])));
             let over_cell = slopes.fold(0.0, larger) / range;
             (values, range, over_cell)
         })
@@ -49,8 +55,8 @@ pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span
     let hurry = unknowns.iter().fold(0.0, |m, (_, _, over_cell)| larger(m, need(*over_cell)));
     let mut share = 1.0_f64;
     for (values, range, over_cell) in unknowns {
-        let u: Vec<f64> = padded(lattice, values.as_chunks::<1>().0, [[0.0]; 2]).into_flattened();
-        let mut second = vec![[0.0; 2]; u.len()];
+        let u: Vec<f64> = padded(lattice, values.as_chunks::<1>().0, [[0.0]; D]).into_flattened();
+        let mut second = vec![[0.0; D]; u.len()];
         for k in patch.places() {
             second[k] = strides.map(|s| u[k - s] - 2.0 * u[k] + u[k + s]);
         }
@@ -59,7 +65,7 @@ pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span
         let harms = patch
             .places()
             .zip(end.areas())
-            .map(|(k, area)| (0..2).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
+            .map(|(k, area)| (0..D).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
         let uniform = INTERPOLATION * over_cell * over_cell;
         let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + OF_CHANGE * hurry * state.own_change * dt;
@@ -71,7 +77,10 @@ pub(super) fn allowed(state: &State, from: &Mesh<2>, to: &Mesh<2>, dt: f64, span
 }
 
 /// The largest change of an unknown at a fixed place in a step, as a share of its range, over the time that it took.
-pub(super) fn own_change(before: &State, mesh: &Mesh<2>, u: &Field, dt: f64) -> f64 {
+pub(super) fn own_change<const D: usize>(before: &State<D>, mesh: &Mesh<D>, u: &Field, dt: f64) -> f64
+where
+    Mesh<D>: Cells<D>,
+{
     let share = |c: usize| {
         let range = range(u, c).max(range(&before.u, c));
         if range > 0.0 { change(before, mesh, u, c) / range } else { 0.0 }
@@ -80,17 +89,23 @@ pub(super) fn own_change(before: &State, mesh: &Mesh<2>, u: &Field, dt: f64) -> 
 }
 
 /// The largest change of an unknown at a fixed place, past which the nodes move.
-pub(super) fn change_in_place(before: &State, after: &State, c: usize) -> f64 {
+pub(super) fn change_in_place<const D: usize>(before: &State<D>, after: &State<D>, c: usize) -> f64
+where
+    Mesh<D>: Cells<D>,
+{
     change(before, &after.mesh, &after.u, c)
 }
 
-fn change(before: &State, mesh: &Mesh<2>, u: &Field, c: usize) -> f64 {
+fn change<const D: usize>(before: &State<D>, mesh: &Mesh<D>, u: &Field, c: usize) -> f64
+where
+    Mesh<D>: Cells<D>,
+{
     let (from, to) = (DualCells::new(&before.mesh), DualCells::new(mesh));
     let swept = from.swept(&to);
     let strides = to.patch().padded_strides();
     let [old, new] = [&before.u, u].map(|u| {
         let values: Vec<[f64; 1]> = u.component(c).map(|u| [u]).collect();
-        padded(mesh.lattice(), &values, [[0.0]; 2])
+        padded(mesh.lattice(), &values, [[0.0]; D])
     });
     let middle = |k: usize, n: usize| 0.25 * ((old[k][0] + old[n][0]) + (new[k][0] + new[n][0]));
     let changes = to.patch().places().enumerate().map(|(i, k)| {

@@ -25,30 +25,31 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Field, Mesh, Quality, check_unfolded, largest, quality_and_integral};
+use crate::geometry::{Cells, Field, Mesh, Quality, check_unfolded, largest};
 use crate::kept::Kept;
-use crate::meshing::Interface;
+use crate::meshing::{Interface, Movable};
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use crate::stopwatch::Stopwatch;
 use pace::Pace;
+use std::any::Any;
 use std::time::Instant;
 
 /// Everything that changes from step to step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct State {
+pub struct State<const D: usize = 2> {
     /// Time.
     pub t: f64,
     /// Steps done.
     pub step: usize,
     /// The mesh.
-    pub mesh: Mesh<2>,
+    pub mesh: Mesh<D>,
     /// The solution on it.
     pub u: Field,
     /// The density that follows from both: what moves the mesh next.
     pub rho: Vec<f64>,
     /// How the mesh was going.
-    pub gait: Gait,
+    pub gait: Gait<D>,
     /// How fast the solution changes by itself: the largest change at a fixed place in the last step, as a share of its
     /// range, over the time that it took; 0 before the first step.
     pub own_change: f64,
@@ -77,13 +78,13 @@ pub struct State {
 /// assert!(record.reports[0].quality.min_scaled_jacobian > 0.0);
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
-pub struct Simulation {
+pub struct Simulation<const D: usize = 2> {
     /// The equation on the mesh.
-    pub physics: Box<dyn Physics>,
+    pub physics: Box<dyn Physics<D>>,
     /// Where the mesh should be fine.
-    pub monitor: Box<dyn Monitor>,
+    pub monitor: Box<dyn Monitor<D>>,
     /// How the mesh follows it; how often it tries again is for `safety` to say.
-    pub mover: Mover,
+    pub mover: Mover<D>,
     /// How often mesh and physics alternate in a step.
     pub coupling: Coupling,
     /// How far a step that fails is tried again.
@@ -94,12 +95,15 @@ pub struct Simulation {
 
 /// Standard error of interface values, as a share of the shortest edge, above which a run says so.
 pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
-impl Simulation {
+impl<const D: usize> Simulation<D>
+where
+    Mesh<D>: Movable<D>,
+{
     /// The state at the start, on a given mesh.
     ///
     /// # Errors
     /// [`Error::Failed`] where the mesh is folded or the initial solution has no finite density.
-    pub fn start(&self, mesh: Mesh<2>) -> Result<State> {
+    pub fn start(&self, mesh: Mesh<D>) -> Result<State<D>> {
         let t = self.schedule.start();
         let at_start = |failure| self.at_start(failure);
         check_unfolded(&mesh).map_err(at_start)?;
@@ -107,7 +111,7 @@ impl Simulation {
         self.physics.check(t, &mesh, &u).map_err(at_start)?;
         if let Some(place) = u.values().iter().position(|v| !v.is_finite()) {
             let (value, k) = (u.values()[place], place / u.components());
-            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+            let (node, x) = mesh.told(k);
             return Err(at_start(Failure::NonFinite { what: "the initial solution", value, node, x }));
         }
         let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
@@ -123,10 +127,10 @@ impl Simulation {
     /// # Errors
     /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer
     /// returned.
-    pub fn adapted(&self, mesh: Mesh<2>, observers: &mut [&mut dyn Observer]) -> Result<Start> {
+    pub fn adapted(&self, mesh: Mesh<D>, observers: &mut [&mut dyn Observer]) -> Result<Start<D>> {
         mover::adapted(mesh, self.mover.equation.form, |mesh| {
             let state = self.with_sides(self.start(mesh.clone())?)?;
-            observers.iter_mut().try_for_each(|observer| observer.adapting(&state))?;
+            observers.iter_mut().try_for_each(|observer| observer.adapting(state.t))?;
             end_where_asked(observers, &state)?;
             let u = self.monitor.followed(state.t, &state.mesh, &state.u).map_err(|failure| self.at_start(failure))?;
             Ok((u, state.rho))
@@ -135,7 +139,7 @@ impl Simulation {
 
     /// A start with the values that its sides will have: where they differ from the initial solution, a layer begins
     /// there.
-    fn with_sides(&self, mut state: State) -> Result<State> {
+    fn with_sides(&self, mut state: State<D>) -> Result<State<D>> {
         let (lattice, count) = (*state.mesh.lattice(), state.u.components());
         let mut differs = false;
         for k in lattice.sides() {
@@ -157,7 +161,7 @@ impl Simulation {
 
     /// What the user should know of a start although nothing failed: a density that is noise at the scale of its cells,
     /// and unknowns of which the mesh misses something.
-    pub fn doubts(&self, start: &State) -> Vec<String> {
+    pub fn doubts(&self, start: &State<D>) -> Vec<String> {
         doubts::doubts(self, start)
     }
 
@@ -171,17 +175,22 @@ impl Simulation {
     ///
     /// # Errors
     /// [`Error::Failed`] with the time and step of a numerical failure, or what an observer returned.
-    pub fn run(&mut self, state: &mut State, record: &mut Record, observers: &mut [&mut dyn Observer]) -> Result<()> {
+    pub fn run(
+        &mut self,
+        state: &mut State<D>,
+        record: &mut Record,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<()> {
         self.run_on(state, record, observers, None, None)
     }
 
     /// The same with checkpoints, and from where the one left off that the state is of.
     pub(crate) fn run_on(
         &mut self,
-        state: &mut State,
+        state: &mut State<D>,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        keeper: Option<&mut dyn Keeper>,
+        keeper: Option<&mut dyn Keeper<D>>,
         course: Option<Course>,
     ) -> Result<()> {
         record.timed(|record| self.run_steps(state, record, observers, keeper, course))
@@ -189,10 +198,10 @@ impl Simulation {
 
     fn run_steps(
         &mut self,
-        state: &mut State,
+        state: &mut State<D>,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        mut keeper: Option<&mut dyn Keeper>,
+        mut keeper: Option<&mut dyn Keeper<D>>,
         course: Option<Course>,
     ) -> Result<()> {
         let clock = Clock::start(course.as_ref(), record);
@@ -245,10 +254,10 @@ impl Simulation {
     /// Writes a checkpoint where one is due, and ends the run where an observer asks for that.
     fn pause(
         &self,
-        state: &State,
+        state: &State<D>,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        keeper: &mut Option<&mut dyn Keeper>,
+        keeper: &mut Option<&mut dyn Keeper<D>>,
         clock: &Clock,
         course: impl FnOnce() -> Course,
     ) -> Result<()> {
@@ -263,10 +272,10 @@ impl Simulation {
 
     fn checkpoint(
         &self,
-        state: &State,
+        state: &State<D>,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-        keeper: &mut dyn Keeper,
+        keeper: &mut dyn Keeper<D>,
         clock: &Clock,
         course: Course,
     ) -> Result<()> {
@@ -282,7 +291,7 @@ impl Simulation {
     fn show(
         &self,
         event: Event,
-        state: &State,
+        state: &State<D>,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
         dt: f64,
@@ -301,7 +310,7 @@ impl Simulation {
             share: (state.t - self.schedule.start()) / (self.schedule.end() - self.schedule.start()),
             smallest: quality.min_scaled_jacobian,
             seconds: clock.seconds(),
-            nodes: state.mesh.x(),
+            nodes: in_plane(&state.mesh).map_or(&[], Mesh::x),
             scene: &|| state.scene(&self.physics.unknowns()),
             moving: Some(Moving { state, quality, error, work: record.work, interface: record.interface }),
         };
@@ -311,9 +320,9 @@ impl Simulation {
     }
 
     /// Quality of the mesh, and the error where an exact solution is known.
-    fn assess(&self, state: &State) -> (Quality, Option<ErrorNorms>) {
+    fn assess(&self, state: &State<D>) -> (Quality, Option<ErrorNorms>) {
         let Some(exact) = self.physics.exact(state.t, &state.mesh) else {
-            return (quality_and_integral(&state.mesh, &state.rho, &state.rho).0, None);
+            return (state.mesh.quality_and_integral(&state.rho, &state.rho).0, None);
         };
         let known = self.physics.known();
         let (mut linf, mut squares) = (0.0_f64, vec![0.0; state.mesh.x().len()]);
@@ -322,17 +331,15 @@ impl Simulation {
             linf = linf.max(largest(&errors));
             squares.iter_mut().zip(&errors).for_each(|(square, error)| *square += error * error);
         }
-        let (quality, integral) = quality_and_integral(&state.mesh, &state.rho, &squares);
-        let [width, height] = state.mesh.extent();
-        let mean = integral / (width * height * known.len() as f64);
+        let (quality, integral) = state.mesh.quality_and_integral(&state.rho, &squares);
+        let mean = integral / (state.mesh.extent().iter().product::<f64>() * known.len() as f64);
         (quality, Some(ErrorNorms { linf, l2: mean.sqrt() }))
     }
 
-    fn report(&self, state: &State, mass_at_start: f64, interface: Option<Interface>) -> Report {
+    fn report(&self, state: &State<D>, mass_at_start: f64, interface: Option<Interface>) -> Report {
         let mass = self.physics.conserved(&state.mesh, &state.u);
         // an integral that began with nothing but rounding is no measure
-        let [width, height] = state.mesh.extent();
-        let rounding = 1e-12 * width * height * largest(state.u.values());
+        let rounding = 1e-12 * state.mesh.extent().iter().product::<f64>() * largest(state.u.values());
         let size = if mass_at_start.abs() > rounding { mass_at_start.abs() } else { 1.0 };
         let drift = (mass - mass_at_start) / size;
         let (quality, error) = self.assess(state);
@@ -350,8 +357,13 @@ impl Simulation {
     }
 }
 
+/// A mesh of two dimensions as one; none of another.
+fn in_plane<const D: usize>(mesh: &Mesh<D>) -> Option<&Mesh<2>> {
+    (mesh as &dyn Any).downcast_ref()
+}
+
 /// Ends a run where an observer asks for that.
-fn end_where_asked(observers: &[&mut dyn Observer], state: &State) -> Result<()> {
+fn end_where_asked<const D: usize>(observers: &[&mut dyn Observer], state: &State<D>) -> Result<()> {
     match observers.iter().any(|observer| observer.interrupts()) {
         true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
         false => Ok(()),

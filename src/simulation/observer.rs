@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::geometry::Quality;
 use crate::kept::Kept;
 use crate::meshing::Interface;
+use std::any::Any;
 
 /// What just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,8 +48,8 @@ pub struct Snapshot<'a> {
 /// What an observer sees of a simulation of a moving mesh beside what runs of all kinds have.
 #[derive(Debug)]
 pub struct Moving<'a> {
-    /// Time, mesh, solution and density.
-    pub state: &'a State,
+    /// Time, mesh, solution and density: a [`State`] of the dimension of the mesh, which [`Snapshot::state`] finds.
+    pub state: &'a dyn Any,
     /// Quality of the mesh.
     pub quality: Quality,
     /// Error of the solution where an exact one is known.
@@ -60,9 +61,9 @@ pub struct Moving<'a> {
 }
 
 impl<'a> Snapshot<'a> {
-    /// The state of a moving mesh; none of a run of another kind.
-    pub fn state(&self) -> Option<&'a State> {
-        self.moving.as_ref().map(|moving| moving.state)
+    /// The state of a moving mesh of D dimensions; none of a run of another kind.
+    pub fn state<const D: usize>(&self) -> Option<&'a State<D>> {
+        self.moving.as_ref().and_then(|moving| moving.state.downcast_ref())
     }
 }
 
@@ -74,12 +75,12 @@ pub trait Observer {
     /// Whatever stops the observer from doing its work, such as a full disk.
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()>;
 
-    /// Called before the run, with every mesh on the way to the one that is adapted to the initial solution. An error
-    /// ends the run.
+    /// Called before the run, for every mesh on the way to the one that is adapted to the initial solution at time t. An
+    /// error ends the run.
     ///
     /// # Errors
     /// Whatever stops the observer from doing its work.
-    fn adapting(&mut self, _state: &State) -> Result<()> {
+    fn adapting(&mut self, _t: f64) -> Result<()> {
         Ok(())
     }
 

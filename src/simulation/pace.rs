@@ -5,8 +5,8 @@ use super::safety::{Safety, divided};
 use super::schedule::{Schedule, Steps};
 use super::{Record, Simulation, State};
 use crate::error::{Cause, Error, Failure, Moment, Result};
-use crate::geometry::{Field, Lattice};
-use crate::meshing::Relaxation;
+use crate::geometry::{Field, Lattice, Mesh};
+use crate::meshing::{Movable, Relaxation};
 use crate::numerics::larger;
 use crate::physics::Motion;
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,10 @@ pub(crate) enum Pace {
 
 impl Pace {
     /// Before the first step from a state.
-    pub fn new(simulation: &mut Simulation, state: &State) -> Result<Self> {
+    pub fn new<const D: usize>(simulation: &mut Simulation<D>, state: &State<D>) -> Result<Self>
+    where
+        Mesh<D>: Movable<D>,
+    {
         match simulation.schedule.decided_by() {
             Steps::Even => Ok(Self::Even { halvings: 0 }),
             Steps::ByChange => Ok(Self::Free(Free::new(simulation, state, None, None)?)),
@@ -48,7 +51,7 @@ impl Pace {
     }
 
     /// The time after the next step, and its length; none at the end.
-    pub fn next(&self, schedule: &Schedule, state: &State) -> Option<(f64, f64)> {
+    pub fn next<const D: usize>(&self, schedule: &Schedule, state: &State<D>) -> Option<(f64, f64)> {
         match self {
             Self::Even { .. } => Some((schedule.time(state.step + 1), schedule.step_from(state.step)?)),
             Self::Free(free) => schedule.after(state.t, free.dt).map(|t| (t, t - state.t)),
@@ -59,13 +62,16 @@ impl Pace {
     ///
     /// # Errors
     /// What it failed with when all was tried.
-    pub(super) fn step(
+    pub(super) fn step<const D: usize>(
         &mut self,
-        simulation: &mut Simulation,
-        state: &State,
+        simulation: &mut Simulation<D>,
+        state: &State<D>,
         (t, dt): (f64, f64),
         record: &mut Record,
-    ) -> Result<Option<Advanced>, Failure> {
+    ) -> Result<Option<Advanced<D>>, Failure>
+    where
+        Mesh<D>: Movable<D>,
+    {
         match self {
             Self::Even { halvings } => {
                 let stretch = Stretch { t, dt, scale: dt, estimated: false };
@@ -135,7 +141,15 @@ const TRIALS: usize = 3;
 const OF_ROUNDING: f64 = 1e-9;
 
 impl Free {
-    fn new(simulation: &mut Simulation, state: &State, control: Option<Control>, first: Option<f64>) -> Result<Self> {
+    fn new<const D: usize>(
+        simulation: &mut Simulation<D>,
+        state: &State<D>,
+        control: Option<Control>,
+        first: Option<f64>,
+    ) -> Result<Self>
+    where
+        Mesh<D>: Movable<D>,
+    {
         let ranges: Vec<f64> = (0..state.u.components()).map(|c| range(&state.u, c)).collect();
         let free = |dt: f64, longest: f64| Self {
             dt,
@@ -184,13 +198,16 @@ impl Free {
     /// # Errors
     /// What a step failed with once it was halved as often as may be, or [`Failure::VanishingStep`], where the next
     /// would be too short.
-    fn judge(
+    fn judge<const D: usize>(
         &mut self,
-        simulation: &mut Simulation,
-        before: &State,
-        step: Result<Advanced, Failure>,
+        simulation: &mut Simulation<D>,
+        before: &State<D>,
+        step: Result<Advanced<D>, Failure>,
         record: &mut Record,
-    ) -> Result<Option<Advanced>, Failure> {
+    ) -> Result<Option<Advanced<D>>, Failure>
+    where
+        Mesh<D>: Movable<D>,
+    {
         let step = match step {
             Ok(step) => step,
             Err(failure) => {
@@ -259,7 +276,16 @@ impl Free {
     }
 
     /// What makes steps as short as this one.
-    fn cause(&self, simulation: &mut Simulation, before: &State, after: &State, dt: f64) -> Cause {
+    fn cause<const D: usize>(
+        &self,
+        simulation: &mut Simulation<D>,
+        before: &State<D>,
+        after: &State<D>,
+        dt: f64,
+    ) -> Cause
+    where
+        Mesh<D>: Movable<D>,
+    {
         let change = change_at_nodes(after.mesh.lattice(), &before.u, &after.u);
         let (start, end) = (simulation.schedule.start(), simulation.schedule.end());
         if range(&after.u, 0) - range(&before.u, 0) > GROWS * change {
@@ -274,7 +300,10 @@ impl Free {
     }
 
     /// The change in the next step if the mesh rested; infinite where that fails.
-    fn share_at_rest(&self, simulation: &mut Simulation, State { t, mesh, u, .. }: &State) -> f64 {
+    fn share_at_rest<const D: usize>(&self, simulation: &mut Simulation<D>, State { t, mesh, u, .. }: &State<D>) -> f64
+    where
+        Mesh<D>: Movable<D>,
+    {
         let motion = Motion { t: *t, dt: self.dt, old: mesh, new: mesh };
         let after = simulation.physics.step(motion, u);
         after.map_or(f64::INFINITY, |(after, _)| share(change_at_nodes(mesh.lattice(), u, &after), self.ranges[0]))
@@ -283,7 +312,10 @@ impl Free {
 
 /// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic
 /// length.
-pub(super) fn rushed(simulation: &Simulation, before: &State, after: &State) -> bool {
+pub(super) fn rushed<const D: usize>(simulation: &Simulation<D>, before: &State<D>, after: &State<D>) -> bool
+where
+    Mesh<D>: Movable<D>,
+{
     let follows = simulation.mover.equation.relaxation == Relaxation::Auto && simulation.mover.generator.moves();
     let range = range(&before.u, 0).max(range(&after.u, 0));
     follows
@@ -300,9 +332,9 @@ fn relative(errors: &[f64], ranges: &[f64]) -> f64 {
 
 /// The largest change of the first unknown at a node inside. On sides, where values are
 /// given, nothing has to be solved for.
-fn change_at_nodes(lattice: &Lattice<2>, before: &Field, after: &Field) -> f64 {
+fn change_at_nodes<const D: usize>(lattice: &Lattice<D>, before: &Field, after: &Field) -> f64 {
     let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
-    let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; 2]);
+    let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; D]);
     inside.fold(0.0, |m, (_, change)| larger(m, change))
 }
 

@@ -3,6 +3,8 @@
 use super::coupling::{Advanced, Stretch, attempt};
 use super::{Record, Simulation, State, pace};
 use crate::error::{Error, Failure, Result};
+use crate::geometry::Mesh;
+use crate::meshing::Movable;
 use crate::mover::Care;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -89,13 +91,16 @@ impl Safety {
 /// One step in 2^`parts` parts, or in as many as it takes; with the halvings that it took.
 ///
 /// What it fails with is what its last part failed with.
-pub(super) fn divided(
-    simulation: &mut Simulation,
-    state: &State,
+pub(super) fn divided<const D: usize>(
+    simulation: &mut Simulation<D>,
+    state: &State<D>,
     stretch: Stretch,
     [parts, done]: [usize; 2],
     record: &mut Record,
-) -> Result<(Advanced, usize), Failure> {
+) -> Result<(Advanced<D>, usize), Failure>
+where
+    Mesh<D>: Movable<D>,
+{
     if parts == 0 {
         match attempt(simulation, state, stretch, record) {
             Ok(advanced) if done == simulation.safety.halvings || !pace::rushed(simulation, state, &advanced.state) => {

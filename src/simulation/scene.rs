@@ -1,7 +1,7 @@
 //! What can be drawn, written and shown of a run of any kind of study.
 
 use super::State;
-use crate::geometry::{Mesh, cell_jacobians, cell_qualities};
+use crate::geometry::{Cells, Mesh, cell_jacobians, cell_qualities, first_two};
 
 /// Points with values at one time, in the order of a lattice of cells
 ///
@@ -55,25 +55,30 @@ pub enum Values {
 }
 
 impl Scene {
-    /// A mesh with named values at its nodes (in lattice order, without the repeated ones), and in its cells the shape
-    /// measure Q and the smallest corner Jacobian.
-    pub fn of_mesh(t: f64, step: usize, mesh: &Mesh<2>, nodal: Vec<(String, Vec<f64>)>) -> Self {
+    /// A mesh with named values at its nodes (in lattice order, without the repeated ones), and in its cells the
+    /// smallest corner Jacobian and in the plane the shape measure Q.
+    pub fn of_mesh<const D: usize>(t: f64, step: usize, mesh: &Mesh<D>, nodal: Vec<(String, Vec<f64>)>) -> Self
+    where
+        Mesh<D>: Cells<D>,
+    {
         let lattice = mesh.lattice();
         let closed = |(name, values): (String, Vec<f64>)| (name, Values::Scalars(lattice.closed(&values).into_owned()));
         let mut scene = Self {
             t,
             step,
-            cells: lattice.cells(),
-            periodic: lattice.periodic(),
-            lower: mesh.lower(),
-            extent: mesh.extent(),
-            points: mesh.closed().into_owned(),
+            cells: first_two(&lattice.cells()),
+            periodic: first_two(&lattice.periodic()),
+            lower: first_two(&mesh.lower()),
+            extent: first_two(&mesh.extent()),
+            points: mesh.closed().iter().map(|x| first_two(x)).collect(),
             nodal: nodal.into_iter().map(closed).collect(),
             density: None,
             in_cells: Vec::new(),
             curve: Vec::new(),
         };
-        scene.add_to_cells("Q", Values::Scalars(cell_qualities(mesh)));
+        if D > 1 {
+            scene.add_to_cells("Q", Values::Scalars(cell_qualities(mesh)));
+        }
         scene.add_to_cells("jacobian", Values::Scalars(cell_jacobians(mesh)));
         scene
     }
@@ -90,7 +95,10 @@ impl Scene {
     }
 }
 
-impl State {
+impl<const D: usize> State<D>
+where
+    Mesh<D>: Cells<D>,
+{
     /// The mesh with the unknowns, by their names, and with its density.
     pub fn scene(&self, unknowns: &[String]) -> Scene {
         let named = unknowns.iter().enumerate().map(|(c, name)| (name.clone(), self.u.component(c).collect()));

@@ -1,7 +1,8 @@
 //! What a run says once while it goes on: meshes that cannot rest, interface values that are noisy.
 
 use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State};
-use crate::meshing::Relaxation;
+use crate::geometry::Mesh;
+use crate::meshing::{Movable, Relaxation};
 use crate::mover;
 
 /// More time steps in τ than any layer needs: what a mesh moves by then is little more than noise.
@@ -11,9 +12,12 @@ const RESTLESS: &str = "the mesh hardly follows its density any more";
 const NOISY: &str = "interface values are noisy";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
-impl Simulation {
+impl<const D: usize> Simulation<D>
+where
+    Mesh<D>: Movable<D>,
+{
     /// Says once in a run that the mesh turns back from step to step, and with which τ it would rest on this solution.
-    pub(super) fn warn_of_unrest(&self, state: &State, dt: f64, record: &mut Record) {
+    pub(super) fn warn_of_unrest(&self, state: &State<D>, dt: f64, record: &mut Record) {
         let relaxation = self.mover.equation.relaxation;
         let hardly_follows = relaxation == Relaxation::Auto && state.gait.steps() > HARDLY_FOLLOWS;
         if !(hardly_follows || relaxation != Relaxation::Auto && state.gait.is_restless())
@@ -47,7 +51,7 @@ impl Simulation {
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.
-    pub(super) fn warn_of_noise(&self, state: &State, record: &mut Record) {
+    pub(super) fn warn_of_noise(&self, state: &State<D>, record: &mut Record) {
         let Some(interface) = record.interface.filter(|i| i.walks > 0) else { return };
         let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * NOISE_WORTH_A_WARNING);
         let warning = match percent {

@@ -52,7 +52,7 @@ impl Kind for MovingMesh {
         });
         monitor.check().map_err(|error| error.within("monitor"))?;
         let unknowns = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?.unknowns();
-        monitor.clone().into_monitor(&unknowns).map_err(|error| error.within("monitor"))?;
+        monitor.clone().into_monitor::<2>(&unknowns).map_err(|error| error.within("monitor"))?;
         if prescribed_density && !matches!(monitor, MonitorKind::GivenTable(_)) {
             let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
             return Err(Error::invalid("monitor.kind", format!("\"{}\"", monitor.name()), rule));

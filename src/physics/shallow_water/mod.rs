@@ -235,7 +235,7 @@ impl Physics for ShallowWater {
         if let Some(axis) = lattice.periodic().iter().position(|periodic| !periodic) {
             return Err(Failure::NotPeriodic { what: "the shallow water equations", axis });
         }
-        let start = nodal::<3>(motion, u)?;
+        let start = nodal::<2, 3>(motion, u)?;
         check(old, start)?;
         let patch = Patch::whole(lattice);
         let w = patch.gather(lattice, start, [[0.0; 3]; 2]);

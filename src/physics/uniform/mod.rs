@@ -133,8 +133,8 @@ impl Physics for UniformBurgers {
     }
 
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
-        let start = nodal::<1>(motion, u)?.as_flattened();
-        check_finite(["u"], motion.new, nodal::<1>(motion, u)?)?;
+        let start = nodal::<2, 1>(motion, u)?.as_flattened();
+        check_finite(["u"], motion.new, nodal::<2, 1>(motion, u)?)?;
         [motion.old, motion.new].into_iter().try_for_each(check_uniform)?;
         match self.order {
             2 => self.advance::<1>(motion, start),
