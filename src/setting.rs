@@ -129,12 +129,86 @@ pub(crate) fn texts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeM
     Ok(entries.into_iter().map(|(name, Text(text))| (name, text)).collect())
 }
 
-/// Pairs of formulas by name.
-pub(crate) fn text_pairs<'de, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<BTreeMap<String, [String; 2]>, D::Error> {
-    #[derive(Deserialize)]
-    struct Pair(#[serde(deserialize_with = "pair")] [Text; 2]);
-    let entries = BTreeMap::<String, Pair>::deserialize(deserializer)?;
-    Ok(entries.into_iter().map(|(name, Pair(texts))| (name, texts.map(|Text(text)| text))).collect())
+/// One entry for each of D axes, which a study writes as an array of exactly so many
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Axes<T, const D: usize>(pub [T; D]);
+
+impl<T, const D: usize> std::ops::Deref for Axes<T, D> {
+    type Target = [T; D];
+
+    fn deref(&self) -> &[T; D] {
+        &self.0
+    }
+}
+
+impl<T, const D: usize> From<[T; D]> for Axes<T, D> {
+    fn from(entries: [T; D]) -> Self {
+        Self(entries)
+    }
+}
+
+impl<T: Serialize, const N: usize> Serialize for Axes<T, N> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.as_slice().serialize(serializer)
+    }
+}
+
+impl<'de, T: Deserialize<'de>, const N: usize> Deserialize<'de> for Axes<T, N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        fixed(deserializer).map(Self)
+    }
+}
+
+impl<T: JsonSchema, const D: usize> JsonSchema for Axes<T, D> {
+    fn schema_name() -> Cow<'static, str> {
+        format!("Axes_{}_{D}", T::schema_name()).into()
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "array", "items": generator.subschema_for::<T>(), "minItems": D, "maxItems": D })
+    }
+}
+
+/// The flux of each unknown, by its name: formulas for its components along D axes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Fluxes<const D: usize>(pub BTreeMap<String, [String; D]>);
+
+impl<const D: usize> std::ops::Deref for Fluxes<D> {
+    type Target = BTreeMap<String, [String; D]>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl<const D: usize> Serialize for Fluxes<D> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, along)| (name, along.as_slice())))
+    }
+}
+
+impl<'de, const N: usize> Deserialize<'de> for Fluxes<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let entries = BTreeMap::<String, Axes<Text, N>>::deserialize(deserializer)?;
+        let texts = entries.into_iter().map(|(name, Axes(along))| (name, along.map(|Text(text)| text)));
+        Ok(Self(texts.collect()))
+    }
+}
+
+impl<const D: usize> JsonSchema for Fluxes<D> {
+    fn schema_name() -> Cow<'static, str> {
+        format!("Fluxes_{D}").into()
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        generator.subschema_for::<BTreeMap<String, Axes<Text, D>>>()
+    }
 }

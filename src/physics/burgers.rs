@@ -142,7 +142,7 @@ impl Burgers {
         }
         for (n, (key, text)) in [("initial", &self.initial), ("boundary", &self.boundary)].into_iter().enumerate() {
             self.given[n] = match text {
-                Some(text) => Some(Program::new([&formula(key, text)?])),
+                Some(text) => Some(Program::new([&formula::<2>(key, text)?])),
                 None => None,
             };
         }

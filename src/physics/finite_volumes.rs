@@ -1,8 +1,11 @@
 //! Conservation laws on the dual cells of a moving mesh.
 
+mod line;
+mod plane;
+
 use super::{Motion, check_finite};
 use crate::error::Failure;
-use crate::geometry::{DualCells, Mesh, padded};
+use crate::geometry::{Cells, DualCells, Mesh, Patch, diagonal, dot, padded, strides};
 use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport};
 use crate::parallel;
@@ -13,7 +16,7 @@ use std::borrow::Cow;
 ///
 /// Fluxes at a face are functions of what [`nodes`](Self::nodes) computes for its two nodes, and are differentiated by
 /// the unknowns there.
-pub(super) trait Law<const B: usize>: Sync {
+pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// What is computed once for each node: its values and those of formulas.
     type Node: Copy + Send + Sync;
     /// Newton's method has converged once, after at least one step, every residual is below this share of the size of
@@ -23,13 +26,13 @@ pub(super) trait Law<const B: usize>: Sync {
     /// Names of the unknowns, for messages.
     fn names(&self) -> [&'static str; B];
     /// The data of the nodes at all places of padded vectors.
-    fn nodes(&self, t: f64, x: &[[f64; 2]], u: &[[f64; B]]) -> Vec<Self::Node>;
+    fn nodes(&self, t: f64, x: &[[f64; D]], u: &[[f64; B]]) -> Vec<Self::Node>;
     /// Refuses node data that are not finite; the failure names the place.
-    fn check(&self, _mesh: &Mesh<2>, _u: &[[f64; B]], _nodes: &[Self::Node]) -> Result<(), Failure> {
+    fn check(&self, _mesh: &Mesh<D>, _u: &[[f64; B]], _nodes: &[Self::Node]) -> Result<(), Failure> {
         Ok(())
     }
     /// F·N through a face with normal N.
-    fn convection(&self, below: &Self::Node, above: &Self::Node, normal: [f64; 2]) -> Crossing<B>;
+    fn convection(&self, below: &Self::Node, above: &Self::Node, normal: [f64; D]) -> Crossing<B>;
     /// D at a face.
     fn diffusivity(&self, below: &Self::Node, above: &Self::Node) -> Crossing<B>;
     /// S at a node and its derivative; none for an equation without a source.
@@ -37,7 +40,14 @@ pub(super) trait Law<const B: usize>: Sync {
         None
     }
     /// The unknowns that are given on bounded sides; for the others the flux through the sides is zero.
-    fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; B];
+    fn side(&self, t: f64, x: [f64; D]) -> [Option<f64>; B];
+    /// The dual cells over which the law is integrated.
+    fn cells(&self, mesh: &Mesh<D>) -> DualCells<D>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        DualCells::new(mesh)
+    }
 }
 
 /// Derivatives of B equations by B unknowns.
@@ -60,18 +70,18 @@ pub(super) struct Crossing<const B: usize> {
 ///
 /// where the sum is over the faces of a dual cell, N is the normal of a face and t the vector along it from a to b, d =
 /// x_k − x_i, J = d·N, s is the area that the face sweeps between the meshes, and u_a and u_b are the means of the four
-/// nodes around its ends. What leaves a cell enters its neighbour, and a constant stays constant on any moving mesh.
+/// nodes around its ends. On a line there is no t. What leaves a cell enters its neighbour, and a constant stays constant on any moving mesh.
 /// The scheme is Crank–Nicolson in time, solved by Newton's method with the exact Jacobian.
 #[derive(Debug, Clone)]
-pub(super) struct FiniteVolumes<const B: usize> {
-    solver: RobustTransport<B>,
+pub(super) struct FiniteVolumes<const B: usize, const D: usize = 2, Solver = RobustTransport<B>> {
+    solver: Solver,
     /// The newest mesh with its dual cells, on which the next step starts.
-    newest: Option<(Mesh<2>, DualCells)>,
+    newest: Option<(Mesh<D>, DualCells<D>)>,
 }
 
-impl<const B: usize> Default for FiniteVolumes<B> {
+impl<const B: usize, const D: usize, Solver: Default> Default for FiniteVolumes<B, D, Solver> {
     fn default() -> Self {
-        Self { solver: RobustTransport::default(), newest: None }
+        Self { solver: Solver::default(), newest: None }
     }
 }
 
@@ -87,6 +97,14 @@ struct Face<const B: usize> {
     tangent: [f64; B],
 }
 
+impl<const B: usize> Face<B> {
+    /// Nothing passes.
+    const CLOSED: Self = Self {
+        crossing: Crossing { value: [0.0; B], by_below: [[0.0; B]; B], by_above: [[0.0; B]; B] },
+        tangent: [0.0; B],
+    };
+}
+
 /// A node on a bounded side: its index, its place in padded vectors, and the values given there.
 struct Side<const B: usize> {
     i: usize,
@@ -95,37 +113,61 @@ struct Side<const B: usize> {
 }
 
 /// One of the two meshes of a time step, with its half of the fluxes.
-struct Half<'a> {
+struct Half<'a, const D: usize> {
     dt: f64,
     t: f64,
-    mesh: &'a Mesh<2>,
-    cells: &'a DualCells,
+    mesh: &'a Mesh<D>,
+    cells: &'a DualCells<D>,
     /// Positions, padded.
-    x: &'a [[f64; 2]],
-    swept: &'a [[f64; 2]],
+    x: &'a [[f64; D]],
+    swept: &'a [[f64; D]],
 }
 
-impl<const B: usize> FiniteVolumes<B> {
+/// What lies around a face and around a dual cell, with S points in a stencil.
+trait Around<const D: usize, const S: usize> {
+    /// All faces, each stored with the node below it. Those on bounded sides have no flux.
+    fn faces<const B: usize, L: Law<B, D>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; D]>;
+
+    /// The sum of the fluxes out of the dual cell of a place, in this half of the step.
+    fn leaving<const B: usize>(&self, faces: &[[Face<B>; D]], k: usize) -> [f64; B];
+
+    /// Derivatives of u + (fluxes out)/area by the nodes around a place.
+    fn row<const B: usize>(&self, faces: &[[Face<B>; D]], i: usize, k: usize) -> [Block<B>; S];
+
+    /// Beyond a bounded side the values of the side are repeated, so that couplings to them belong to the nodes on the
+    /// side.
+    fn fold_sides<const B: usize>(beyond: [[bool; 2]; D], row: &mut [Block<B>; S]);
+
+    /// Fills the ring: beyond bounded sides with the values on the side, on periodic axes with images.
+    fn repeat_sides<const B: usize>(patch: &Patch<D>, u: &mut [[f64; B]]);
+}
+
+impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
     /// The solution on the new mesh, with one value for each node and unknown.
-    pub fn step<L: Law<B>>(
+    #[allow(private_bounds)] // what lies around a face is known here alone
+    pub fn step<const S: usize, L: Law<B, D>>(
         &mut self,
         law: &L,
-        motion: Motion<'_>,
+        motion: Motion<'_, D>,
         start: &[[f64; B]],
-    ) -> Result<(Vec<[f64; B]>, Work), Failure> {
+    ) -> Result<(Vec<[f64; B]>, Work), Failure>
+    where
+        Mesh<D>: Cells<D>,
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
         let Motion { t, dt, old, new } = motion;
         let lattice = new.lattice();
         let old_cells = match self.newest.take() {
             Some((mesh, cells)) if mesh == *old => cells,
-            _ => DualCells::new(old),
+            _ => law.cells(old),
         };
-        let cells = DualCells::new(new);
+        let cells = law.cells(new);
         let swept = old_cells.swept(&cells);
-        let [width, height] = new.extent();
-        let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), [[width, 0.0], [0.0, height]]));
-        let mut u = padded(lattice, start, [[0.0; B]; 2]);
+        let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), diagonal(mesh.extent())));
+        let mut u = padded(lattice, start, [[0.0; B]; D]);
         let before = Half { dt, t, mesh: old, cells: &old_cells, x: &x_old, swept: &swept };
-        let known = before.known(law, &u)?;
+        let known = before.known::<S, B, L>(law, &u)?;
 
         // given values are set from the start
         let sides = sides(law, t + dt, new);
@@ -134,7 +176,7 @@ impl<const B: usize> FiniteVolumes<B> {
                 *u = given.unwrap_or(*u);
             }
         }
-        repeat_sides(cells.patch(), &mut u);
+        <Half<'_, D> as Around<D, S>>::repeat_sides(cells.patch(), &mut u);
         let after = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x_new, swept: &swept };
         let Solved { residual, work, stalled } = self.newton(law, &after, &known, &sides, &mut u)?;
 
@@ -150,20 +192,24 @@ impl<const B: usize> FiniteVolumes<B> {
     }
 
     /// Newton's method for the padded values `u` at the end of a time step, from what is `known` of its beginning.
-    fn newton<L: Law<B>>(
+    fn newton<const S: usize, L: Law<B, D>>(
         &mut self,
         law: &L,
-        half: &Half<'_>,
+        half: &Half<'_, D>,
         known: &[[f64; B]],
         sides: &[Side<B>],
         u: &mut [[f64; B]],
-    ) -> Result<Solved<B>, Failure> {
+    ) -> Result<Solved<B>, Failure>
+    where
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
         let patch = *half.cells.patch();
         let seen = inside(half.mesh, half.x);
         // unknowns may differ much in size, and one that is 0 takes the size of its first change
         let mut sizes = largest_of(u);
         let mut size = sizes.into_iter().fold(f64::MIN_POSITIVE, larger);
-        let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
+        let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
         // where the flux through a cell in a step is large, round-off alone leaves residuals above the tolerance
@@ -172,8 +218,8 @@ impl<const B: usize> FiniteVolumes<B> {
         let stalled = loop {
             let nodes = law.nodes(half.t, &seen, u);
             law.check(half.mesh, u, &nodes)?;
-            let faces = half.faces(law, &nodes, u);
-            half.residual(law, (&nodes, &faces), known, u, &mut residual);
+            let faces = Around::<D, S>::faces(half, law, &nodes, u);
+            half.residual::<S, B, L>(law, (&nodes, &faces), known, u, &mut residual);
             for side in sides {
                 for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
                     *residual = if given.is_some() { 0.0 } else { *residual };
@@ -213,7 +259,7 @@ impl<const B: usize> FiniteVolumes<B> {
             for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
                 *u += correction;
             }
-            repeat_sides(&patch, u);
+            <Half<'_, D> as Around<D, S>>::repeat_sides(&patch, u);
         };
         Ok(Solved { residual, work, stalled })
     }
@@ -233,24 +279,26 @@ fn largest_of<const B: usize>(values: &[[f64; B]]) -> [f64; B] {
 }
 
 /// The nodes on bounded sides, and the values given there at time t.
-fn sides<const B: usize, L: Law<B>>(law: &L, t: f64, mesh: &Mesh<2>) -> Vec<Side<B>> {
-    let m = mesh.lattice().nodes()[1];
-    let side = |i: usize| Side { i, k: (i / m + 1) * (m + 2) + i % m + 1, given: law.side(t, mesh.image(mesh.x()[i])) };
-    mesh.lattice().sides().map(side).collect()
+fn sides<const B: usize, const D: usize, L: Law<B, D>>(law: &L, t: f64, mesh: &Mesh<D>) -> Vec<Side<B>> {
+    let lattice = mesh.lattice();
+    let strides = strides(lattice.nodes().map(|n| n + 2));
+    let place = |i: usize| lattice.node(i).iter().zip(strides).map(|(i, s)| (i + 1) * s).sum();
+    let side = |i: usize| Side { i, k: place(i), given: law.side(t, mesh.image(mesh.x()[i])) };
+    lattice.sides().map(side).collect()
 }
 
 /// Positions in the box, where those beyond a periodic side are replaced by their images.
-fn inside<'a>(mesh: &Mesh<2>, x: &'a [[f64; 2]]) -> Cow<'a, [[f64; 2]]> {
-    match mesh.lattice().periodic() {
-        [false, false] => Cow::Borrowed(x),
-        _ => Cow::Owned(x.iter().map(|x| mesh.image(*x)).collect()),
+fn inside<'a, const D: usize>(mesh: &Mesh<D>, x: &'a [[f64; D]]) -> Cow<'a, [[f64; D]]> {
+    match mesh.lattice().periodic().contains(&true) {
+        false => Cow::Borrowed(x),
+        true => Cow::Owned(x.iter().map(|x| mesh.image(*x)).collect()),
     }
 }
 
 /// For each unknown without a flux through the sides, adds the mean of the remaining residual to all values: sums are
 /// then conserved to round-off, whatever the tolerance of Newton's method.
-fn settle<const B: usize>(
-    cells: &DualCells,
+fn settle<const B: usize, const D: usize>(
+    cells: &DualCells<D>,
     residual: &[[f64; B]],
     values: &mut [[f64; B]],
     closed: impl Fn(usize) -> bool,
@@ -263,17 +311,24 @@ fn settle<const B: usize>(
 }
 
 /// Nodes and faces of one half of a time step, as a law sees them.
-type Seen<'a, N, const B: usize> = (&'a [N], &'a [[Face<B>; 2]]);
+type Seen<'a, N, const B: usize, const D: usize> = (&'a [N], &'a [[Face<B>; D]]);
 
-impl Half<'_> {
+impl<const D: usize> Half<'_, D> {
     /// What the beginning of a time step contributes to each dual cell: A (u + ½ Δt S) less half of what leaves it.
-    fn known<const B: usize, L: Law<B>>(&self, law: &L, u: &[[f64; B]]) -> Result<Vec<[f64; B]>, Failure> {
+    fn known<const S: usize, const B: usize, L: Law<B, D>>(
+        &self,
+        law: &L,
+        u: &[[f64; B]],
+    ) -> Result<Vec<[f64; B]>, Failure>
+    where
+        Self: Around<D, S>,
+    {
         let nodes = law.nodes(self.t, &inside(self.mesh, self.x), u);
         law.check(self.mesh, u, &nodes)?;
-        let faces = self.faces(law, &nodes, u);
+        let faces = Around::<D, S>::faces(self, law, &nodes, u);
         let mut known = vec![[0.0; B]; self.cells.patch().len()];
         self.for_each_node(&mut known, |known, i, k| {
-            let (leaving, area) = (self.leaving(&faces, k), self.cells.areas()[i]);
+            let (leaving, area) = (Around::<D, S>::leaving(self, &faces, k), self.cells.areas()[i]);
             let source = self.source(law, &nodes[k]);
             *known = std::array::from_fn(|c| area * (u[k][c] + source[c]) - leaving[c]);
         });
@@ -281,38 +336,42 @@ impl Half<'_> {
     }
 
     /// The residual of the equations at the end of a time step, divided by the areas of the cells.
-    fn residual<const B: usize, L: Law<B>>(
+    fn residual<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
-        (nodes, faces): Seen<'_, L::Node, B>,
+        (nodes, faces): Seen<'_, L::Node, B, D>,
         known: &[[f64; B]],
         u: &[[f64; B]],
         residual: &mut [[f64; B]],
-    ) {
+    ) where
+        Self: Around<D, S>,
+    {
         self.for_each_node(residual, |residual, i, k| {
-            let (leaving, area) = (self.leaving(faces, k), self.cells.areas()[i]);
+            let (leaving, area) = (Around::<D, S>::leaving(self, faces, k), self.cells.areas()[i]);
             let source = self.source(law, &nodes[k]);
             *residual = std::array::from_fn(|c| (known[i][c] - leaving[c]) / area - (u[k][c] - source[c]));
         });
     }
 
     /// The derivative of −[`residual`](Self::residual) by u, and the identity for values that are given.
-    fn matrix<const B: usize, L: Law<B>>(
+    fn matrix<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
-        (nodes, faces): Seen<'_, L::Node, B>,
+        (nodes, faces): Seen<'_, L::Node, B, D>,
         sides: &[Side<B>],
-        matrix: &mut BlockMatrix<2, 9, B>,
-    ) {
+        matrix: &mut BlockMatrix<D, S, B>,
+    ) where
+        Self: Around<D, S>,
+    {
         self.for_each_node(&mut matrix.rows, |row, i, k| {
-            *row = self.row(faces, i, k);
+            *row = Around::<D, S>::row(self, faces, i, k);
             if let Some((_, derivative)) = law.source(&nodes[k]) {
                 add(&mut row[0], -0.5 * self.dt, &derivative);
             }
         });
         for side in sides {
             let row = &mut matrix.rows[side.i];
-            fold_sides(self.mesh.lattice().beyond(side.i), row);
+            <Self as Around<D, S>>::fold_sides(self.mesh.lattice().beyond(side.i), row);
             for c in (0..B).filter(|&c| side.given[c].is_some()) {
                 row.iter_mut().for_each(|block| block[c] = [0.0; B]);
                 row[0][c][c] = 1.0;
@@ -321,7 +380,7 @@ impl Half<'_> {
     }
 
     /// ½ Δt S at a node.
-    fn source<const B: usize, L: Law<B>>(&self, law: &L, node: &L::Node) -> [f64; B] {
+    fn source<const B: usize, L: Law<B, D>>(&self, law: &L, node: &L::Node) -> [f64; B] {
         law.source(node).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * self.dt * s))
     }
 
@@ -336,57 +395,29 @@ impl Half<'_> {
         });
     }
 
-    /// All faces, each stored with the node below it. Those on bounded sides have no flux.
-    fn faces<const B: usize, L: Law<B>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; 2]> {
-        let patch = self.cells.patch();
-        let ([n, m], wraps) = (patch.size, patch.wraps);
-        let s = m + 2;
-        let nothing = Crossing { value: [0.0; B], by_below: [[0.0; B]; B], by_above: [[0.0; B]; B] };
-        let mut faces = vec![[Face { crossing: nothing, tangent: [0.0; B] }; 2]; u.len()];
-        parallel::for_each_row(&mut faces, s, |p, row| {
-            if p == 0 || p > n {
-                return;
-            }
-            for (q, faces) in row.iter_mut().enumerate().take(m + 1).skip(1) {
-                let k = p * s + q;
-                if p < n || wraps[0] {
-                    let ends = [k + 1, k + s + 1, k - 1, k + s - 1].map(|k| &u[k]);
-                    faces[0] = self.face(law, nodes, u, k, k + s, 0, ends);
-                }
-                if q < m || wraps[1] {
-                    let ends = [k - s, k - s + 1, k + s, k + s + 1].map(|k| &u[k]);
-                    faces[1] = self.face(law, nodes, u, k, k + 1, 1, ends);
-                }
-            }
-        });
-        patch.wrap(&mut faces);
-        faces
-    }
-
-    /// The face between two places; `ends` holds the nodes around its end b, then those around its end a.
+    /// The face between two places. `turned` is the part of t in d, and `change` u_b − u_a.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)] // what a face is made of
-    fn face<const B: usize, L: Law<B>>(
+    fn face<const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
         nodes: &[L::Node],
         u: &[[f64; B]],
-        i: usize,
-        k: usize,
+        [i, k]: [usize; 2],
         axis: usize,
-        ends: [&[f64; B]; 4],
+        turned: f64,
+        change: impl Fn(usize) -> f64,
     ) -> Face<B> {
-        let ([nx, ny], swept) = (self.cells.normals()[i][axis], self.swept[i][axis]);
-        let d = [0, 1].map(|c| self.x[k][c] - self.x[i][c]);
+        let (normal, swept) = (self.cells.normals()[i][axis], self.swept[i][axis]);
         let half = 0.5 * self.dt;
-        let scale = half / (d[0] * nx + d[1] * ny);
-        let (across, along) = (scale * (nx * nx + ny * ny), 0.25 * scale * (d[0] * ny - d[1] * nx));
-        let passing = law.convection(&nodes[i], &nodes[k], [nx, ny]);
+        let scale = half / dot(self.way(i, k), normal);
+        let (across, along) = (scale * dot(normal, normal), 0.25 * scale * turned);
+        let passing = law.convection(&nodes[i], &nodes[k], normal);
         let spread = law.diffusivity(&nodes[i], &nodes[k]);
         let mut face = Face { crossing: passing, tangent: [0.0; B] };
         let Crossing { value, by_below, by_above } = &mut face.crossing;
         for c in 0..B {
-            let slope = across * (u[k][c] - u[i][c]) + along * ((ends[0][c] + ends[1][c]) - (ends[2][c] + ends[3][c]));
+            let slope = across * (u[k][c] - u[i][c]) + along * change(c);
             value[c] = half * value[c] - spread.value[c] * slope - 0.25 * swept * (u[i][c] + u[k][c]);
             for e in 0..B {
                 by_below[c][e] = half * by_below[c][e] - spread.by_below[c][e] * slope;
@@ -399,86 +430,10 @@ impl Half<'_> {
         face
     }
 
-    /// The sum of the fluxes out of the dual cell of a place, in this half of the step.
+    /// From one place to another.
     #[inline(always)]
-    fn leaving<const B: usize>(&self, faces: &[[Face<B>; 2]], k: usize) -> [f64; B] {
-        let [right, left, top, bottom] = self.around(faces, k);
-        std::array::from_fn(|c| {
-            (right.crossing.value[c] - left.crossing.value[c]) + (top.crossing.value[c] - bottom.crossing.value[c])
-        })
-    }
-
-    /// The faces of a dual cell: above and below along ξ, above and below along η.
-    fn around<'f, const B: usize>(&self, faces: &'f [[Face<B>; 2]], k: usize) -> [&'f Face<B>; 4] {
-        let s = self.cells.patch().size[1] + 2;
-        [&faces[k][0], &faces[k - s][0], &faces[k][1], &faces[k - 1][1]]
-    }
-
-    /// Derivatives of u + (fluxes out)/area by the nine nodes around a place.
-    #[inline(always)]
-    fn row<const B: usize>(&self, faces: &[[Face<B>; 2]], i: usize, k: usize) -> [Block<B>; 9] {
-        let [right, left, top, bottom] = self.around(faces, k);
-        let share = 1.0 / self.cells.areas()[i];
-        let mut row = [[[0.0; B]; B]; 9];
-        for (face, sign, own, other) in
-            [(right, share, true, 2), (left, -share, false, 1), (top, share, true, 4), (bottom, -share, false, 3)]
-        {
-            let Crossing { by_below, by_above, .. } = &face.crossing;
-            let (mine, theirs) = if own { (by_below, by_above) } else { (by_above, by_below) };
-            add(&mut row[0], sign, mine);
-            add(&mut row[other], sign, theirs);
-        }
-        #[allow(clippy::needless_range_loop)] // c is an equation and an unknown
-        for c in 0..B {
-            row[0][c][c] += 1.0;
-            // the ends b and a of the four faces, as points of the stencil
-            for (weight, b, a) in [
-                (share * right.tangent[c], [4, 8], [3, 7]),
-                (-share * left.tangent[c], [6, 4], [5, 3]),
-                (share * top.tangent[c], [1, 6], [2, 8]),
-                (-share * bottom.tangent[c], [5, 1], [7, 2]),
-            ] {
-                b.into_iter().for_each(|point| row[point][c][c] += weight);
-                a.into_iter().for_each(|point| row[point][c][c] -= weight);
-            }
-        }
-        row
-    }
-}
-
-/// Beyond a bounded side the values of the side are repeated, so that couplings to them belong to the nodes on the
-/// side.
-fn fold_sides<const B: usize>([[left, right], [below, above]]: [[bool; 2]; 2], row: &mut [Block<B>; 9]) {
-    let mut fold = |from: usize, to: usize| {
-        let block = std::mem::replace(&mut row[from], [[0.0; B]; B]);
-        add(&mut row[to], 1.0, &block);
-    };
-    // the three points beyond each side, as (from, to)
-    for (beyond, points) in [
-        (left, [(1, 0), (5, 3), (6, 4)]),
-        (right, [(2, 0), (7, 3), (8, 4)]),
-        (below, [(3, 0), (5, 1), (7, 2)]),
-        (above, [(4, 0), (6, 1), (8, 2)]),
-    ] {
-        if beyond {
-            points.into_iter().for_each(|(from, to)| fold(from, to));
-        }
-    }
-}
-
-/// Fills the ring: beyond bounded sides with the values on the side, on periodic axes with images.
-fn repeat_sides<const B: usize>(patch: &crate::geometry::Patch<2>, u: &mut [[f64; B]]) {
-    let [n, m] = patch.size;
-    let s = m + 2;
-    patch.wrap(u);
-    if !patch.wraps[1] {
-        for p in 0..n + 2 {
-            (u[p * s], u[p * s + m + 1]) = (u[p * s + 1], u[p * s + m]);
-        }
-    }
-    if !patch.wraps[0] {
-        u.copy_within(s..2 * s, 0);
-        u.copy_within(n * s..(n + 1) * s, (n + 1) * s);
+    fn way(&self, i: usize, k: usize) -> [f64; D] {
+        std::array::from_fn(|c| self.x[k][c] - self.x[i][c])
     }
 }
 

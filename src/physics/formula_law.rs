@@ -6,43 +6,48 @@ use super::prescribed::evaluate;
 use super::{Motion, Physics, nodal};
 use crate::error::{Failure, Result};
 use crate::formula::{Formula, Program};
-use crate::geometry::{DualCells, Field, Mesh};
+use crate::geometry::{Cells, DualCells, Field, Mesh, dot, strides};
+use crate::numerics::linear::{RobustLine, RobustTransport};
 use crate::numerics::sum;
 use crate::parallel;
 use crate::work::Work;
 
-/// B unknowns. P = 2 + B is the number of values that the formulas take at a node, K = 4 B (B + 1) that of the values
-/// they give.
-pub(super) struct FormulaLaw<const B: usize, const P: usize, const K: usize> {
+/// B unknowns in D dimensions. P = D + B is the number of values that the formulas take at a node, K = (D + 2) B (B + 1)
+/// that of the values they give.
+pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, const K: usize, Solver> {
     names: [String; B],
     nodal: Program<P, K>,
-    initial: Program<2, B>,
+    initial: Program<D, B>,
     boundary: [Option<Formula>; B],
     /// The exact solution, for the unknowns that have one.
-    exact: Vec<(usize, Program<2, 1>)>,
+    exact: Vec<(usize, Program<D, 1>)>,
     has_source: bool,
-    volumes: FiniteVolumes<B>,
+    cells: fn(&Mesh<D>) -> DualCells<D>,
+    volumes: FiniteVolumes<B, D, Solver>,
 }
 
-/// Indices of the quantities of an equation, in the order of [`Formulas::nodal`].
-const FLUX: [usize; 2] = [0, 1];
-const DIFFUSIVITY: usize = 2;
 /// A diffusivity may be negative by up to this share of its largest value, as it may be where it is a function of a
 /// solution that oscillates slightly around zero.
 const WIGGLES: f64 = 1e-3;
-const SOURCE: usize = 3;
 
-impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
-    pub fn new(formulas: Formulas) -> Self {
+impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Default> FormulaLaw<D, B, P, K, Solver> {
+    /// Indices of the quantities of an equation, in the order of [`Formulas::nodal`], in which fluxes come first.
+    const DIFFUSIVITY: usize = D;
+    const SOURCE: usize = D + 1;
+    const QUANTITIES: usize = D + 2;
+
+    /// The equation of some formulas, integrated over dual cells.
+    pub fn new(formulas: Formulas, cells: fn(&Mesh<D>) -> DualCells<D>) -> Self {
         let Formulas { names, nodal, initial, boundary, exact } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
-            has_source: (0..B).any(|c| nodal[SOURCE * B + c].text() != "0"),
+            has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
             initial: Program::new(std::array::from_fn(|c| &initial[c])),
             boundary: std::array::from_fn(|c| boundary[c].clone()),
             exact: exact.collect(),
+            cells,
             volumes: FiniteVolumes::default(),
         }
     }
@@ -56,50 +61,51 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
     /// The derivative of that quantity by unknown e.
     #[inline(always)]
     fn slope(node: &[f64; K], quantity: usize, c: usize, e: usize) -> f64 {
-        node[(4 * (1 + e) + quantity) * B + c]
+        node[(Self::QUANTITIES * (1 + e) + quantity) * B + c]
     }
 
     /// The name, for messages, of the k-th value at a node.
     fn what(&self, k: usize) -> String {
-        let (row, quantity, name) = (k / (4 * B), k / B % 4, &self.names[k % B]);
+        let (row, quantity, name) = (k / (Self::QUANTITIES * B), k / B % Self::QUANTITIES, &self.names[k % B]);
         let key = match quantity {
-            DIFFUSIVITY => format!("`pde.diffusivity.{name}`"),
-            SOURCE => format!("`pde.source.{name}`"),
+            quantity if quantity == Self::DIFFUSIVITY => format!("`pde.diffusivity.{name}`"),
+            quantity if quantity == Self::SOURCE => format!("`pde.source.{name}`"),
             axis => format!("`pde.flux.{name}[{axis}]`"),
         };
         if row == 0 { key } else { format!("the derivative of {key} by {}", self.names[row - 1]) }
     }
 
-    fn failure(&self, what: String, value: f64, mesh: &Mesh<2>, k: usize, u: Option<&[f64; B]>) -> Failure {
+    fn failure(&self, what: String, value: f64, mesh: &Mesh<D>, k: usize, u: Option<&[f64; B]>) -> Failure {
         let given = u.map_or(Vec::new(), |u| self.names.iter().cloned().zip(*u).collect());
-        Failure::Formula { what, value, node: mesh.lattice().node(k), x: mesh.x()[k], given }
+        let (node, x) = mesh.told(k);
+        Failure::Formula { what, value, node, x, given }
     }
 
     /// The node at a place of padded arrays. In the ring it is the node of which there is an image or a repetition.
-    fn node(mesh: &Mesh<2>, place: usize) -> usize {
-        let [n, m] = mesh.lattice().nodes();
-        let along = |place: usize, n: usize, wraps: bool| {
-            if wraps { (place + n - 1) % n } else { place.clamp(1, n) - 1 }
-        };
-        let wraps = mesh.lattice().periodic();
-        mesh.lattice().index([along(place / (m + 2), n, wraps[0]), along(place % (m + 2), m, wraps[1])])
+    fn node(mesh: &Mesh<D>, place: usize) -> usize {
+        let (nodes, wraps) = (mesh.lattice().nodes(), mesh.lattice().periodic());
+        let strides = strides(nodes.map(|n| n + 2));
+        mesh.lattice().index(std::array::from_fn(|d| {
+            let (n, along) = (nodes[d], place / strides[d] % (nodes[d] + 2));
+            if wraps[d] { (along + n - 1) % n } else { along.clamp(1, n) - 1 }
+        }))
     }
 
     /// Refuses a diffusivity that is more negative than oscillations of the solution may make it.
-    fn check_diffusivities(&self, mesh: &Mesh<2>, nodes: &[[f64; K]]) -> Result<(), Failure> {
+    fn check_diffusivities(&self, mesh: &Mesh<D>, nodes: &[[f64; K]]) -> Result<(), Failure> {
         for c in 0..B {
-            let values = || nodes.iter().map(|node| Self::value(node, DIFFUSIVITY, c));
+            let values = || nodes.iter().map(|node| Self::value(node, Self::DIFFUSIVITY, c));
             let [least, largest] = values().fold([0.0_f64; 2], |[l, h], value| [l.min(value), h.max(value.abs())]);
             if least < -WIGGLES * largest {
                 let k = Self::node(mesh, values().position(|value| value == least).unwrap_or_default());
-                let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
+                let (node, x) = mesh.told(k);
                 return Err(Failure::NotPositive { what: "the diffusivity of a formula", value: least, node, x });
             }
         }
         Ok(())
     }
 
-    fn check_exact(&self, t: f64, mesh: &Mesh<2>) -> Result<(), Failure> {
+    fn check_exact(&self, t: f64, mesh: &Mesh<D>) -> Result<(), Failure> {
         for (c, exact) in &self.exact {
             let values = evaluate(exact, t, mesh);
             if let Some(k) = values.iter().position(|[u]| !u.is_finite()) {
@@ -109,10 +115,16 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
         Ok(())
     }
 
+    /// The values given at a place on a side.
+    fn given(&self, t: f64, x: [f64; D]) -> [Option<f64>; B] {
+        let place: Vec<f64> = x.into_iter().chain([t]).collect();
+        std::array::from_fn(|c| Some(self.boundary[c].as_ref()?.eval(&place)))
+    }
+
     /// Refuses boundary values that are not finite.
-    fn check_sides(&self, t: f64, mesh: &Mesh<2>) -> Result<(), Failure> {
+    fn check_sides(&self, t: f64, mesh: &Mesh<D>) -> Result<(), Failure> {
         for k in mesh.lattice().sides() {
-            for (c, value) in self.side(t, mesh.image(mesh.x()[k])).into_iter().enumerate() {
+            for (c, value) in self.given(t, mesh.image(mesh.x()[k])).into_iter().enumerate() {
                 if let Some(value) = value.filter(|value| !value.is_finite()) {
                     return Err(self.failure(format!("`pde.boundary.{}`", self.names[c]), value, mesh, k, None));
                 }
@@ -122,29 +134,42 @@ impl<const B: usize, const P: usize, const K: usize> FormulaLaw<B, P, K> {
     }
 }
 
-impl<const B: usize, const P: usize, const K: usize> Law<B> for FormulaLaw<B, P, K> {
+impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> Law<B, D>
+    for FormulaLaw<D, B, P, K, Solver>
+where
+    Solver: Default + Sync,
+{
     type Node = [f64; K];
     /// Smaller than usual, since an error may grow exponentially, as in an unstable state ahead of a front.
     const TOLERANCE: f64 = 1e-9;
 
     fn names(&self) -> [&'static str; B] {
         std::array::from_fn(|c| {
-            ["the first unknown", "the second unknown", "the third unknown", "the fourth unknown"][c]
+            [
+                "the first unknown",
+                "the second unknown",
+                "the third unknown",
+                "the fourth unknown",
+                "the fifth unknown",
+                "the sixth unknown",
+                "the seventh unknown",
+                "the eighth unknown",
+            ][c]
         })
     }
 
-    fn nodes(&self, t: f64, x: &[[f64; 2]], u: &[[f64; B]]) -> Vec<[f64; K]> {
+    fn nodes(&self, t: f64, x: &[[f64; D]], u: &[[f64; B]]) -> Vec<[f64; K]> {
         let mut nodes = vec![[0.0; K]; x.len()];
         parallel::for_each_piece(&mut nodes, |begin, nodes| {
             let points: Vec<[f64; P]> = (x[begin..].iter().zip(&u[begin..]).take(nodes.len()))
-                .map(|(x, u)| std::array::from_fn(|v| if v < 2 { x[v] } else { u[v - 2] }))
+                .map(|(x, u)| std::array::from_fn(|v| if v < D { x[v] } else { u[v - D] }))
                 .collect();
             self.nodal.eval_each(&points, &[t], nodes);
         });
         nodes
     }
 
-    fn check(&self, mesh: &Mesh<2>, u: &[[f64; B]], nodes: &[[f64; K]]) -> Result<(), Failure> {
+    fn check(&self, mesh: &Mesh<D>, u: &[[f64; B]], nodes: &[[f64; K]]) -> Result<(), Failure> {
         let Some(place) = nodes.iter().position(|node| node.iter().any(|v| !v.is_finite())) else {
             return self.check_diffusivities(mesh, nodes);
         };
@@ -158,29 +183,36 @@ impl<const B: usize, const P: usize, const K: usize> Law<B> for FormulaLaw<B, P,
     }
 
     #[inline(always)]
-    fn convection(&self, below: &[f64; K], above: &[f64; K], [nx, ny]: [f64; 2]) -> Crossing<B> {
-        let through = |[along_x, along_y]: [f64; 2]| 0.5 * (along_x * nx + along_y * ny);
-        let value = |node: &[f64; K], c| through(FLUX.map(|q| Self::value(node, q, c)));
-        let slope = |node: &[f64; K], c, e| through(FLUX.map(|q| Self::slope(node, q, c, e)));
+    fn convection(&self, below: &[f64; K], above: &[f64; K], normal: [f64; D]) -> Crossing<B> {
+        let through = |flux: [f64; D]| 0.5 * dot(flux, normal);
+        let value = |node: &[f64; K], c| through(std::array::from_fn(|d| Self::value(node, d, c)));
+        let slope = |node: &[f64; K], c, e| through(std::array::from_fn(|d| Self::slope(node, d, c, e)));
         crossing(below, above, value, slope)
     }
 
     #[inline(always)]
     fn diffusivity(&self, below: &[f64; K], above: &[f64; K]) -> Crossing<B> {
-        let value = |node: &[f64; K], c| 0.5 * Self::value(node, DIFFUSIVITY, c);
-        let slope = |node: &[f64; K], c, e| 0.5 * Self::slope(node, DIFFUSIVITY, c, e);
+        let value = |node: &[f64; K], c| 0.5 * Self::value(node, Self::DIFFUSIVITY, c);
+        let slope = |node: &[f64; K], c, e| 0.5 * Self::slope(node, Self::DIFFUSIVITY, c, e);
         crossing(below, above, value, slope)
     }
 
     #[inline(always)]
     fn source(&self, node: &[f64; K]) -> Option<([f64; B], Block<B>)> {
-        let value = std::array::from_fn(|c| Self::value(node, SOURCE, c));
-        let slope = std::array::from_fn(|c| std::array::from_fn(|e| Self::slope(node, SOURCE, c, e)));
+        let value = std::array::from_fn(|c| Self::value(node, Self::SOURCE, c));
+        let slope = std::array::from_fn(|c| std::array::from_fn(|e| Self::slope(node, Self::SOURCE, c, e)));
         self.has_source.then_some((value, slope))
     }
 
-    fn side(&self, t: f64, [x, y]: [f64; 2]) -> [Option<f64>; B] {
-        std::array::from_fn(|c| Some(self.boundary[c].as_ref()?.eval(&[x, y, t])))
+    fn side(&self, t: f64, x: [f64; D]) -> [Option<f64>; B] {
+        self.given(t, x)
+    }
+
+    fn cells(&self, mesh: &Mesh<D>) -> DualCells<D>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        (self.cells)(mesh)
     }
 }
 
@@ -200,20 +232,26 @@ fn crossing<const B: usize, N>(
     }
 }
 
-impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P, K> {
+impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> Physics<D>
+    for FormulaLaw<D, B, P, K, Solver>
+where
+    Solver: Default + Send + Sync,
+    Self: Stepped<D, B>,
+    Mesh<D>: Cells<D>,
+{
     fn unknowns(&self) -> Vec<String> {
         self.names.to_vec()
     }
 
-    fn initial(&self, t: f64, mesh: &Mesh<2>) -> Field {
+    fn initial(&self, t: f64, mesh: &Mesh<D>) -> Field {
         Field::nodal(evaluate(&self.initial, t, mesh))
     }
 
-    fn side_values(&self, t: f64, x: [f64; 2]) -> Vec<Option<f64>> {
-        self.side(t, x).to_vec()
+    fn side_values(&self, t: f64, x: [f64; D]) -> Vec<Option<f64>> {
+        self.given(t, x).to_vec()
     }
 
-    fn check(&self, t: f64, mesh: &Mesh<2>, u: &Field) -> Result<(), Failure> {
+    fn check(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Result<(), Failure> {
         let values = u.values().as_chunks::<B>().0;
         if let Some(place) = u.values().iter().position(|u| !u.is_finite()) {
             let (k, c) = (place / B, place % B);
@@ -229,7 +267,7 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
         Ok(())
     }
 
-    fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
+    fn exact(&self, t: f64, mesh: &Mesh<D>) -> Option<Field> {
         let unknown = |exact| evaluate(exact, t, mesh).into_flattened();
         let known: Vec<Vec<f64>> = self.exact.iter().map(|(_, exact)| unknown(exact)).collect();
         (!known.is_empty()).then(|| Field::joined(&known).expect("each has one value a node"))
@@ -239,22 +277,44 @@ impl<const B: usize, const P: usize, const K: usize> Physics for FormulaLaw<B, P
         self.exact.iter().map(|(c, _)| *c).collect()
     }
 
-    fn conserved(&self, mesh: &Mesh<2>, u: &Field) -> f64 {
-        sum(DualCells::new(mesh).areas().iter().zip(u.component(0)).map(|(area, u)| area * u))
+    fn conserved(&self, mesh: &Mesh<D>, u: &Field) -> f64 {
+        sum((self.cells)(mesh).areas().iter().zip(u.component(0)).map(|(area, u)| area * u))
     }
 
-    fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
-        let start = nodal::<2, B>(motion, u)?;
+    fn step(&mut self, motion: Motion<'_, D>, u: &Field) -> Result<(Field, Work), Failure> {
+        let start = nodal::<D, B>(motion, u)?;
         let end = motion.t + motion.dt;
         self.check_sides(end, motion.new)?;
-        let mut volumes = std::mem::take(&mut self.volumes);
-        let stepped = volumes.step(self, motion, start);
-        self.volumes = volumes;
-        let (values, work) = stepped?;
+        let (values, work) = self.advanced(motion, start)?;
         self.check_exact(end, motion.new)?;
         Ok((Field::nodal(values), work))
     }
 }
+
+/// A step of finite volumes, whose stencils differ between the line and the plane.
+trait Stepped<const D: usize, const B: usize> {
+    fn advanced(&mut self, motion: Motion<'_, D>, start: &[[f64; B]]) -> Result<(Vec<[f64; B]>, Work), Failure>;
+}
+
+macro_rules! stepped {
+    ($D:literal, $Solver:ty) => {
+        impl<const B: usize, const P: usize, const K: usize> Stepped<$D, B> for FormulaLaw<$D, B, P, K, $Solver> {
+            fn advanced(
+                &mut self,
+                motion: Motion<'_, $D>,
+                start: &[[f64; B]],
+            ) -> Result<(Vec<[f64; B]>, Work), Failure> {
+                let mut volumes = std::mem::take(&mut self.volumes);
+                let stepped = volumes.step(self, motion, start);
+                self.volumes = volumes;
+                stepped
+            }
+        }
+    };
+}
+
+stepped!(1, RobustLine);
+stepped!(2, RobustTransport<B>);
 
 #[cfg(test)]
 mod tests {
@@ -268,7 +328,7 @@ mod tests {
 
     impl Law<1> for Tight {
         type Node = f64;
-        const TOLERANCE: f64 = <FormulaLaw<1, 3, 8> as Law<1>>::TOLERANCE;
+        const TOLERANCE: f64 = <FormulaLaw<2, 1, 3, 8, RobustTransport<1>> as Law<1>>::TOLERANCE;
 
         fn names(&self) -> [&'static str; 1] {
             self.0.names()
@@ -306,7 +366,7 @@ mod tests {
             "#,
         )
         .unwrap();
-        let law: FormulaLaw<2, 4, 24> = FormulaLaw::new(pde.read().unwrap());
+        let law: FormulaLaw<2, 2, 4, 24, RobustTransport<2>> = FormulaLaw::new(pde.read().unwrap(), DualCells::new);
         let square = Mesh::uniform(Lattice::bounded([9, 8]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         let mesh = |t: f64| {
             let bent = |x: f64, y: f64| x + 0.07 * (std::f64::consts::TAU * x).sin() * (5.0 * y + 3.0 * t).cos();

@@ -1,13 +1,15 @@
 use super::formula_law::FormulaLaw;
-use super::{Physics, formula, mistaken};
+use super::{AXES, Physics, formula, mistaken};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::setting::{Text, text_pairs, texts};
+use crate::geometry::{DualCells, Mesh};
+use crate::numerics::linear::{RobustLine, RobustTransport};
+use crate::setting::{Fluxes, Text, texts};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// An equation of your own for one to four unknowns, given by formulas
+/// An equation of your own, given by formulas, for one to four unknowns in the plane and one to eight on a line
 ///
 /// ```text
 /// u_t + ∇·F(u, x, y, t) = ∇·(D(u, x, y, t) ∇u) + S(u, x, y, t)
@@ -52,13 +54,13 @@ use std::collections::BTreeMap;
 /// (2003), for the scheme on a mesh at rest.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct FormulaPde {
+#[schemars(rename = "FormulaPde")]
+pub struct FormulaPde<const D: usize = 2> {
     /// Names of the unknowns, at most [`MAX_UNKNOWNS`].
     pub unknowns: Vec<String>,
     /// Flux F of each unknown, as formulas along x and along y; 0 by default.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "text_pairs")]
-    #[schemars(with = "BTreeMap<String, [Text; 2]>")]
-    pub flux: BTreeMap<String, [String; 2]>,
+    #[serde(default, skip_serializing_if = "no_flux")]
+    pub flux: Fluxes<D>,
     /// Diffusivity D ≥ 0 of each unknown; 0 by default.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
@@ -82,8 +84,10 @@ pub struct FormulaPde {
     pub exact: BTreeMap<String, String>,
 }
 
-/// Largest number of unknowns of a [`FormulaPde`].
+/// Largest number of unknowns of a [`FormulaPde`] in the plane.
 pub const MAX_UNKNOWNS: usize = 4;
+/// The same on a line.
+pub const MAX_UNKNOWNS_ON_A_LINE: usize = 8;
 /// The word in `boundary` that stands for a side without a flux.
 const NO_FLUX: &str = "no-flux";
 
@@ -99,7 +103,7 @@ pub(super) struct Formulas {
     pub exact: Vec<Option<Formula>>,
 }
 
-impl FormulaPde {
+impl<const D: usize> FormulaPde<D> {
     /// Refuses settings that define no equation.
     ///
     /// # Errors
@@ -114,36 +118,22 @@ impl FormulaPde {
     /// # Errors
     /// [`Error::Invalid`] unless every unknown has a `boundary` if there is a bounded axis, and none has one if there
     /// is not.
-    pub fn check_sides(&self, periodic: [bool; 2]) -> Result<()> {
+    pub fn check_sides(&self, periodic: [bool; D]) -> Result<()> {
         let missing = self.unknowns.iter().find(|name| !self.boundary.contains_key(*name));
-        match (periodic, missing, self.boundary.keys().next()) {
-            ([true, true], _, Some(name)) => {
-                let rule = "both axes are periodic and have no sides; leave it out";
+        match (periodic.contains(&false), missing, self.boundary.keys().next()) {
+            (false, _, Some(name)) => {
+                let rule = "all axes are periodic and have no sides; leave it out";
                 Err(Error::invalid("boundary", format!("given for `{name}`"), rule))
             }
-            ([true, true], _, None) | (_, None, _) => Ok(()),
+            (false, _, None) | (_, None, _) => Ok(()),
             (_, Some(name), _) => {
                 let rule = format!(
-                    "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to [true, \
-                     true]"
+                    "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to {:?}",
+                    [true; D]
                 );
                 Err(Error::invalid("boundary", format!("not given for `{name}`"), rule))
             }
         }
-    }
-
-    /// The equation, ready to step.
-    ///
-    /// # Errors
-    /// As [`FormulaPde::check`].
-    pub fn into_physics(self) -> Result<Box<dyn Physics>> {
-        let formulas = self.read()?;
-        Ok(match formulas.names.len() {
-            1 => Box::new(FormulaLaw::<1, 3, 8>::new(formulas)),
-            2 => Box::new(FormulaLaw::<2, 4, 24>::new(formulas)),
-            3 => Box::new(FormulaLaw::<3, 5, 48>::new(formulas)),
-            _ => Box::new(FormulaLaw::<4, 6, 80>::new(formulas)),
-        })
     }
 
     /// The formulas of x, y and t alone, with their keys.
@@ -164,18 +154,22 @@ impl FormulaPde {
         both.filter(|[_, (_, side)]| *side != NO_FLUX).collect()
     }
 
+    /// Reads all formulas.
+    ///
+    /// # Errors
+    /// As [`FormulaPde::check`].
     pub(super) fn read(&self) -> Result<Formulas> {
         self.check_names()?;
         let names = &self.unknowns;
         let variables: Vec<&str> =
-            ["x", "y"].into_iter().chain(names.iter().map(String::as_str)).chain(["t"]).collect();
+            AXES[..D].iter().copied().chain(names.iter().map(String::as_str)).chain(["t"]).collect();
         let nodal = |key: String, text: &str| {
             Formula::parse(text, &variables).map(|f| (key.clone(), f)).map_err(|mistake| mistaken(&key, text, mistake))
         };
         let mut values = Vec::new();
-        for axis in 0..2 {
+        for axis in 0..D {
             for name in names {
-                let text = self.flux.get(name).map_or("0", |pair| &pair[axis]);
+                let text = self.flux.get(name).map_or("0", |along| &along[axis]);
                 values.push(nodal(format!("flux.{name}[{axis}]"), text)?);
             }
         }
@@ -195,14 +189,14 @@ impl FormulaPde {
         let mut all: Vec<Formula> = values.iter().map(|(_, f)| f.clone()).collect();
         for unknown in 0..names.len() {
             for (key, f) in &values {
-                all.push(f.derivative(2 + unknown).map_err(|mistake| mistaken(key, f.text(), mistake))?);
+                all.push(f.derivative(D + unknown).map_err(|mistake| mistaken(key, f.text(), mistake))?);
             }
         }
         let read = |table: &str, texts: &BTreeMap<String, String>| -> Result<Vec<Option<Formula>>> {
             let read = |name| match texts.get(name).map(String::as_str) {
                 None => Ok(None),
                 Some(NO_FLUX) if table == "boundary" => Ok(None),
-                Some(text) => formula(&format!("{table}.{name}"), text).map(Some),
+                Some(text) => formula::<D>(&format!("{table}.{name}"), text).map(Some),
             };
             names.iter().map(read).collect()
         };
@@ -219,14 +213,16 @@ impl FormulaPde {
     /// values.
     fn check_names(&self) -> Result<()> {
         let names = &self.unknowns;
-        if !(1..=MAX_UNKNOWNS).contains(&names.len()) {
-            let rule = format!("must be 1 to {MAX_UNKNOWNS} names");
+        let most = if D == 1 { MAX_UNKNOWNS_ON_A_LINE } else { MAX_UNKNOWNS };
+        if !(1..=most).contains(&names.len()) {
+            let rule = format!("must be 1 to {most} names");
             return Err(Error::invalid("unknowns", format!("{names:?}"), rule));
         }
         for (k, name) in names.iter().enumerate() {
             let refused = |why: String| Err(Error::invalid(format!("unknowns[{k}]"), format!("{name:?}"), why));
-            if ["x", "y", "t"].contains(&name.as_str()) {
-                return refused("x, y and t are place and time in every formula; take another name".into());
+            if name == "t" || AXES[..D].contains(&name.as_str()) {
+                let axes = AXES[..D].join(", ");
+                return refused(format!("{axes} and t are place and time in every formula; take another name"));
             }
             if name == "kind" {
                 return refused("`kind` is a key of its own in every table; take another name".into());
@@ -258,6 +254,48 @@ impl FormulaPde {
             }
         }
     }
+}
+
+impl FormulaPde {
+    /// The equation, ready to step.
+    ///
+    /// # Errors
+    /// As [`FormulaPde::check`].
+    pub fn into_physics(self) -> Result<Box<dyn Physics>> {
+        let formulas = self.read()?;
+        type Plane<const B: usize, const P: usize, const K: usize> = FormulaLaw<2, B, P, K, RobustTransport<B>>;
+        Ok(match formulas.names.len() {
+            1 => Box::new(Plane::<1, 3, 8>::new(formulas, DualCells::new)),
+            2 => Box::new(Plane::<2, 4, 24>::new(formulas, DualCells::new)),
+            3 => Box::new(Plane::<3, 5, 48>::new(formulas, DualCells::new)),
+            _ => Box::new(Plane::<4, 6, 80>::new(formulas, DualCells::new)),
+        })
+    }
+}
+
+impl FormulaPde<1> {
+    /// The equation on a line, integrated over dual cells that `cells` gives, ready to step.
+    ///
+    /// # Errors
+    /// As [`FormulaPde::check`].
+    pub fn into_physics_on_a_line(self, cells: fn(&Mesh<1>) -> DualCells<1>) -> Result<Box<dyn Physics<1>>> {
+        let formulas = self.read()?;
+        type Line<const B: usize, const P: usize, const K: usize> = FormulaLaw<1, B, P, K, RobustLine>;
+        Ok(match formulas.names.len() {
+            1 => Box::new(Line::<1, 2, 6>::new(formulas, cells)),
+            2 => Box::new(Line::<2, 3, 18>::new(formulas, cells)),
+            3 => Box::new(Line::<3, 4, 36>::new(formulas, cells)),
+            4 => Box::new(Line::<4, 5, 60>::new(formulas, cells)),
+            5 => Box::new(Line::<5, 6, 90>::new(formulas, cells)),
+            6 => Box::new(Line::<6, 7, 126>::new(formulas, cells)),
+            7 => Box::new(Line::<7, 8, 168>::new(formulas, cells)),
+            _ => Box::new(Line::<8, 9, 216>::new(formulas, cells)),
+        })
+    }
+}
+
+fn no_flux<const D: usize>(fluxes: &Fluxes<D>) -> bool {
+    fluxes.is_empty()
 }
 
 /// Adds a remedy where a formula for the sides looks like `"no-flux"` in another spelling.

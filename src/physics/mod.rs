@@ -10,7 +10,7 @@ mod shallow_water;
 mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
-pub use formula_pde::{FormulaPde, MAX_UNKNOWNS};
+pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
 pub use uniform::UniformBurgers;
@@ -126,7 +126,7 @@ impl PdeKind {
             Self::Burgers(burgers) => Box::new(burgers.compiled()?),
             Self::ShallowWater(water) => Box::new(water),
             Self::FormulaPde(pde) => pde.into_physics()?,
-            Self::Prescribed(prescribed) => Box::new(prescribed.field()?),
+            Self::Prescribed(prescribed) => Box::new(prescribed.field::<2>()?),
         })
     }
 
@@ -153,13 +153,17 @@ impl PdeKind {
     }
 }
 
-/// Parses a formula of x, y and t.
+/// Parses a formula of place, in D dimensions, and time: of x, y and t, or of x and t.
 ///
 /// # Errors
 /// [`Error::Formula`] with the key.
-pub fn formula(key: &str, text: &str) -> Result<Formula> {
-    Formula::parse(text, &["x", "y", "t"]).map_err(|mistake| mistaken(key, text, mistake))
+pub fn formula<const D: usize>(key: &str, text: &str) -> Result<Formula> {
+    let names: Vec<&str> = AXES[..D].iter().copied().chain(["t"]).collect();
+    Formula::parse(text, &names).map_err(|mistake| mistaken(key, text, mistake))
 }
+
+/// Names of the axes in formulas.
+const AXES: [&str; 2] = ["x", "y"];
 
 fn mistaken(key: &str, text: &str, mistake: Mistake) -> Error {
     let Mistake { message, at, help } = mistake;

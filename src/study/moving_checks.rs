@@ -78,11 +78,11 @@ impl Kind for MovingMesh {
     fn warnings(&self) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
         for (key, text) in self.pde.formulas() {
-            let f = formula(&key, text).map_err(|error| error.within("pde"))?;
+            let f = formula::<2>(&key, text).map_err(|error| error.within("pde"))?;
             warnings.extend((0..2).filter(|&d| self.domain.periodic[d]).filter_map(|d| self.jump(&key, &f, d)));
         }
         for [(at_start, initial), (on_sides, boundary)] in self.pde.starts_and_sides() {
-            let both = [formula(&at_start, initial)?, formula(&on_sides, boundary)?];
+            let both = [formula::<2>(&at_start, initial)?, formula::<2>(&on_sides, boundary)?];
             warnings.extend(self.gap(&at_start, &on_sides, &both));
         }
         Ok(warnings)

@@ -7,6 +7,7 @@
 mod adi;
 mod bicgstab;
 mod block;
+mod block_line;
 mod ilu;
 mod krylov;
 mod lu;
@@ -18,6 +19,7 @@ mod tridiagonal;
 
 pub use bicgstab::Bicgstab;
 pub use block::BlockBicgstab;
+pub use block_line::BlockElimination;
 pub use ilu::IluBicgstab;
 pub use lu::SparseLu;
 pub use pcg::Pcg;
@@ -238,6 +240,9 @@ pub type Robust<const K: usize> = Fallback<Bicgstab<K>, SparseLu>;
 
 /// [`Robust`] for B unknowns at a node that convection and diffusion couple to all nine points around it.
 pub type RobustTransport<const B: usize> = Fallback<IluBicgstab<B>, SparseLu>;
+
+/// The same on a line.
+pub type RobustLine = Fallback<BlockElimination, SparseLu>;
 
 /// [`Robust`] for B coupled unknowns at a node.
 pub type RobustBlock<const B: usize> = Fallback<BlockBicgstab<B>, SparseLu>;
