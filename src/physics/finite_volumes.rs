@@ -1,6 +1,7 @@
 //! Conservation laws on the dual cells of a moving mesh.
 
 mod line;
+mod mass;
 mod plane;
 
 use super::{Motion, check_finite};
@@ -10,6 +11,7 @@ use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport};
 use crate::parallel;
 use crate::work::Work;
+use mass::{Excess, stretched};
 use std::borrow::Cow;
 
 /// A conservation law for B unknowns: u_t + ∇·F(u) = ∇·(D(u)∇u) + S(u, x, t)
@@ -22,6 +24,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// Newton's method has converged once, after at least one step, every residual is below this share of the size of
     /// its unknown. It is far below the error of a time step.
     const TOLERANCE: f64 = 1e-6;
+    /// Whether neighbours have a share in the mass of a node where cells grow ([`Excess`]); else it is A u alone.
+    const SHARES_MASS: bool = true;
 
     /// Names of the unknowns, for messages.
     fn names(&self) -> [&'static str; B];
@@ -71,7 +75,9 @@ pub(super) struct Crossing<const B: usize> {
 /// where the sum is over the faces of a dual cell, N is the normal of a face and t the vector along it from a to b, d =
 /// x_k − x_i, J = d·N, s is the area that the face sweeps between the meshes, and u_a and u_b are the means of the four
 /// nodes around its ends. On a line there is no t. What leaves a cell enters its neighbour, and a constant stays constant on any moving mesh.
-/// The scheme is Crank–Nicolson in time, solved by Newton's method with the exact Jacobian.
+/// The scheme is Crank–Nicolson in time, solved by Newton's method with the exact Jacobian. Where neighbours have a share
+/// in the mass ([`Law::SHARES_MASS`]), A u and A S are M u and M S, and s (u_i + u_k)/2 is the mean of the product along
+/// the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition.
 #[derive(Debug, Clone)]
 pub(super) struct FiniteVolumes<const B: usize, const D: usize = 2, Solver = RobustTransport<B>> {
     solver: Solver,
@@ -121,6 +127,8 @@ struct Half<'a, const D: usize> {
     /// Positions, padded.
     x: &'a [[f64; D]],
     swept: &'a [[f64; D]],
+    /// (d_k − d_i)·N for each face; empty where neighbours have no share in the mass.
+    stretched: &'a [[f64; D]],
 }
 
 /// What lies around a face and around a dual cell, with S points in a stencil.
@@ -165,9 +173,11 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let cells = law.cells(new);
         let swept = old_cells.swept(&cells);
         let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), diagonal(mesh.extent())));
+        let stretched = if L::SHARES_MASS { stretched([&old_cells, &cells], [&x_old, &x_new]) } else { Vec::new() };
+        let [excess_before, excess] = [old, new].map(|mesh| L::SHARES_MASS.then(|| Excess::<D, S>::of(mesh)));
         let mut u = padded(lattice, start, [[0.0; B]; D]);
-        let before = Half { dt, t, mesh: old, cells: &old_cells, x: &x_old, swept: &swept };
-        let known = before.known::<S, B, L>(law, &u)?;
+        let before = Half { dt, t, mesh: old, cells: &old_cells, x: &x_old, swept: &swept, stretched: &stretched };
+        let known = before.known(law, excess_before.as_ref(), &u)?;
 
         // given values are set from the start
         let sides = sides(law, t + dt, new);
@@ -177,8 +187,8 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             }
         }
         <Half<'_, D> as Around<D, S>>::repeat_sides(cells.patch(), &mut u);
-        let after = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x_new, swept: &swept };
-        let Solved { residual, work, stalled } = self.newton(law, &after, &known, &sides, &mut u)?;
+        let after = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x_new, swept: &swept, stretched: &stretched };
+        let Solved { residual, work, stalled } = self.newton(law, &after, excess.as_ref(), &known, &sides, &mut u)?;
 
         let mut values = vec![[0.0; B]; cells.patch().len()];
         for (i, k) in cells.patch().places().enumerate() {
@@ -196,6 +206,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         &mut self,
         law: &L,
         half: &Half<'_, D>,
+        excess: Option<&Excess<D, S>>,
         known: &[[f64; B]],
         sides: &[Side<B>],
         u: &mut [[f64; B]],
@@ -219,7 +230,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             let nodes = law.nodes(half.t, &seen, u);
             law.check(half.mesh, u, &nodes)?;
             let faces = Around::<D, S>::faces(half, law, &nodes, u);
-            half.residual::<S, B, L>(law, (&nodes, &faces), known, u, &mut residual);
+            half.residual(law, excess, (&nodes, &faces), known, u, &mut residual);
             for side in sides {
                 for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
                     *residual = if given.is_some() { 0.0 } else { *residual };
@@ -244,7 +255,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                 let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
                 break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
             }
-            half.matrix(law, (&nodes, &faces), sides, &mut matrix);
+            half.matrix(law, excess, (&nodes, &faces), sides, &mut matrix);
             let stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
             round_off = 16.0 * f64::EPSILON * stiffest;
             let mut correction = vec![[0.0; B]; patch.padded_len()];
@@ -318,6 +329,7 @@ impl<const D: usize> Half<'_, D> {
     fn known<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
+        excess: Option<&Excess<D, S>>,
         u: &[[f64; B]],
     ) -> Result<Vec<[f64; B]>, Failure>
     where
@@ -331,6 +343,13 @@ impl<const D: usize> Half<'_, D> {
             let (leaving, area) = (Around::<D, S>::leaving(self, &faces, k), self.cells.areas()[i]);
             let source = self.source(law, &nodes[k]);
             *known = std::array::from_fn(|c| area * (u[k][c] + source[c]) - leaving[c]);
+            if let Some(excess) = excess {
+                let more: [f64; B] = excess.product(i, k, |n| {
+                    let source = self.source(law, &nodes[n]);
+                    std::array::from_fn(|c| u[n][c] + source[c])
+                });
+                (0..B).for_each(|c| known[c] += more[c]);
+            }
         });
         Ok(known)
     }
@@ -339,6 +358,7 @@ impl<const D: usize> Half<'_, D> {
     fn residual<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
+        excess: Option<&Excess<D, S>>,
         (nodes, faces): Seen<'_, L::Node, B, D>,
         known: &[[f64; B]],
         u: &[[f64; B]],
@@ -350,6 +370,13 @@ impl<const D: usize> Half<'_, D> {
             let (leaving, area) = (Around::<D, S>::leaving(self, faces, k), self.cells.areas()[i]);
             let source = self.source(law, &nodes[k]);
             *residual = std::array::from_fn(|c| (known[i][c] - leaving[c]) / area - (u[k][c] - source[c]));
+            if let Some(excess) = excess {
+                let more: [f64; B] = excess.product(i, k, |n| {
+                    let source = self.source(law, &nodes[n]);
+                    std::array::from_fn(|c| u[n][c] - source[c])
+                });
+                (0..B).for_each(|c| residual[c] -= more[c] / area);
+            }
         });
     }
 
@@ -357,6 +384,7 @@ impl<const D: usize> Half<'_, D> {
     fn matrix<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
+        excess: Option<&Excess<D, S>>,
         (nodes, faces): Seen<'_, L::Node, B, D>,
         sides: &[Side<B>],
         matrix: &mut BlockMatrix<D, S, B>,
@@ -367,6 +395,9 @@ impl<const D: usize> Half<'_, D> {
             *row = Around::<D, S>::row(self, faces, i, k);
             if let Some((_, derivative)) = law.source(&nodes[k]) {
                 add(&mut row[0], -0.5 * self.dt, &derivative);
+            }
+            if let Some(excess) = excess {
+                excess.add_to_row(row, (i, k), (law, nodes), [self.cells.areas()[i], self.dt]);
             }
         });
         for side in sides {
@@ -414,17 +445,19 @@ impl<const D: usize> Half<'_, D> {
         let (across, along) = (scale * dot(normal, normal), 0.25 * scale * turned);
         let passing = law.convection(&nodes[i], &nodes[k], normal);
         let spread = law.diffusivity(&nodes[i], &nodes[k]);
+        let bent = self.stretched.get(i).map_or(0.0, |stretched| stretched[axis] / 24.0);
         let mut face = Face { crossing: passing, tangent: [0.0; B] };
         let Crossing { value, by_below, by_above } = &mut face.crossing;
         for c in 0..B {
             let slope = across * (u[k][c] - u[i][c]) + along * change(c);
             value[c] = half * value[c] - spread.value[c] * slope - 0.25 * swept * (u[i][c] + u[k][c]);
+            value[c] -= bent * (u[k][c] - u[i][c]);
             for e in 0..B {
                 by_below[c][e] = half * by_below[c][e] - spread.by_below[c][e] * slope;
                 by_above[c][e] = half * by_above[c][e] - spread.by_above[c][e] * slope;
             }
-            by_below[c][c] += spread.value[c] * across - 0.25 * swept;
-            by_above[c][c] -= spread.value[c] * across + 0.25 * swept;
+            by_below[c][c] += spread.value[c] * across - 0.25 * swept + bent;
+            by_above[c][c] -= spread.value[c] * across + 0.25 * swept + bent;
             face.tangent[c] = -spread.value[c] * along;
         }
         face

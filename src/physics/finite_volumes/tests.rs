@@ -42,7 +42,7 @@ fn each_flux_keeps_its_own_invariant() {
         law.viscosity = 0.0;
         let u = law.initial(0.0, &mesh);
         let u = padded(mesh.lattice(), u.values().as_chunks::<1>().0, [[0.0]; 2]);
-        let half = Half { dt, t: 0.0, mesh: &mesh, cells: &cells, x: &x, swept: &swept };
+        let half = Half { dt, t: 0.0, mesh: &mesh, cells: &cells, x: &x, swept: &swept, stretched: &[] };
         let faces = half.faces(&law, &Law::nodes(&law, 0.0, &x, &u), &u);
         let sum = |f: fn(f64) -> f64| cells.patch().places().map(|k| half.leaving(&faces, k)[0] * f(u[k][0])).sum();
         [sum(|u| 1.0 / u), sum(|u| u)]
@@ -94,42 +94,39 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
     u: &[[f64; B]],
 ) -> f64 {
     let Motion { t, dt, old, new } = motion;
-    let (lattice, [width, height]) = (new.lattice(), new.extent());
-    let cells = DualCells::new(new);
-    let (patch, swept) = (*cells.patch(), DualCells::new(old).swept(&cells));
-    let x = padded(lattice, new.x(), [[width, 0.0], [0.0, height]]);
+    let lattice = new.lattice();
+    let [old_cells, cells] = [old, new].map(DualCells::new);
+    let (patch, swept) = (*cells.patch(), old_cells.swept(&cells));
+    let [from, x] = [old, new].map(|mesh| padded(lattice, mesh.x(), diagonal(mesh.extent())));
     let seen = inside(new, &x);
-    let half = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x, swept: &swept };
+    let stretched = if L::SHARES_MASS { stretched([&old_cells, &cells], [&from, &x]) } else { Vec::new() };
+    let excess = L::SHARES_MASS.then(|| Excess::of(new));
+    let half = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x, swept: &swept, stretched: &stretched };
+    let nothing = vec![[0.0; B]; patch.len()];
     let residual = |u: &[[f64; B]]| -> Vec<[f64; B]> {
         let nodes = law.nodes(half.t, &seen, u);
         let faces = half.faces(law, &nodes, u);
-        let at = |(i, k): (usize, usize)| {
-            let (leaving, area) = (half.leaving(&faces, k), cells.areas()[i]);
-            let source = law.source(&nodes[k]).map_or([0.0; B], |(s, _)| s.map(|s| 0.5 * dt * s));
-            std::array::from_fn(|c| leaving[c] / area + u[k][c] - source[c])
-        };
-        patch.places().enumerate().map(at).collect()
+        let mut residual = nothing.clone();
+        half.residual(law, excess.as_ref(), (&nodes, &faces), &nothing, u, &mut residual);
+        residual
     };
     let mut u = padded(lattice, u, [[0.0; B]; 2]);
-    repeat_sides(&patch, &mut u);
+    Half::repeat_sides(&patch, &mut u);
     let mut state = 7_u64;
     let mut direction = u.clone();
     for value in direction.as_flattened_mut() {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         *value = (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
     }
-    repeat_sides(&patch, &mut direction);
+    Half::repeat_sides(&patch, &mut direction);
 
     let nodes = law.nodes(half.t, &seen, &u);
     let faces = half.faces(law, &nodes, &u);
     let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
-    for (row, (i, k)) in matrix.rows.iter_mut().zip(patch.places().enumerate()) {
-        *row = half.row(&faces, i, k);
-        if let Some((_, derivative)) = law.source(&nodes[k]) {
-            add(&mut row[0], -0.5 * dt, &derivative);
-        }
-    }
-    lattice.sides().for_each(|i| fold_sides(lattice.beyond(i), &mut matrix.rows[i]));
+    let places: Vec<usize> = patch.places().collect();
+    let sides: Vec<Side<B>> = lattice.sides().map(|i| Side { i, k: places[i], given: [None; B] }).collect();
+    // of −residual
+    half.matrix(law, excess.as_ref(), (&nodes, &faces), &sides, &mut matrix);
     let mut product = vec![[0.0; B]; patch.padded_len()];
     matrix.multiply(&direction, &mut product);
 
@@ -139,7 +136,7 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
         let ahead = residual(&ahead.collect::<Vec<[f64; B]>>());
         let all = patch.places().enumerate().flat_map(|(i, k)| {
             let (start, ahead, product) = (start[i], ahead[i], product[k]);
-            (0..B).map(move |c| ahead[c] - start[c] - epsilon * product[c])
+            (0..B).map(move |c| ahead[c] - start[c] + epsilon * product[c])
         });
         all.fold(0.0, larger)
     };
