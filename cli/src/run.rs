@@ -52,6 +52,7 @@ impl Run {
         terminal::use_threads(self.threads)?;
         match &study {
             Study::MovingMesh(study) => self.watched(study, &out),
+            Study::MovingLine(study) => self.watched(study, &out),
             Study::Poisson(study) => self.watched(study, &out),
             Study::Stefan(study) => self.watched(study, &out),
             Study::Equidistribution(study) => self.watched(study, &out),

@@ -30,46 +30,7 @@ pub type SummaryOf<K> = Summary<<<K as Kind>::Run as Running>::Figures>;
 
 impl Told for MovingMesh {
     fn table(summary: &Summary<MovingFigures>) -> String {
-        let compared = summary.figures.reports.iter().any(|report| report.comparison.is_some());
-        let mut text = String::new();
-        if !summary.figures.reports.is_empty() {
-            text += "       t     l_inf        l2   Q max  Q mean   min J  equidist";
-            text += if compared { "   R max  R mean  mesh rms\n" } else { "\n" };
-        }
-        for report in &summary.figures.reports {
-            let [linf, l2] =
-                report.error.map_or(["-".into(), "-".into()], |e| [e.linf, e.l2].map(|e| format!("{e:.3e}")));
-            let q = report.quality;
-            let smallest = match q.min_scaled_jacobian {
-                small if small > 0.0 && small < 1e-3 => format!("{small:.0e}"),
-                j => format!("{j:.4}"),
-            };
-            text += &format!(
-                "{:>8} {linf:>9} {l2:>9} {:7.3} {:7.3} {smallest:>7} {:9.3}",
-                moment(report.t),
-                q.q_max,
-                q.q_mean,
-                q.equidistribution
-            );
-            if let Some(c) = report.comparison {
-                text += &format!(" {:7.4} {:7.4} {:9.1e}", c.r_max, c.r_mean, c.mesh_rms);
-            }
-            text.push('\n');
-        }
-        if let Some((t, benefit)) = summary.figures.reports.last().and_then(|report| Some((report.t, report.benefit?)))
-        {
-            text += &format!(
-                "benefit  interpolation error about {:.1e} on this mesh, {:.1e} on as many equal cells (t = {})\n",
-                benefit.mesh,
-                benefit.uniform,
-                moment(t)
-            );
-        }
-        let last = summary.figures.reports.last().and_then(|report| Some((report.t, report.interface?)));
-        if let Some((t, interface)) = last.filter(|(_, interface)| interface.points > 0) {
-            text += &interfaces(t, &interface);
-        }
-        text + &cost(summary)
+        moving(summary)
     }
 
     fn more(&self, summary: &Summary<MovingFigures>) -> driftmesh::Result<Option<String>> {
@@ -79,6 +40,58 @@ impl Told for MovingMesh {
     fn left(summary: &Summary<MovingFigures>) -> String {
         last_good(summary.figures.work.steps)
     }
+}
+
+impl Told for MovingMesh<1> {
+    fn table(summary: &Summary<MovingFigures>) -> String {
+        moving(summary)
+    }
+
+    fn left(summary: &Summary<MovingFigures>) -> String {
+        last_good(summary.figures.work.steps)
+    }
+}
+
+/// The reports of a moving mesh, what adaptation brought, and what all of it cost.
+fn moving(summary: &Summary<MovingFigures>) -> String {
+    let compared = summary.figures.reports.iter().any(|report| report.comparison.is_some());
+    let mut text = String::new();
+    if !summary.figures.reports.is_empty() {
+        text += "       t     l_inf        l2   Q max  Q mean   min J  equidist";
+        text += if compared { "   R max  R mean  mesh rms\n" } else { "\n" };
+    }
+    for report in &summary.figures.reports {
+        let [linf, l2] = report.error.map_or(["-".into(), "-".into()], |e| [e.linf, e.l2].map(|e| format!("{e:.3e}")));
+        let q = report.quality;
+        let smallest = match q.min_scaled_jacobian {
+            small if small > 0.0 && small < 1e-3 => format!("{small:.0e}"),
+            j => format!("{j:.4}"),
+        };
+        text += &format!(
+            "{:>8} {linf:>9} {l2:>9} {:7.3} {:7.3} {smallest:>7} {:9.3}",
+            moment(report.t),
+            q.q_max,
+            q.q_mean,
+            q.equidistribution
+        );
+        if let Some(c) = report.comparison {
+            text += &format!(" {:7.4} {:7.4} {:9.1e}", c.r_max, c.r_mean, c.mesh_rms);
+        }
+        text.push('\n');
+    }
+    if let Some((t, benefit)) = summary.figures.reports.last().and_then(|report| Some((report.t, report.benefit?))) {
+        text += &format!(
+            "benefit  interpolation error about {:.1e} on this mesh, {:.1e} on as many equal cells (t = {})\n",
+            benefit.mesh,
+            benefit.uniform,
+            moment(t)
+        );
+    }
+    let last = summary.figures.reports.last().and_then(|report| Some((report.t, report.interface?)));
+    if let Some((t, interface)) = last.filter(|(_, interface)| interface.points > 0) {
+        text += &interfaces(t, &interface);
+    }
+    text + &cost(summary)
 }
 
 impl Told for StefanStudy {

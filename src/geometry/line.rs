@@ -5,14 +5,7 @@ use super::{Cells, DualCells, Lattice, Mesh, Patch, Quality, padded};
 
 impl Cells<1> for Mesh<1> {
     fn dual_cells(&self) -> DualCells<1> {
-        let (lattice, [extent]) = (self.lattice(), self.extent());
-        let ([n], wraps) = (lattice.nodes(), lattice.periodic());
-        let patch = Patch { origin: [0], size: [n], wraps };
-        let x = padded(lattice, self.x(), [[extent]]);
-        let mut centres: Vec<[f64; 1]> = x.windows(2).map(|x| [0.5 * (x[0][0] + x[1][0])]).collect();
-        let areas = centres.windows(2).map(|c| c[1][0] - c[0][0]).collect();
-        centres.push([0.0]);
-        DualCells { patch, centres, normals: vec![[[1.0]]; n + 2], areas }
+        dual_cells(self, 0)
     }
 
     fn swept(from: &DualCells<1>, to: &DualCells<1>) -> Vec<[f64; 1]> {
@@ -90,6 +83,35 @@ impl Cells<1> for Mesh<1> {
         let x = self.closed();
         points.map(|[point]| [self.find(&x, point).0]).collect()
     }
+}
+
+impl DualCells<1> {
+    /// Dual cells of a line along the radius of cylinders: rings, per radian and length, with faces of area r.
+    pub fn cylindrical(mesh: &Mesh<1>) -> Self {
+        dual_cells(mesh, 1)
+    }
+
+    /// Dual cells of a line along the radius of spheres: shells, per steradian, with faces of area r².
+    pub fn spherical(mesh: &Mesh<1>) -> Self {
+        dual_cells(mesh, 2)
+    }
+}
+
+/// Dual cells with the weight r^m: in the place of their ends r stands the volume r^{m+1}/(m+1) within, so that volumes
+/// and what faces sweep are exact.
+fn dual_cells(mesh: &Mesh<1>, m: i32) -> DualCells<1> {
+    let (lattice, [extent]) = (mesh.lattice(), mesh.extent());
+    let ([n], wraps) = (lattice.nodes(), lattice.periodic());
+    let patch = Patch { origin: [0], size: [n], wraps };
+    let x = padded(lattice, mesh.x(), [[extent]]);
+    let middle = |x: &[[f64; 1]]| 0.5 * (x[0][0] + x[1][0]);
+    let within = |r: f64| [r.powi(m + 1) / f64::from(m + 1)];
+    let mut centres: Vec<[f64; 1]> = x.windows(2).map(|x| within(middle(x))).collect();
+    let mut normals: Vec<[[f64; 1]; 1]> = x.windows(2).map(|x| [[middle(x).powi(m)]]).collect();
+    let areas = centres.windows(2).map(|c| c[1][0] - c[0][0]).collect();
+    centres.push([0.0]);
+    normals.push([[1.0]]);
+    DualCells { patch, centres, normals, areas }
 }
 
 impl Mesh<1> {

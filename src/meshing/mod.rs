@@ -150,6 +150,33 @@ kinds! {
     }
 }
 
+/// [`Whole`] on a line.
+pub type LineWhole = Whole<1>;
+
+kinds! {
+    /// `mesh.generator` of a study in one dimension.
+    LineGeneratorKind {
+        "whole" = LineWhole: "one implicit solve of the mesh equation on the whole line",
+        "fixed" = Fixed: "the mesh does not move",
+    }
+}
+
+impl Default for LineGeneratorKind {
+    fn default() -> Self {
+        Self::LineWhole(Whole::default())
+    }
+}
+
+impl LineGeneratorKind {
+    /// The generator, ready to step.
+    pub fn into_generator(self) -> Box<dyn MeshGenerator<1>> {
+        match self {
+            Self::LineWhole(whole) => Box::new(whole),
+            Self::Fixed(fixed) => Box::new(fixed),
+        }
+    }
+}
+
 impl Default for GeneratorKind {
     fn default() -> Self {
         Self::Whole(Whole::default())

@@ -194,12 +194,12 @@ impl Checkpoints {
     }
 }
 
-impl Keeper for Checkpoints {
+impl<const D: usize> Keeper<D> for Checkpoints {
     fn due(&self, step: usize, last: bool) -> bool {
         if last { self.at_the_end } else { self.is_due(step) }
     }
 
-    fn keep(&mut self, checkpoint: &Checkpoint) -> Result<()> {
+    fn keep(&mut self, checkpoint: &Checkpoint<D>) -> Result<()> {
         self.write(checkpoint.step, checkpoint)
     }
 }

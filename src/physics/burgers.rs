@@ -89,6 +89,18 @@ pub enum BurgersFlux {
     Central,
 }
 
+impl BurgersFlux {
+    /// The flux between two values, and its derivatives by both.
+    #[inline(always)]
+    pub(super) fn between(self, a: f64, b: f64) -> (f64, f64, f64) {
+        match self {
+            Self::Product => (0.5 * a * b, 0.5 * b, 0.5 * a),
+            Self::Energy => ((a * a + a * b + b * b) / 6.0, (2.0 * a + b) / 6.0, (a + 2.0 * b) / 6.0),
+            Self::Central => (0.25 * (a * a + b * b), 0.5 * a, 0.5 * b),
+        }
+    }
+}
+
 /// Newton's method has converged once the largest residual is below this; u is of size one.
 const TOLERANCE: f64 = 1e-10;
 /// Newton steps after which a time step is given up.
@@ -235,8 +247,6 @@ impl Row {
 
 impl Law<1> for Burgers {
     type Node = f64;
-    /// The product flux balances A u: what both are wrong by where cells grow is the same for u = x/t.
-    const SHARES_MASS: bool = false;
 
     fn names(&self) -> [&'static str; 1] {
         ["u"]
@@ -249,17 +259,18 @@ impl Law<1> for Burgers {
     #[inline(always)]
     fn convection(&self, &a: &f64, &b: &f64, [nx, ny]: [f64; 2]) -> Crossing<1> {
         let n = nx + ny;
-        let (value, by_a, by_b) = match self.flux {
-            BurgersFlux::Product => (0.5 * a * b, 0.5 * b, 0.5 * a),
-            BurgersFlux::Energy => ((a * a + a * b + b * b) / 6.0, (2.0 * a + b) / 6.0, (a + 2.0 * b) / 6.0),
-            BurgersFlux::Central => (0.25 * (a * a + b * b), 0.5 * a, 0.5 * b),
-        };
+        let (value, by_a, by_b) = self.flux.between(a, b);
         Crossing { value: [n * value], by_below: [[n * by_a]], by_above: [[n * by_b]] }
     }
 
     #[inline(always)]
     fn diffusivity(&self, _: &f64, _: &f64) -> Crossing<1> {
         Crossing { value: [self.viscosity], by_below: [[0.0]], by_above: [[0.0]] }
+    }
+
+    /// The product flux balances A u: what both are wrong by where cells grow is the same for u = x/t.
+    fn shares_mass(&self) -> [bool; 1] {
+        [false]
     }
 
     fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; 1] {

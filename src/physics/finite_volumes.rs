@@ -24,8 +24,6 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// Newton's method has converged once, after at least one step, every residual is below this share of the size of
     /// its unknown. It is far below the error of a time step.
     const TOLERANCE: f64 = 1e-6;
-    /// Whether neighbours have a share in the mass of a node where cells grow ([`Excess`]); else it is A u alone.
-    const SHARES_MASS: bool = true;
 
     /// Names of the unknowns, for messages.
     fn names(&self) -> [&'static str; B];
@@ -45,6 +43,11 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     }
     /// The unknowns that are given on bounded sides; for the others the flux through the sides is zero.
     fn side(&self, t: f64, x: [f64; D]) -> [Option<f64>; B];
+    /// The unknowns for which neighbours have a share in the mass of a node where cells grow ([`Excess`]); for the others
+    /// it is A u alone. Diffusion must damp what overshoots by that.
+    fn shares_mass(&self) -> [bool; B] {
+        [true; B]
+    }
     /// The dual cells over which the law is integrated.
     fn cells(&self, mesh: &Mesh<D>) -> DualCells<D>
     where
@@ -76,7 +79,7 @@ pub(super) struct Crossing<const B: usize> {
 /// x_k − x_i, J = d·N, s is the area that the face sweeps between the meshes, and u_a and u_b are the means of the four
 /// nodes around its ends. On a line there is no t. What leaves a cell enters its neighbour, and a constant stays constant on any moving mesh.
 /// The scheme is Crank–Nicolson in time, solved by Newton's method with the exact Jacobian. Where neighbours have a share
-/// in the mass ([`Law::SHARES_MASS`]), A u and A S are M u and M S, and s (u_i + u_k)/2 is the mean of the product along
+/// in the mass ([`Law::shares_mass`]), A u and A S are M u and M S, and s (u_i + u_k)/2 is the mean of the product along
 /// the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition.
 #[derive(Debug, Clone)]
 pub(super) struct FiniteVolumes<const B: usize, const D: usize = 2, Solver = RobustTransport<B>> {
@@ -127,7 +130,7 @@ struct Half<'a, const D: usize> {
     /// Positions, padded.
     x: &'a [[f64; D]],
     swept: &'a [[f64; D]],
-    /// (d_k − d_i)·N for each face; empty where neighbours have no share in the mass.
+    /// (d_k − d_i)·N for each face; empty where neighbours have no share in the mass of any unknown.
     stretched: &'a [[f64; D]],
 }
 
@@ -173,8 +176,10 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let cells = law.cells(new);
         let swept = old_cells.swept(&cells);
         let [x_old, x_new] = [old, new].map(|mesh| padded(lattice, mesh.x(), diagonal(mesh.extent())));
-        let stretched = if L::SHARES_MASS { stretched([&old_cells, &cells], [&x_old, &x_new]) } else { Vec::new() };
-        let [excess_before, excess] = [old, new].map(|mesh| L::SHARES_MASS.then(|| Excess::<D, S>::of(mesh)));
+        let shares = law.shares_mass();
+        let shared = shares.contains(&true);
+        let stretched = if shared { stretched([&old_cells, &cells], [&x_old, &x_new]) } else { Vec::new() };
+        let [excess_before, excess] = [old, new].map(|mesh| shared.then(|| Excess::<B, D, S>::of(mesh, shares)));
         let mut u = padded(lattice, start, [[0.0; B]; D]);
         let before = Half { dt, t, mesh: old, cells: &old_cells, x: &x_old, swept: &swept, stretched: &stretched };
         let known = before.known(law, excess_before.as_ref(), &u)?;
@@ -206,7 +211,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         &mut self,
         law: &L,
         half: &Half<'_, D>,
-        excess: Option<&Excess<D, S>>,
+        excess: Option<&Excess<B, D, S>>,
         known: &[[f64; B]],
         sides: &[Side<B>],
         u: &mut [[f64; B]],
@@ -329,7 +334,7 @@ impl<const D: usize> Half<'_, D> {
     fn known<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
-        excess: Option<&Excess<D, S>>,
+        excess: Option<&Excess<B, D, S>>,
         u: &[[f64; B]],
     ) -> Result<Vec<[f64; B]>, Failure>
     where
@@ -344,7 +349,7 @@ impl<const D: usize> Half<'_, D> {
             let source = self.source(law, &nodes[k]);
             *known = std::array::from_fn(|c| area * (u[k][c] + source[c]) - leaving[c]);
             if let Some(excess) = excess {
-                let more: [f64; B] = excess.product(i, k, |n| {
+                let more = excess.product(i, k, |n| {
                     let source = self.source(law, &nodes[n]);
                     std::array::from_fn(|c| u[n][c] + source[c])
                 });
@@ -358,7 +363,7 @@ impl<const D: usize> Half<'_, D> {
     fn residual<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
-        excess: Option<&Excess<D, S>>,
+        excess: Option<&Excess<B, D, S>>,
         (nodes, faces): Seen<'_, L::Node, B, D>,
         known: &[[f64; B]],
         u: &[[f64; B]],
@@ -371,7 +376,7 @@ impl<const D: usize> Half<'_, D> {
             let source = self.source(law, &nodes[k]);
             *residual = std::array::from_fn(|c| (known[i][c] - leaving[c]) / area - (u[k][c] - source[c]));
             if let Some(excess) = excess {
-                let more: [f64; B] = excess.product(i, k, |n| {
+                let more = excess.product(i, k, |n| {
                     let source = self.source(law, &nodes[n]);
                     std::array::from_fn(|c| u[n][c] - source[c])
                 });
@@ -384,7 +389,7 @@ impl<const D: usize> Half<'_, D> {
     fn matrix<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
-        excess: Option<&Excess<D, S>>,
+        excess: Option<&Excess<B, D, S>>,
         (nodes, faces): Seen<'_, L::Node, B, D>,
         sides: &[Side<B>],
         matrix: &mut BlockMatrix<D, S, B>,
@@ -445,12 +450,14 @@ impl<const D: usize> Half<'_, D> {
         let (across, along) = (scale * dot(normal, normal), 0.25 * scale * turned);
         let passing = law.convection(&nodes[i], &nodes[k], normal);
         let spread = law.diffusivity(&nodes[i], &nodes[k]);
+        let shares = law.shares_mass();
         let bent = self.stretched.get(i).map_or(0.0, |stretched| stretched[axis] / 24.0);
         let mut face = Face { crossing: passing, tangent: [0.0; B] };
         let Crossing { value, by_below, by_above } = &mut face.crossing;
         for c in 0..B {
             let slope = across * (u[k][c] - u[i][c]) + along * change(c);
             value[c] = half * value[c] - spread.value[c] * slope - 0.25 * swept * (u[i][c] + u[k][c]);
+            let bent = if shares[c] { bent } else { 0.0 };
             value[c] -= bent * (u[k][c] - u[i][c]);
             for e in 0..B {
                 by_below[c][e] = half * by_below[c][e] - spread.by_below[c][e] * slope;

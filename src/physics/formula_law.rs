@@ -22,6 +22,7 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     /// The exact solution, for the unknowns that have one.
     exact: Vec<(usize, Program<D, 1>)>,
     has_source: bool,
+    diffuses: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
 }
@@ -42,6 +43,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
+            diffuses: std::array::from_fn(|c| nodal[Self::DIFFUSIVITY * B + c].text() != "0"),
             has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
             initial: Program::new(std::array::from_fn(|c| &initial[c])),
@@ -206,6 +208,10 @@ where
 
     fn side(&self, t: f64, x: [f64; D]) -> [Option<f64>; B] {
         self.given(t, x)
+    }
+
+    fn shares_mass(&self) -> [bool; B] {
+        self.diffuses
     }
 
     fn cells(&self, mesh: &Mesh<D>) -> DualCells<D>

@@ -5,12 +5,14 @@ mod curvilinear;
 mod finite_volumes;
 mod formula_law;
 mod formula_pde;
+mod line;
 mod prescribed;
 mod shallow_water;
 mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
 pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE};
+pub use line::{Coordinates, LineBurgers, LineFormulaPde, LinePdeKind};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
 pub use uniform::UniformBurgers;

@@ -13,8 +13,10 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 #[allow(clippy::large_enum_variant)] // one value a run
 pub enum Study {
-    /// Of kind `moving-mesh`.
+    /// Of kind `moving-mesh`, in two dimensions.
     MovingMesh(MovingMesh),
+    /// Of kind `moving-mesh`, in one dimension.
+    MovingLine(MovingMesh<1>),
     /// Of kind `poisson`.
     Poisson(PoissonStudy),
     /// Of kind `stefan`.
@@ -28,6 +30,7 @@ macro_rules! each {
     ($study:expr, $it:ident => $does:expr) => {
         match $study {
             Study::MovingMesh($it) => $does,
+            Study::MovingLine($it) => $does,
             Study::Poisson($it) => $does,
             Study::Stefan($it) => $does,
             Study::Equidistribution($it) => $does,
@@ -49,11 +52,22 @@ impl Study {
         struct PeekHeader {
             kind: StudyKind,
         }
+        /// The axes of a moving mesh.
+        #[derive(Deserialize)]
+        struct PeekGrid {
+            grid: PeekCells,
+        }
+        #[derive(Deserialize)]
+        struct PeekCells {
+            cells: Vec<u64>,
+        }
+        let is_line = || source.parse::<PeekGrid>().is_ok_and(|peek| peek.grid.cells.len() == 1);
         // whatever is wrong before the kind is known is told by the reader of the first kind
         match source.parse::<Peek>().map(|peek| peek.study.kind) {
             Ok(StudyKind::Poisson) => PoissonStudy::from_source(source).map(Self::Poisson),
             Ok(StudyKind::Stefan) => StefanStudy::from_source(source).map(Self::Stefan),
             Ok(StudyKind::Equidistribution) => EquidistributionStudy::from_source(source).map(Self::Equidistribution),
+            Ok(StudyKind::MovingMesh) if is_line() => MovingMesh::from_source(source).map(Self::MovingLine),
             _ => MovingMesh::from_source(source).map(Self::MovingMesh),
         }
     }

@@ -2,6 +2,7 @@
 
 mod any;
 mod common;
+mod dimension;
 mod equidistribution;
 mod front_checks;
 mod front_figures;
@@ -27,6 +28,7 @@ mod uniform;
 
 pub use any::Study;
 pub use common::{Header, Output, StudyKind};
+pub use dimension::{GeneratorTable, PdeTable, Settings, Studied};
 pub use equidistribution::{
     Discretization, EquidistributionStudy, FirstMesh, Integral, Interval, LineArclength, LineDensityKind, LineDomain,
     LineFormula, LineGrid, LineTime, MethodName, SchwarzTable, Start, StopTable,

@@ -1,15 +1,15 @@
 //! Studies of kind `moving-mesh`: what is refused, what is completed, and what is doubtful.
 
 use super::common::{Header, Output, StudyKind};
+use super::dimension::{GeneratorTable, PdeTable, Studied};
 use super::kind::Kind;
-use super::moving_mesh::{Domain, MovingMesh, StartMesh, Stepper};
+use super::moving_mesh::{MovingMesh, StartMesh, Stepper};
 use super::moving_run::MovingRun;
 use crate::density::{ArclengthTable, GivenTable, MonitorKind};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::geometry::Lattice;
-use crate::meshing::GeneratorKind;
-use crate::physics::{PdeKind, formula};
+use crate::geometry::{Lattice, Mesh};
+use crate::physics::formula;
 use crate::setting::Auto;
 
 /// Memory that a run needs for each node: 2250 bytes measured at 600 × 600 cells with subdomains and a reference, and a
@@ -20,8 +20,11 @@ const SAMPLES: usize = 100;
 /// A difference, as a share of the largest value, that is not of rounding.
 const NOT_ROUNDING: f64 = 1e-9;
 
-impl Kind for MovingMesh {
-    type Run = MovingRun;
+impl<const D: usize> Kind for MovingMesh<D>
+where
+    Mesh<D>: Studied<D>,
+{
+    type Run = MovingRun<D>;
 
     const KIND: StudyKind = StudyKind::MovingMesh;
 
@@ -32,7 +35,7 @@ impl Kind for MovingMesh {
     fn resolve(&mut self) -> Result<()> {
         self.study.check_name()?;
         self.pde.check().map_err(|error| error.within("pde"))?;
-        self.check_axes()?;
+        self.pde.check_axes(&self.domain)?;
         self.check_stepper()?;
         self.check_tolerance()?;
         self.safety.check().map_err(|error| error.within("safety"))?;
@@ -42,8 +45,9 @@ impl Kind for MovingMesh {
         if let Some(compare) = &self.compare {
             compare.generator.check(&lattice).map_err(|error| error.within("generator").within("compare"))?;
         }
-        let prescribed_density = matches!(&self.pde, PdeKind::Prescribed(p) if p.rho.is_some());
-        let stays = matches!(self.mesh.generator, GeneratorKind::Fixed(_));
+        let [_, prescribed_density] = self.pde.prescribes();
+        let stays = self.mesh.generator.stays();
+        let unknowns = self.physics()?.unknowns();
         let monitor = self.monitor.get_or_insert_with(|| match prescribed_density {
             true => MonitorKind::GivenTable(GivenTable::default()),
             // no mesh follows it: the cheap one
@@ -51,15 +55,14 @@ impl Kind for MovingMesh {
             false => MonitorKind::default(),
         });
         monitor.check().map_err(|error| error.within("monitor"))?;
-        let unknowns = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?.unknowns();
-        monitor.clone().into_monitor::<2>(&unknowns).map_err(|error| error.within("monitor"))?;
+        monitor.clone().into_monitor::<D>(&unknowns).map_err(|error| error.within("monitor"))?;
         if prescribed_density && !matches!(monitor, MonitorKind::GivenTable(_)) {
             let rule = "pde.rho is the density itself; set it to \"given\", or leave [monitor] out";
             return Err(Error::invalid("monitor.kind", format!("\"{}\"", monitor.name()), rule));
         }
-        self.mesh.start.get_or_insert(match self.mesh.generator {
-            GeneratorKind::Fixed(_) => StartMesh::Uniform,
-            _ => StartMesh::Adapted,
+        self.mesh.start.get_or_insert(match stays {
+            true => StartMesh::Uniform,
+            false => StartMesh::Adapted,
         });
         self.equation().check().map_err(|error| error.within("mesh"))?;
         self.mesh.coupling.check().map_err(|error| error.within("coupling").within("mesh"))?;
@@ -78,11 +81,11 @@ impl Kind for MovingMesh {
     fn warnings(&self) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
         for (key, text) in self.pde.formulas() {
-            let f = formula::<2>(&key, text).map_err(|error| error.within("pde"))?;
-            warnings.extend((0..2).filter(|&d| self.domain.periodic[d]).filter_map(|d| self.jump(&key, &f, d)));
+            let f = formula::<D>(&key, text).map_err(|error| error.within("pde"))?;
+            warnings.extend((0..D).filter(|&d| self.domain.periodic[d]).filter_map(|d| self.jump(&key, &f, d)));
         }
         for [(at_start, initial), (on_sides, boundary)] in self.pde.starts_and_sides() {
-            let both = [formula::<2>(&at_start, initial)?, formula::<2>(&on_sides, boundary)?];
+            let both = [formula::<D>(&at_start, initial)?, formula::<D>(&on_sides, boundary)?];
             warnings.extend(self.gap(&at_start, &on_sides, &both));
         }
         Ok(warnings)
@@ -93,41 +96,15 @@ impl Kind for MovingMesh {
         self.simulation()?.start(self.uniform_mesh()?).map(|_| ())
     }
 
-    fn begin(&self) -> Result<MovingRun> {
+    fn begin(&self) -> Result<MovingRun<D>> {
         MovingRun::of(self)
     }
 }
 
-impl MovingMesh {
-    /// Refuses axes that the equation is not made for.
-    fn check_axes(&self) -> Result<()> {
-        let periodic = self.domain.periodic;
-        let (wrong, rule) = match &self.pde {
-            PdeKind::Burgers(burgers) if burgers.initial.is_none() => (
-                periodic.contains(&true),
-                "the front of pde.kind = \"burgers\" needs bounded axes; set it to [false, false], or give pde.initial",
-            ),
-            PdeKind::Burgers(burgers) => (
-                periodic.contains(&false) == burgers.boundary.is_none(),
-                match burgers.boundary {
-                    None => {
-                        "pde.initial needs pde.boundary beside it on bounded axes; add it, or make both axes periodic"
-                    }
-                    Some(_) => "pde.boundary has no side to stand on; leave it out, or make an axis bounded",
-                },
-            ),
-            PdeKind::ShallowWater(_) => {
-                (periodic.contains(&false), "pde.kind = \"shallow-water\" needs periodic axes; set it to [true, true]")
-            }
-            PdeKind::FormulaPde(pde) => return pde.check_sides(periodic).map_err(|error| error.within("pde")),
-            PdeKind::Prescribed(_) => (false, ""),
-        };
-        if !wrong {
-            return Ok(());
-        }
-        Err(Error::invalid("domain.periodic", format!("{periodic:?}"), rule))
-    }
-
+impl<const D: usize> MovingMesh<D>
+where
+    Mesh<D>: Studied<D>,
+{
     /// Refuses a stepper that the rest of the study does not go with, and fills in its order.
     fn check_stepper(&mut self) -> Result<()> {
         if let (None, Some(order)) = (self.time.stepper, self.time.order) {
@@ -155,74 +132,89 @@ impl MovingMesh {
                 "time.tolerance decides on the steps; leave one of both out, or give the longest step as a number";
             return Err(Error::invalid("time.step", "\"auto\"", rule));
         }
-        let rule = match (&self.pde, self.time.stepper) {
+        let rule = match (self.pde.prescribes(), self.time.stepper) {
             (_, Some(Stepper::Rk4)) => "stepper = \"rk4\" has steps of its own; leave one of both out",
-            (PdeKind::Prescribed(_), _) => "pde.kind = \"prescribed\" has no error in time; leave it out",
+            ([true, _], _) => "pde.kind = \"prescribed\" has no error in time; leave it out",
             _ => return Ok(()),
         };
         Err(Error::invalid("time.tolerance", tolerance, rule))
     }
 
-    /// Places along an axis, both ends among them.
-    fn samples(&self, d: usize) -> impl Iterator<Item = f64> + Clone {
-        let Domain { lower, upper, .. } = self.domain;
-        (0..=SAMPLES).map(move |k| lower[d] + (upper[d] - lower[d]) * k as f64 / SAMPLES as f64)
+    /// Places on the domain, `SAMPLES` and one along each axis but those along which they stand at one place.
+    fn places(&self, at: [Option<f64>; D]) -> impl Iterator<Item = [f64; D]> {
+        let (lower, upper) = (*self.domain.lower, *self.domain.upper);
+        let count = at.iter().filter(|at| at.is_none()).count() as u32;
+        (0..(SAMPLES + 1).pow(count)).map(move |k| {
+            let mut rest = k;
+            std::array::from_fn(|d| {
+                at[d].unwrap_or_else(|| {
+                    let place = rest % (SAMPLES + 1);
+                    rest /= SAMPLES + 1;
+                    lower[d] + (upper[d] - lower[d]) * place as f64 / SAMPLES as f64
+                })
+            })
+        })
     }
 
     /// Says so where a formula jumps from one end of a periodic axis to the other.
     fn jump(&self, key: &str, f: &Formula, d: usize) -> Option<String> {
-        let Domain { lower, upper, .. } = self.domain;
+        let [lower, upper] = [self.domain.lower[d], self.domain.upper[d]];
         let (mut jump, mut size) = (0.0_f64, 0.0_f64);
-        for (t, along) in [self.time.start, self.time.end].iter().flat_map(|t| self.samples(1 - d).map(move |s| (t, s)))
-        {
-            let at = |across: f64| {
-                let x = if d == 0 { [across, along] } else { [along, across] };
-                f.eval(&[x[0], x[1], *t])
-            };
-            jump = jump.max((at(lower[d]) - at(upper[d])).abs());
-            size = self.samples(d).fold(size, |size, across| size.max(at(across).abs()));
+        for t in [self.time.start, self.time.end] {
+            for x in self.places(std::array::from_fn(|e| (e == d).then_some(lower))) {
+                let mut across = x;
+                across[d] = upper;
+                jump = jump.max((at(f, x, t) - at(f, across, t)).abs());
+            }
+            size = self.places([None; D]).fold(size, |size, x| size.max(at(f, x, t).abs()));
         }
         let axis = ["x", "y"][d];
         (jump > NOT_ROUNDING * size).then(|| {
             format!(
-                "`pde.{key}` is not periodic along {axis}: from {axis} = {} to {axis} = {} it jumps by up to \
-                 {jump:.1e}",
-                upper[d], lower[d]
+                "`pde.{key}` is not periodic along {axis}: from {axis} = {upper} to {axis} = {lower} it jumps by up to \
+                 {jump:.1e}"
             )
         })
     }
 
     /// Says so where the values on the bounded sides are not the initial ones at the start.
-    fn gap(&self, at_start: &str, on_sides: &str, both: &[Formula; 2]) -> Option<String> {
-        let Domain { lower, upper, periodic } = self.domain;
-        let mut worst = (0.0_f64, [0.0; 2]);
+    fn gap(&self, at_start: &str, on_sides: &str, [initial, boundary]: &[Formula; 2]) -> Option<String> {
+        let t = self.time.start;
         // of the data everywhere: what is far below that is rounding
-        let inside = (0..100).map(|k| [0, 1].map(|d| [k % 10, k / 10][d] as f64 / 9.0));
-        let inside = inside.map(|s| [0, 1].map(|d| lower[d] + s[d] * (upper[d] - lower[d])));
-        let at = |[x, y]: [f64; 2]| both[0].eval(&[x, y, self.time.start]).abs();
-        let mut size = inside.map(at).filter(|u| u.is_finite()).fold(0.0_f64, f64::max);
-        for d in (0..2).filter(|&d| !periodic[d]) {
-            for (across, along) in [lower[d], upper[d]].iter().flat_map(|x| self.samples(1 - d).map(move |s| (*x, s))) {
-                let x = if d == 0 { [across, along] } else { [along, across] };
-                let [u, side] = [0, 1].map(|k| both[k].eval(&[x[0], x[1], self.time.start]));
-                size = size.max(u.abs()).max(side.abs());
-                if (u - side).abs() > worst.0 {
-                    worst = ((u - side).abs(), x);
+        let all = self.places([None; D]).map(|x| at(initial, x, t).abs());
+        let mut size = all.filter(|u| u.is_finite()).fold(0.0_f64, f64::max);
+        let mut worst = (0.0_f64, [0.0; D]);
+        for d in (0..D).filter(|&d| !self.domain.periodic[d]) {
+            for end in [self.domain.lower[d], self.domain.upper[d]] {
+                for x in self.places(std::array::from_fn(|e| (e == d).then_some(end))) {
+                    let [u, side] = [initial, boundary].map(|f| at(f, x, t));
+                    size = size.max(u.abs()).max(side.abs());
+                    if (u - side).abs() > worst.0 {
+                        worst = ((u - side).abs(), x);
+                    }
                 }
             }
         }
-        let (gap, [x, y]) = worst;
+        let (gap, x) = worst;
+        let place: Vec<String> = ["x", "y"].iter().zip(x).map(|(axis, x)| format!("{axis} = {x}")).collect();
         (gap > NOT_ROUNDING * size).then(|| {
             format!(
-                "`pde.{on_sides}` is not `pde.{at_start}` at the start: on the sides they differ by up to {gap:.1e}, \
-                 at x = {x}, y = {y}"
+                "`pde.{on_sides}` is not `pde.{at_start}` at the start: on the sides they differ by up to {gap:.1e}, at \
+                 {}",
+                place.join(", ")
             )
         })
     }
 
     fn check_size(&self) -> Result<()> {
-        let lattice = Lattice::new(self.grid.cells, self.domain.periodic).map_err(|error| error.within("grid"))?;
+        let lattice = Lattice::new(*self.grid.cells, *self.domain.periodic).map_err(|error| error.within("grid"))?;
         let nodes = lattice.nodes().into_iter().map(|n| n as u128).product();
-        super::memory::check_memory(nodes, BYTES_PER_NODE, &self.grid.cells)
+        super::memory::check_memory(nodes, BYTES_PER_NODE, &*self.grid.cells)
     }
+}
+
+/// The value of a formula of place and time.
+fn at<const D: usize>(f: &Formula, x: [f64; D], t: f64) -> f64 {
+    let values: Vec<f64> = x.into_iter().chain([t]).collect();
+    f.eval(&values)
 }

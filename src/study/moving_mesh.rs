@@ -1,87 +1,114 @@
 //! Studies of kind `moving-mesh`: what they say, and what they describe.
 
 use super::common::{Header, Output};
+use super::dimension::{GeneratorTable, PdeTable, Studied};
 use crate::density::MonitorKind;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{Form, GeneratorKind, Mmpde, Relaxation};
 use crate::mover::{Ending, Mover};
 use crate::output::FramesAt;
-use crate::physics::{PdeKind, Physics, UniformBurgers};
-use crate::setting::{Auto, pair};
+use crate::physics::{Coordinates, Physics};
+use crate::setting::{Auto, Axes};
 use crate::simulation::{Coupling, Observer, Record, Safety, Schedule, Simulation, State, timed};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A study of kind `moving-mesh`: a PDE on a mesh that follows its solution.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MovingMesh {
+#[serde(deny_unknown_fields, bound = "")]
+#[schemars(rename = "MovingMesh")]
+pub struct MovingMesh<const D: usize = 2>
+where
+    Mesh<D>: Studied<D>,
+{
     /// `[study]`.
     pub study: Header,
     /// `[domain]`.
     #[serde(default)]
-    pub domain: Domain,
+    pub domain: Domain<D>,
     /// `[grid]`.
-    pub grid: Grid,
+    pub grid: Grid<D>,
     /// `[time]`.
     pub time: Time,
     /// `[pde]`.
-    pub pde: PdeKind,
+    pub pde: Pde<D>,
     /// `[monitor]`. Left out, it is `auto`; `given` where `pde.rho` prescribes the density; `arclength` where the mesh
     /// does not move, since no mesh follows it and it is the cheapest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub monitor: Option<MonitorKind>,
     /// `[mesh]`.
     #[serde(default)]
-    pub mesh: MeshTable,
+    pub mesh: MeshTable<Generator<D>>,
     /// `[safety]`.
     #[serde(default)]
     pub safety: Safety,
     /// `[compare]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub compare: Option<Compare>,
+    pub compare: Option<Compare<Generator<D>>>,
     /// `[output]`.
     #[serde(default)]
     pub output: Output,
 }
 
+/// `[pde]` in D dimensions.
+type Pde<const D: usize> = <Mesh<D> as Studied<D>>::Pde;
+/// `mesh.generator` in D dimensions.
+type Generator<const D: usize> = <Mesh<D> as Studied<D>>::Generator;
+
 /// `[compare]`: the same study with another generator, as a reference for the mesh.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Compare {
+pub struct Compare<G = GeneratorKind> {
     /// How the mesh of the reference moves.
-    pub generator: GeneratorKind,
+    pub generator: G,
 }
 
 /// `[domain]`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Domain {
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Domain")]
+pub struct Domain<const D: usize = 2> {
     /// Lower corner of the box.
-    #[serde(deserialize_with = "pair")]
-    pub lower: [f64; 2],
+    #[serde(default = "origin::<D>")]
+    pub lower: Axes<f64, D>,
     /// Upper corner of the box.
-    #[serde(deserialize_with = "pair")]
-    pub upper: [f64; 2],
+    #[serde(default = "ones::<D>")]
+    pub upper: Axes<f64, D>,
     /// Axes that wrap around.
-    #[serde(deserialize_with = "pair")]
-    pub periodic: [bool; 2],
+    #[serde(default = "bounded::<D>")]
+    pub periodic: Axes<bool, D>,
+    /// The coordinate along a line: with `cylindrical` and `spherical` it is the distance r from an axis or a point, 0 or
+    /// more, and volumes have the weight r or r². In one dimension only; `cartesian` where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coordinates: Option<Coordinates>,
 }
 
-impl Default for Domain {
+impl<const D: usize> Default for Domain<D> {
     fn default() -> Self {
-        Self { lower: [0.0; 2], upper: [1.0; 2], periodic: [false; 2] }
+        Self { lower: origin(), upper: ones(), periodic: bounded(), coordinates: None }
     }
+}
+
+fn origin<const D: usize>() -> Axes<f64, D> {
+    Axes([0.0; D])
+}
+
+fn ones<const D: usize>() -> Axes<f64, D> {
+    Axes([1.0; D])
+}
+
+fn bounded<const D: usize>() -> Axes<bool, D> {
+    Axes([false; D])
 }
 
 /// `[grid]`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Grid {
+#[schemars(rename = "Grid")]
+pub struct Grid<const D: usize = 2> {
     /// Cells along each axis.
-    #[serde(deserialize_with = "pair")]
-    pub cells: [usize; 2],
+    pub cells: Axes<usize, D>,
 }
 
 /// `[time]`.
@@ -121,7 +148,7 @@ pub enum Stepper {
 /// `[mesh]`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct MeshTable {
+pub struct MeshTable<G: Default = GeneratorKind> {
     /// τ of the mesh equation.
     pub relaxation: Relaxation,
     /// Form of the mesh equation.
@@ -130,18 +157,18 @@ pub struct MeshTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start: Option<StartMesh>,
     /// How the mesh moves.
-    pub generator: GeneratorKind,
+    pub generator: G,
     /// How mesh and physics alternate.
     pub coupling: Coupling,
 }
 
-impl Default for MeshTable {
+impl<G: Default> Default for MeshTable<G> {
     fn default() -> Self {
         Self {
             relaxation: Mmpde::default().relaxation,
             form: MeshForm::Conservative,
             start: None,
-            generator: GeneratorKind::default(),
+            generator: G::default(),
             coupling: Coupling::default(),
         }
     }
@@ -167,24 +194,13 @@ pub enum StartMesh {
     Adapted,
 }
 
-impl MovingMesh {
+impl<const D: usize> MovingMesh<D>
+where
+    Mesh<D>: Studied<D>,
+{
     /// The equation with its stepper.
-    pub(super) fn physics(&self) -> Result<Box<dyn Physics>> {
-        let physics = self.pde.clone().into_physics().map_err(|error| error.within("pde"))?;
-        if self.time.stepper.is_none() {
-            return Ok(physics);
-        }
-        match (&self.pde, &self.mesh.generator) {
-            (PdeKind::Burgers(burgers), GeneratorKind::Fixed(_)) => {
-                let uniform = UniformBurgers::new(burgers.clone(), self.time.order.unwrap_or(2));
-                Ok(Box::new(uniform.map_err(|error| error.within("time"))?))
-            }
-            _ => {
-                let rule = "steps pde.kind = \"burgers\" on a mesh that stays; set mesh.generator to \
-                            { kind = \"fixed\" }, or leave time.stepper out";
-                Err(Error::invalid("time.stepper", "\"rk4\"", rule))
-            }
-        }
+    pub(super) fn physics(&self) -> Result<Box<dyn Physics<D>>> {
+        self.pde.physics(&self.domain, &self.time, self.mesh.generator.stays())
     }
 
     pub(super) fn schedule(&self) -> Result<Schedule> {
@@ -219,10 +235,10 @@ impl MovingMesh {
     /// [`Error::Failed`] where there is none, or what an observer returned.
     pub fn start(
         &self,
-        simulation: &Simulation,
+        simulation: &Simulation<D>,
         record: &mut Record,
         observers: &mut [&mut dyn Observer],
-    ) -> Result<State> {
+    ) -> Result<State<D>> {
         record.timed(|record| {
             let mut mesh = self.uniform_mesh()?;
             if self.mesh.start == Some(StartMesh::Adapted) {
@@ -251,16 +267,16 @@ impl MovingMesh {
     ///
     /// # Errors
     /// [`Error::Invalid`] where the grid or the domain makes no mesh.
-    pub fn uniform_mesh(&self) -> Result<Mesh<2>> {
-        let lattice = Lattice::new(self.grid.cells, self.domain.periodic).map_err(|error| error.within("grid"))?;
-        Mesh::uniform(lattice, self.domain.lower, self.domain.upper).map_err(|error| error.within("domain"))
+    pub fn uniform_mesh(&self) -> Result<Mesh<D>> {
+        let lattice = Lattice::new(*self.grid.cells, *self.domain.periodic).map_err(|error| error.within("grid"))?;
+        Mesh::uniform(lattice, *self.domain.lower, *self.domain.upper).map_err(|error| error.within("domain"))
     }
 
     /// The simulation that this study describes.
     ///
     /// # Errors
     /// [`Error::Invalid`] with the dotted key of a setting out of range.
-    pub fn simulation(&self) -> Result<Simulation> {
+    pub fn simulation(&self) -> Result<Simulation<D>> {
         let physics = self.physics()?;
         let monitor = self.monitor().into_monitor(&physics.unknowns()).map_err(|error| error.within("monitor"))?;
         Ok(Simulation {

@@ -1,16 +1,19 @@
 //! Studies of kind `moving-mesh`: how they run, and what they leave.
 
 use super::MovingMesh;
+use super::dimension::{GeneratorTable, Studied};
 use super::kind::{Running, SpentBy};
 use super::rest::at_rest;
 use super::runner::Stage;
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
 use crate::kept::{Kept, check_nodal};
-use crate::output::{Figures, Frames, FramesAt, History, RunDirectory, Spent, Summary};
+use crate::output::{
+    Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Spent, Summary, final_arrays, moment,
+};
 use crate::simulation::{
     Checkpoint, Course, Event, Keeper, Observer, Record, Report, Retries, Scene, Seconds, Simulation, Snapshot, State,
-    WorkTotal,
+    Values, WorkTotal,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -44,29 +47,35 @@ impl Figures for MovingFigures {
 }
 
 /// A moving mesh while it runs.
-pub struct MovingRun {
-    study: MovingMesh,
-    simulation: Simulation,
+pub struct MovingRun<const D: usize = 2>
+where
+    Mesh<D>: Studied<D>,
+{
+    study: MovingMesh<D>,
+    simulation: Simulation<D>,
     /// The last good state; none before the mesh is adapted to the initial solution.
-    pub state: Option<State>,
+    pub state: Option<State<D>>,
     /// What was found in the steps done, and what they cost.
     pub record: Record,
     /// What the loop of a checkpoint carries.
     course: Option<Course>,
     history: Option<History>,
-    meshes: Meshes,
+    meshes: Meshes<D>,
 }
 
-impl MovingRun {
+impl<const D: usize> MovingRun<D>
+where
+    Mesh<D>: Studied<D>,
+{
     /// Before anything is computed.
-    pub(super) fn of(study: &MovingMesh) -> Result<Self> {
+    pub(super) fn of(study: &MovingMesh<D>) -> Result<Self> {
         let (simulation, meshes, study) = (study.simulation()?, Meshes::of(study), study.clone());
         let record = Record::default();
         Ok(Self { study, simulation, state: None, record, course: None, history: None, meshes })
     }
 
     /// Takes the steps that are left.
-    fn steps(&mut self, state: &mut State, stage: &mut Stage<'_>) -> Result<()> {
+    fn steps(&mut self, state: &mut State<D>, stage: &mut Stage<'_>) -> Result<()> {
         let compares = self.study.compare.is_some();
         let (watching, mut checkpoints) = stage.parts();
         let mut observers: Vec<&mut dyn Observer> = Vec::new();
@@ -75,7 +84,7 @@ impl MovingRun {
         observers.extend(watching);
         // much is left to do after the last step, too
         checkpoints.iter_mut().for_each(|checkpoints| checkpoints.at_the_end = compares);
-        let keeper = checkpoints.map(|checkpoints| checkpoints as &mut dyn Keeper);
+        let keeper = checkpoints.map(|checkpoints| checkpoints as &mut dyn Keeper<D>);
         self.simulation.run_on(state, &mut self.record, &mut observers, keeper, self.course.take())
     }
 
@@ -93,7 +102,8 @@ impl MovingRun {
         let mut state = reference.start(&simulation, &mut Record::default(), &mut observers)?;
         simulation.run(&mut state, &mut Record::default(), &mut observers)?;
         for report in &mut self.record.reports {
-            let at = |meshes: &Meshes| meshes.found.iter().find(|(t, _)| *t == report.t).map(|(_, mesh)| mesh.clone());
+            let at =
+                |meshes: &Meshes<D>| meshes.found.iter().find(|(t, _)| *t == report.t).map(|(_, mesh)| mesh.clone());
             report.comparison = at(&self.meshes).zip(at(&theirs)).map(|(ours, theirs)| compare(&ours, &theirs));
         }
         Ok(())
@@ -105,9 +115,12 @@ impl MovingRun {
     }
 }
 
-impl Running for MovingRun {
+impl<const D: usize> Running for MovingRun<D>
+where
+    Mesh<D>: Studied<D>,
+{
     type Figures = MovingFigures;
-    type Checkpoint = MovingCheckpoint;
+    type Checkpoint = MovingCheckpoint<D>;
 
     fn go(&mut self, stage: &mut Stage<'_>) -> Result<()> {
         let mut state = match self.state.take() {
@@ -132,7 +145,7 @@ impl Running for MovingRun {
 
     fn resume(
         &mut self,
-        MovingCheckpoint(found): MovingCheckpoint,
+        MovingCheckpoint(found): MovingCheckpoint<D>,
         directory: Option<&Path>,
     ) -> Result<(SpentBy<Self>, Kept), Unfit> {
         let mesh = self.study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
@@ -155,8 +168,12 @@ impl Running for MovingRun {
         Ok(self.state.iter().map(|state| state.scene(&unknowns)).collect())
     }
 
-    fn leave(&mut self, _directory: &RunDirectory) -> Result<()> {
-        self.history.iter_mut().try_for_each(History::flush)
+    fn leave(&mut self, directory: &RunDirectory) -> Result<()> {
+        self.history.iter_mut().try_for_each(History::flush)?;
+        match self.scenes()?.last().filter(|_| D == 1) {
+            Some(scene) => leave_line(&self.study.study.name, scene, directory),
+            None => Ok(()),
+        }
     }
 
     fn tell(&self, summary: &mut Summary<MovingFigures>) {
@@ -172,36 +189,60 @@ impl Running for MovingRun {
 
 /// Everything that the steps of a run to come depend on, and what was found in those done.
 #[derive(Deserialize)]
-pub struct MovingCheckpoint(Checkpoint);
+pub struct MovingCheckpoint<const D: usize = 2>(Checkpoint<D>);
 
 /// Where the history of a run is.
 const HISTORY: &str = "history.csv";
 
-/// Keeps the meshes at the times of reports, where `[compare]` gives something to compare them with.
-struct Meshes {
-    at: Vec<f64>,
-    found: Vec<(f64, Mesh<2>)>,
+/// Leaves the arrays of a line and a plot of its first unknown.
+fn leave_line(name: &str, scene: &Scene, directory: &RunDirectory) -> Result<()> {
+    directory.write("final.npz", &final_arrays(scene))?;
+    let curves = scene.nodal.iter().filter_map(|(name, values)| match values {
+        Values::Scalars(values) => {
+            let points = scene.points.iter().zip(values).map(|(x, u)| [x[0], *u]).collect();
+            Some(Curve { name: name.clone(), points, ..Curve::default() })
+        }
+        _ => None,
+    });
+    let figure = Figure {
+        title: format!("{name}, t = {}", moment(scene.t)),
+        labels: ["x".into(), scene.nodal.first().map_or("u".into(), |(name, _)| name.clone())],
+        scales: [Scale::Linear; 2],
+        curves: curves.collect(),
+        ..Figure::default()
+    };
+    figure.draw().write(directory.path(), "mesh")
 }
 
-impl Meshes {
-    fn of(study: &MovingMesh) -> Self {
+/// Keeps the meshes at the times of reports, where `[compare]` gives something to compare them with.
+struct Meshes<const D: usize> {
+    at: Vec<f64>,
+    found: Vec<(f64, Mesh<D>)>,
+}
+
+impl<const D: usize> Meshes<D>
+where
+    Mesh<D>: Studied<D>,
+{
+    fn of(study: &MovingMesh<D>) -> Self {
         let at = if study.compare.is_some() { study.time.report.clone() } else { Vec::new() };
         Self { at, found: Vec::new() }
     }
 
-    fn resume(study: &MovingMesh, mesh: &Mesh<2>, kept: &Kept) -> Result<Self, Unfit> {
-        let found: Vec<(f64, Vec<[f64; 2]>)> = kept.get("meshes")?;
-        let moved = |(t, x): (f64, Vec<[f64; 2]>)| {
-            check_nodal("mesh at a report", &x, mesh.lattice().len())?;
-            Ok((t, mesh.moved(x).map_err(|failure| Unfit::Damaged(failure.to_string()))?))
+    fn resume(study: &MovingMesh<D>, mesh: &Mesh<D>, kept: &Kept) -> Result<Self, Unfit> {
+        let found: Vec<(f64, Vec<f64>)> = kept.get("meshes")?;
+        let moved = |(t, x): (f64, Vec<f64>)| {
+            let (x, rest) = x.as_chunks::<D>();
+            check_nodal("mesh at a report", x, mesh.lattice().len() + rest.len())?;
+            Ok((t, mesh.moved(x.to_vec()).map_err(|failure| Unfit::Damaged(failure.to_string()))?))
         };
         Ok(Self { found: found.into_iter().map(moved).collect::<Result<_, Unfit>>()?, ..Self::of(study) })
     }
 }
 
-impl Observer for Meshes {
+impl<const D: usize> Observer for Meshes<D> {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
-        if let Some(state) = snapshot.state()
+        if let Some(state) = snapshot.state::<D>()
             && matches!(event, Event::Started | Event::Stepped)
             && self.at.contains(&state.t)
         {
@@ -211,7 +252,7 @@ impl Observer for Meshes {
     }
 
     fn keep(&mut self, kept: &mut Kept) -> Result<()> {
-        kept.put("meshes", &self.found.iter().map(|(t, mesh)| (t, mesh.x())).collect::<Vec<_>>());
+        kept.put("meshes", &self.found.iter().map(|(t, mesh)| (t, mesh.x().as_flattened())).collect::<Vec<_>>());
         Ok(())
     }
 }

@@ -1,10 +1,14 @@
 use super::MovingMesh;
+use super::dimension::{GeneratorTable, Studied};
 use super::moving_mesh::StartMesh;
 use crate::density::{MonitorKind, Strength};
 use crate::error::Result;
-use crate::meshing::{Form, GeneratorKind, MeshGenerator, Mmpde, Relaxation, Whole};
+use crate::geometry::Mesh;
+use crate::meshing::{Form, Mmpde, Movable, Relaxation};
 use crate::simulation::{Record, Simulation, State};
 
+/// How close that step is solved, as a share of the shortest edge.
+const CLOSE: f64 = 1e-2;
 /// A mesh of which no node went so many cells in a whole run does not move.
 const MOVES: f64 = 0.25;
 /// A density by which a node should go so many cells asks the mesh to move.
@@ -18,21 +22,24 @@ const NOT_FLAT: f64 = 1.5;
 ///
 /// What the density asks for is how far a node goes from the last mesh in one step of the mesh equation as long as τ. A
 /// density that is flat asks for nothing, but nobody means it.
-pub(super) fn at_rest(
-    study: &MovingMesh,
-    simulation: &Simulation,
-    state: &State,
+pub(super) fn at_rest<const D: usize>(
+    study: &MovingMesh<D>,
+    simulation: &Simulation<D>,
+    state: &State<D>,
     record: &Record,
-) -> Result<Option<String>> {
+) -> Result<Option<String>>
+where
+    Mesh<D>: Studied<D>,
+{
     let mesh = &state.mesh;
-    let cell = (0..2).map(|d| mesh.extent()[d] / mesh.lattice().cells()[d] as f64).fold(f64::INFINITY, f64::min);
+    let cell = (0..D).map(|d| mesh.extent()[d] / mesh.lattice().cells()[d] as f64).fold(f64::INFINITY, f64::min);
     let went = record.travelled / cell;
     // a mesh that is meant to stay
-    if went > MOVES || matches!(study.mesh.generator, GeneratorKind::Fixed(_)) {
+    if went > MOVES || study.mesh.generator.stays() {
         return Ok(None);
     }
     let equation = Mmpde { relaxation: 1.0.into(), form: Form::Conservative };
-    let moved = Whole::default().step(&equation, mesh, &state.rho, 1.0)?;
+    let moved = Mesh::<D>::whole(CLOSE).step(&equation, mesh, &state.rho, 1.0)?;
     let asks = moved.mesh.farthest(mesh) / cell;
     let reason = match spread(&state.rho) {
         _ if asks > ASKS => held_back(study, record),
@@ -60,13 +67,19 @@ fn spread(values: &[f64]) -> f64 {
 }
 
 /// True where what the mesh follows is not constant.
-fn varies(simulation: &Simulation, state: &State) -> Result<bool> {
+fn varies<const D: usize>(simulation: &Simulation<D>, state: &State<D>) -> Result<bool>
+where
+    Mesh<D>: Studied<D>,
+{
     let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u)?;
     let ends = followed.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     Ok(ends.1 - ends.0 > 1e-12 * ends.0.abs().max(ends.1.abs()))
 }
 
-fn held_back(study: &MovingMesh, record: &Record) -> String {
+fn held_back<const D: usize>(study: &MovingMesh<D>, record: &Record) -> String
+where
+    Mesh<D>: Studied<D>,
+{
     let retries = record.safety.substeps + record.safety.smoothed + record.safety.shortened;
     let span = study.time.end - study.time.start;
     if 2 * retries > record.work.steps {
@@ -90,7 +103,15 @@ fn held_back(study: &MovingMesh, record: &Record) -> String {
     }
 }
 
-fn flattened(study: &MovingMesh, simulation: &Simulation, state: &State, spread: f64) -> Result<String> {
+fn flattened<const D: usize>(
+    study: &MovingMesh<D>,
+    simulation: &Simulation<D>,
+    state: &State<D>,
+    spread: f64,
+) -> Result<String>
+where
+    Mesh<D>: Studied<D>,
+{
     let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u)?;
     let mut bare = study.monitor();
     let smoothing = match &mut bare {

@@ -1,6 +1,6 @@
 //! The mass of nodal values: what they make of the integrals over dual cells.
 
-use super::{Block, Law, add};
+use super::{Block, Law};
 use crate::geometry::{Cells, DualCells, Mesh, Patch, dot, strides};
 use crate::numerics::linear::LatticeMatrix;
 
@@ -22,14 +22,17 @@ use crate::numerics::linear::LatticeMatrix;
 /// # Source
 /// Strang and Fix, *An Analysis of the Finite Element Method* (1973), for the mass matrix.
 #[derive(Debug, Clone)]
-pub(super) struct Excess<const D: usize, const S: usize> {
+pub(super) struct Excess<const B: usize, const D: usize, const S: usize> {
     /// C.
     matrix: LatticeMatrix<D, S>,
     offsets: [isize; S],
+    /// The unknowns that it is for.
+    shares: [bool; B],
 }
 
-impl<const D: usize, const S: usize> Excess<D, S> {
-    pub fn of(mesh: &Mesh<D>) -> Self
+impl<const B: usize, const D: usize, const S: usize> Excess<B, D, S> {
+    /// Of a mesh, for some of the unknowns.
+    pub fn of(mesh: &Mesh<D>, shares_mass: [bool; B]) -> Self
     where
         Mesh<D>: Cells<D>,
     {
@@ -51,23 +54,23 @@ impl<const D: usize, const S: usize> Excess<D, S> {
             }
         }
         let offsets = matrix.offsets();
-        Self { matrix, offsets }
+        Self { matrix, offsets, shares: shares_mass }
     }
 
     /// C v at node i, at place k of padded vectors.
     #[inline(always)]
-    pub fn product<const B: usize>(&self, i: usize, k: usize, v: impl Fn(usize) -> [f64; B]) -> [f64; B] {
+    pub fn product(&self, i: usize, k: usize, v: impl Fn(usize) -> [f64; B]) -> [f64; B] {
         let mut sum = [0.0; B];
         for (weight, offset) in self.matrix.rows[i].iter().zip(self.offsets) {
             let v = v(k.wrapping_add_signed(offset));
             (0..B).for_each(|c| sum[c] += weight * v[c]);
         }
-        sum
+        std::array::from_fn(|c| if self.shares[c] { sum[c] } else { 0.0 })
     }
 
     /// Adds C (I − ½ Δt S')/A to a row of a matrix, S' being the derivative of the source.
     #[inline(always)]
-    pub fn add_to_row<const B: usize, L: Law<B, D>>(
+    pub fn add_to_row<L: Law<B, D>>(
         &self,
         row: &mut [Block<B>; S],
         (i, k): (usize, usize),
@@ -76,9 +79,12 @@ impl<const D: usize, const S: usize> Excess<D, S> {
     ) {
         for ((entry, weight), offset) in row.iter_mut().zip(&self.matrix.rows[i]).zip(self.offsets) {
             let weight = weight / area;
-            (0..B).for_each(|c| entry[c][c] += weight);
-            if let Some((_, derivative)) = law.source(&nodes[k.wrapping_add_signed(offset)]) {
-                add(entry, -0.5 * dt * weight, &derivative);
+            let source = law.source(&nodes[k.wrapping_add_signed(offset)]);
+            for c in (0..B).filter(|&c| self.shares[c]) {
+                entry[c][c] += weight;
+                if let Some((_, derivative)) = &source {
+                    (0..B).for_each(|e| entry[c][e] -= 0.5 * dt * weight * derivative[c][e]);
+                }
             }
         }
     }
@@ -158,7 +164,7 @@ mod tests {
         let mesh = mesh.moved(mesh.x().iter().map(|[x]| [0.3 * x + 0.7 * x * x]).collect()).unwrap();
         let x: Vec<f64> = mesh.x().iter().map(|[x]| *x).collect();
         let padded = padded(mesh.lattice(), x.as_chunks::<1>().0, [[0.0]]);
-        let excess = Excess::<1, 3>::of(&mesh);
+        let excess = Excess::<1, 1, 3>::of(&mesh, [true]);
         let found: Vec<f64> = (0..9).map(|i| excess.product(i, i + 1, |k| padded[k])[0]).collect();
         for i in 1..8 {
             let [below, above] = [x[i] - x[i - 1], x[i + 1] - x[i]];
@@ -172,11 +178,11 @@ mod tests {
     #[test]
     fn mass_is_symmetric_and_positive() {
         let square = Mesh::uniform(Lattice::new([6, 7], [false, true]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
-        let none = Excess::<2, 9>::of(&square);
+        let none = Excess::<1, 2, 9>::of(&square, [true]);
         assert!(none.matrix.rows.as_flattened().iter().all(|entry| entry.abs() < 1e-15));
         let bent = square.x().iter().map(|&[x, y]| [x * x, y + 0.1 * (6.283 * y).sin() * x * (1.0 - x)]);
         let mesh = square.moved(bent.collect()).unwrap();
-        let excess = Excess::<2, 9>::of(&mesh);
+        let excess = Excess::<1, 2, 9>::of(&mesh, [true]);
         let areas = node_areas(&mesh);
         for p in 0..mesh.x().len() {
             let checkered = |k: usize| if (k / 7 + k % 7 + k * p) % 3 == 0 { 1.0 } else { -1.0 };

@@ -1,0 +1,257 @@
+//! What the settings of a moving mesh are made of in one dimension and in two.
+
+use super::moving_mesh::{Domain, Stepper, Time};
+use crate::error::{Error, Result};
+use crate::geometry::{Lattice, Mesh};
+use crate::meshing::{GeneratorKind, LineGeneratorKind, MeshGenerator, Movable};
+use crate::physics::{Coordinates, LinePdeKind, PdeKind, Physics, UniformBurgers};
+use schemars::JsonSchema;
+use serde::{Serialize, de::DeserializeOwned};
+use std::fmt::Debug;
+
+/// Meshes of which a study can be made.
+pub trait Studied<const D: usize>: Movable<D> + Clone + Debug {
+    /// `[pde]`.
+    type Pde: PdeTable<D>;
+    /// `mesh.generator`.
+    type Generator: GeneratorTable<D>;
+}
+
+impl Studied<1> for Mesh<1> {
+    type Pde = LinePdeKind;
+    type Generator = LineGeneratorKind;
+}
+
+impl Studied<2> for Mesh<2> {
+    type Pde = PdeKind;
+    type Generator = GeneratorKind;
+}
+
+/// Settings of a table of a study.
+pub trait Settings: Clone + Debug + Serialize + DeserializeOwned + JsonSchema {}
+
+impl<T: Clone + Debug + Serialize + DeserializeOwned + JsonSchema> Settings for T {}
+
+/// `[pde]` of a study in D dimensions.
+pub trait PdeTable<const D: usize>: Settings {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] or [`Error::Formula`].
+    fn check(&self) -> Result<()>;
+
+    /// Refuses axes that the equation is not made for.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for `domain`, or for `pde`.
+    fn check_axes(&self, domain: &Domain<D>) -> Result<()>;
+
+    /// The equation with its stepper.
+    ///
+    /// # Errors
+    /// As [`PdeTable::check`]; [`Error::Invalid`] where the stepper does not go with the rest.
+    fn physics(&self, domain: &Domain<D>, time: &Time, stays: bool) -> Result<Box<dyn Physics<D>>>;
+
+    /// The formulas of place and time alone, with their keys.
+    fn formulas(&self) -> Vec<(String, &str)>;
+
+    /// The initial values and the side values that are both formulas of place and time, with their keys.
+    fn starts_and_sides(&self) -> Vec<[(String, &str); 2]>;
+
+    /// Whether the solution is prescribed, and whether the density is.
+    fn prescribes(&self) -> [bool; 2];
+}
+
+/// `mesh.generator` of a study in D dimensions.
+pub trait GeneratorTable<const D: usize>: Settings + Default {
+    /// Refuses settings out of range for a lattice.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    fn check(&self, lattice: &Lattice<D>) -> Result<()>;
+
+    /// Subdomains along the first two axes.
+    fn subdomains(&self) -> [usize; 2];
+
+    /// True where the mesh is not to move.
+    fn stays(&self) -> bool;
+
+    /// The generator, ready to step.
+    fn into_generator(self) -> Box<dyn MeshGenerator<D>>;
+}
+
+impl PdeTable<2> for PdeKind {
+    fn check(&self) -> Result<()> {
+        self.check()
+    }
+
+    fn check_axes(&self, domain: &Domain<2>) -> Result<()> {
+        if let Some(coordinates) = domain.coordinates {
+            let rule = "only a line has them; leave it out, or give one number an axis";
+            return Err(Error::invalid("domain.coordinates", format!("{coordinates:?}").to_lowercase(), rule));
+        }
+        let periodic = *domain.periodic;
+        let (wrong, rule) = match self {
+            Self::Burgers(burgers) if burgers.initial.is_none() => (
+                periodic.contains(&true),
+                "the front of pde.kind = \"burgers\" needs bounded axes; set it to [false, false], or give pde.initial",
+            ),
+            Self::Burgers(burgers) => (
+                periodic.contains(&false) == burgers.boundary.is_none(),
+                match burgers.boundary {
+                    None => {
+                        "pde.initial needs pde.boundary beside it on bounded axes; add it, or make both axes periodic"
+                    }
+                    Some(_) => "pde.boundary has no side to stand on; leave it out, or make an axis bounded",
+                },
+            ),
+            Self::ShallowWater(_) => {
+                (periodic.contains(&false), "pde.kind = \"shallow-water\" needs periodic axes; set it to [true, true]")
+            }
+            Self::FormulaPde(pde) => return pde.check_sides(periodic).map_err(|error| error.within("pde")),
+            Self::Prescribed(_) => (false, ""),
+        };
+        match wrong {
+            true => Err(Error::invalid("domain.periodic", format!("{periodic:?}"), rule)),
+            false => Ok(()),
+        }
+    }
+
+    fn physics(&self, _domain: &Domain<2>, time: &Time, stays: bool) -> Result<Box<dyn Physics<2>>> {
+        let physics = self.clone().into_physics().map_err(|error| error.within("pde"))?;
+        match (self, time.stepper) {
+            (_, None) => Ok(physics),
+            (Self::Burgers(burgers), Some(Stepper::Rk4)) if stays => {
+                let uniform = UniformBurgers::new(burgers.clone(), time.order.unwrap_or(2));
+                Ok(Box::new(uniform.map_err(|error| error.within("time"))?))
+            }
+            _ => {
+                let rule = "steps pde.kind = \"burgers\" on a mesh that stays; set mesh.generator to \
+                            { kind = \"fixed\" }, or leave time.stepper out";
+                Err(Error::invalid("time.stepper", "\"rk4\"", rule))
+            }
+        }
+    }
+
+    fn formulas(&self) -> Vec<(String, &str)> {
+        self.formulas()
+    }
+
+    fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+        self.starts_and_sides()
+    }
+
+    fn prescribes(&self) -> [bool; 2] {
+        match self {
+            Self::Prescribed(prescribed) => [true, prescribed.rho.is_some()],
+            _ => [false; 2],
+        }
+    }
+}
+
+impl GeneratorTable<2> for GeneratorKind {
+    fn check(&self, lattice: &Lattice<2>) -> Result<()> {
+        self.check(lattice)
+    }
+
+    fn subdomains(&self) -> [usize; 2] {
+        self.subdomains()
+    }
+
+    fn stays(&self) -> bool {
+        matches!(self, Self::Fixed(_))
+    }
+
+    fn into_generator(self) -> Box<dyn MeshGenerator<2>> {
+        self.into_generator()
+    }
+}
+
+impl PdeTable<1> for LinePdeKind {
+    fn check(&self) -> Result<()> {
+        self.check()
+    }
+
+    fn check_axes(&self, domain: &Domain<1>) -> Result<()> {
+        let ([periodic], [lower]) = (*domain.periodic, *domain.lower);
+        let coordinates = domain.coordinates.unwrap_or_default();
+        if coordinates != Coordinates::Cartesian {
+            let named = format!("\"{}\"", format!("{coordinates:?}").to_lowercase());
+            if lower < 0.0 {
+                let rule =
+                    format!("is a distance from the centre with domain.coordinates = {named}; set it to 0 or more");
+                return Err(Error::invalid("domain.lower", format!("[{lower}]"), rule));
+            }
+            if periodic {
+                let rule = "a radius is not periodic; set domain.periodic to [false], or leave it out";
+                return Err(Error::invalid("domain.coordinates", named, rule));
+            }
+            if matches!(self, Self::LineBurgers(_)) {
+                let rule =
+                    "pde.kind = \"burgers\" is along x; leave it out, or write the equation with kind = \"formula\"";
+                return Err(Error::invalid("domain.coordinates", named, rule));
+            }
+        }
+        let (wrong, rule) = match self {
+            Self::LineBurgers(burgers) if burgers.initial.is_none() => (
+                periodic,
+                "the front of pde.kind = \"burgers\" needs a bounded line; set it to [false], or give pde.initial",
+            ),
+            Self::LineBurgers(burgers) => (
+                periodic == burgers.boundary.is_some(),
+                match burgers.boundary {
+                    None => "pde.initial needs pde.boundary beside it on a bounded line; add it, or set this to [true]",
+                    Some(_) => "pde.boundary has no end to stand on; leave it out, or set this to [false]",
+                },
+            ),
+            Self::LineFormulaPde(pde) => return pde.check_sides([periodic]).map_err(|error| error.within("pde")),
+            Self::Prescribed(_) => (false, ""),
+        };
+        match wrong {
+            true => Err(Error::invalid("domain.periodic", format!("[{periodic}]"), rule)),
+            false => Ok(()),
+        }
+    }
+
+    fn physics(&self, domain: &Domain<1>, time: &Time, _stays: bool) -> Result<Box<dyn Physics<1>>> {
+        if time.stepper.is_some() {
+            let rule = "steps pde.kind = \"burgers\" in two dimensions; leave it out";
+            return Err(Error::invalid("time.stepper", "\"rk4\"", rule));
+        }
+        let coordinates = domain.coordinates.unwrap_or_default();
+        self.clone().into_physics(coordinates).map_err(|error| error.within("pde"))
+    }
+
+    fn formulas(&self) -> Vec<(String, &str)> {
+        self.formulas()
+    }
+
+    fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+        self.starts_and_sides()
+    }
+
+    fn prescribes(&self) -> [bool; 2] {
+        match self {
+            Self::Prescribed(prescribed) => [true, prescribed.rho.is_some()],
+            _ => [false; 2],
+        }
+    }
+}
+
+impl GeneratorTable<1> for LineGeneratorKind {
+    fn check(&self, _lattice: &Lattice<1>) -> Result<()> {
+        Ok(())
+    }
+
+    fn subdomains(&self) -> [usize; 2] {
+        [1, 1]
+    }
+
+    fn stays(&self) -> bool {
+        matches!(self, Self::Fixed(_))
+    }
+
+    fn into_generator(self) -> Box<dyn MeshGenerator<1>> {
+        self.into_generator()
+    }
+}
