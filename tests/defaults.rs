@@ -35,6 +35,6 @@ fn the_schema_names_the_default_monitor() {
 fn one_mesh_equation_is_the_default_of_the_library_and_of_studies() {
     let study = resolved("[pde]\nkind = \"burgers\"\nviscosity = 0.05\n");
     assert_eq!(study.simulation().unwrap().mover.equation, Mmpde::default());
-    assert_eq!(Mover::new(Whole::default()).equation, Mmpde::default());
+    assert_eq!(Mover::new(Whole::<2>::default()).equation, Mmpde::default());
     assert_ne!(Mmpde::published(), Mmpde::default());
 }

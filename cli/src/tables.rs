@@ -5,8 +5,8 @@ use driftmesh::meshing::Interface;
 use driftmesh::output::Summary;
 use driftmesh::simulation::Retries;
 use driftmesh::study::{
-    EquidistributionStudy, FrontSummary, Kind, LineFigures, MovingFigures, MovingMesh, NumberedIterate, PoissonFigures,
-    PoissonStudy, Running, StefanStudy, UniformEquivalent,
+    EquidistributionStudy, FrontSummary, Kind, LineFigures, MovingFigures, MovingLine, MovingMesh, NumberedIterate,
+    PoissonFigures, PoissonStudy, Running, StefanStudy, UniformEquivalent,
 };
 
 /// What is said of a run in a few lines.
@@ -42,7 +42,7 @@ impl Told for MovingMesh {
     }
 }
 
-impl Told for MovingMesh<1> {
+impl Told for MovingLine {
     fn table(summary: &Summary<MovingFigures>) -> String {
         moving(summary)
     }

@@ -260,7 +260,8 @@ pub(super) fn qualities_in_plane(mesh: &Mesh<2>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Lattice, cell_areas, check_unfolded, node_areas, quality};
+    use crate::error::Failure;
+    use crate::geometry::{Cells, Lattice, cell_areas, check_unfolded, node_areas, quality};
 
     fn square(cells: usize) -> Mesh<2> {
         Mesh::uniform(Lattice::bounded([cells, cells]).unwrap(), [0.0, 0.0], [1.0, 1.0]).unwrap()

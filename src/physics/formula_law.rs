@@ -405,7 +405,7 @@ mod tests {
         let mut written = pde.into_physics().unwrap();
         let mut builtin = Burgers::new(viscosity, Convection::Flux).unwrap();
         builtin.flux = BurgersFlux::Central;
-        let (law, mut volumes) = (Tight(builtin.clone()), FiniteVolumes::default());
+        let (law, mut volumes) = (Tight(builtin.clone()), FiniteVolumes::<1>::default());
         let square = Mesh::uniform(Lattice::bounded([30, 30]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         let mesh = |t: f64| {
             let bent = |x: f64, y: f64| x + 0.1 * (std::f64::consts::TAU * x).sin() * (5.0 * y + 3.0 * t).cos();

@@ -1,6 +1,6 @@
 use super::kind::Kind;
 use super::runner::{self, Begin};
-use super::{EquidistributionStudy, Header, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
+use super::{EquidistributionStudy, Header, MovingLine, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
 use crate::error::{Act, Error, Failure, Result, Unfit};
 use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing};
 use crate::simulation::Observer;
@@ -16,7 +16,7 @@ pub enum Study {
     /// Of kind `moving-mesh`, in two dimensions.
     MovingMesh(MovingMesh),
     /// Of kind `moving-mesh`, in one dimension.
-    MovingLine(MovingMesh<1>),
+    MovingLine(MovingLine),
     /// Of kind `poisson`.
     Poisson(PoissonStudy),
     /// Of kind `stefan`.
@@ -67,7 +67,7 @@ impl Study {
             Ok(StudyKind::Poisson) => PoissonStudy::from_source(source).map(Self::Poisson),
             Ok(StudyKind::Stefan) => StefanStudy::from_source(source).map(Self::Stefan),
             Ok(StudyKind::Equidistribution) => EquidistributionStudy::from_source(source).map(Self::Equidistribution),
-            Ok(StudyKind::MovingMesh) if is_line() => MovingMesh::from_source(source).map(Self::MovingLine),
+            Ok(StudyKind::MovingMesh) if is_line() => MovingLine::from_source(source).map(Self::MovingLine),
             _ => MovingMesh::from_source(source).map(Self::MovingMesh),
         }
     }

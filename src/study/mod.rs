@@ -40,7 +40,9 @@ pub use line_figures::{LineFigures, LineParts, LineQuality, LineWork, NumberedIt
 pub use line_run::{Evolution, LineRun};
 pub use mapped::{Distort, Ends, Grading, MappedDomain, Mapping, Side};
 pub use memory::check_memory;
-pub use moving_mesh::{Compare, Domain, Grid, MeshForm, MeshTable, MovingMesh, StartMesh, Stepper, Time};
+pub use moving_mesh::{
+    Compare, Domain, Grid, MeshForm, MeshTable, MovingLine, MovingMesh, MovingStudy, StartMesh, Stepper, Time,
+};
 pub use moving_run::{MovingFigures, MovingParts, MovingRun};
 pub use poisson::{Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonStudy, Sides, SolverKind, SolverTable};
 pub use poisson_run::{PoissonError, PoissonFigures, PoissonParts, PoissonRun, Solved, StencilReport};

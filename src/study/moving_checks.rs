@@ -3,7 +3,7 @@
 use super::common::{Header, Output, StudyKind};
 use super::dimension::{GeneratorTable, PdeTable, Studied};
 use super::kind::Kind;
-use super::moving_mesh::{MovingMesh, StartMesh, Stepper};
+use super::moving_mesh::{MovingStudy, StartMesh, Stepper};
 use super::moving_run::MovingRun;
 use crate::density::{ArclengthTable, GivenTable, MonitorKind};
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ const SAMPLES: usize = 100;
 /// A difference, as a share of the largest value, that is not of rounding.
 const NOT_ROUNDING: f64 = 1e-9;
 
-impl<const D: usize> Kind for MovingMesh<D>
+impl<const D: usize> Kind for MovingStudy<D>
 where
     Mesh<D>: Studied<D>,
 {
@@ -101,7 +101,7 @@ where
     }
 }
 
-impl<const D: usize> MovingMesh<D>
+impl<const D: usize> MovingStudy<D>
 where
     Mesh<D>: Studied<D>,
 {

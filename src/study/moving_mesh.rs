@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, bound = "")]
 #[schemars(rename = "MovingMesh")]
-pub struct MovingMesh<const D: usize = 2>
+pub struct MovingStudy<const D: usize>
 where
     Mesh<D>: Studied<D>,
 {
@@ -50,6 +50,11 @@ where
     #[serde(default)]
     pub output: Output,
 }
+
+/// A moving mesh in two dimensions.
+pub type MovingMesh = MovingStudy<2>;
+/// A moving mesh in one dimension.
+pub type MovingLine = MovingStudy<1>;
 
 /// `[pde]` in D dimensions.
 type Pde<const D: usize> = <Mesh<D> as Studied<D>>::Pde;
@@ -194,7 +199,7 @@ pub enum StartMesh {
     Adapted,
 }
 
-impl<const D: usize> MovingMesh<D>
+impl<const D: usize> MovingStudy<D>
 where
     Mesh<D>: Studied<D>,
 {

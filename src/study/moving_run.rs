@@ -1,6 +1,6 @@
 //! Studies of kind `moving-mesh`: how they run, and what they leave.
 
-use super::MovingMesh;
+use super::MovingStudy;
 use super::dimension::{GeneratorTable, Studied};
 use super::kind::{Running, SpentBy};
 use super::rest::at_rest;
@@ -51,7 +51,7 @@ pub struct MovingRun<const D: usize = 2>
 where
     Mesh<D>: Studied<D>,
 {
-    study: MovingMesh<D>,
+    study: MovingStudy<D>,
     simulation: Simulation<D>,
     /// The last good state; none before the mesh is adapted to the initial solution.
     pub state: Option<State<D>>,
@@ -68,7 +68,7 @@ where
     Mesh<D>: Studied<D>,
 {
     /// Before anything is computed.
-    pub(super) fn of(study: &MovingMesh<D>) -> Result<Self> {
+    pub(super) fn of(study: &MovingStudy<D>) -> Result<Self> {
         let (simulation, meshes, study) = (study.simulation()?, Meshes::of(study), study.clone());
         let record = Record::default();
         Ok(Self { study, simulation, state: None, record, course: None, history: None, meshes })
@@ -224,12 +224,12 @@ impl<const D: usize> Meshes<D>
 where
     Mesh<D>: Studied<D>,
 {
-    fn of(study: &MovingMesh<D>) -> Self {
+    fn of(study: &MovingStudy<D>) -> Self {
         let at = if study.compare.is_some() { study.time.report.clone() } else { Vec::new() };
         Self { at, found: Vec::new() }
     }
 
-    fn resume(study: &MovingMesh<D>, mesh: &Mesh<D>, kept: &Kept) -> Result<Self, Unfit> {
+    fn resume(study: &MovingStudy<D>, mesh: &Mesh<D>, kept: &Kept) -> Result<Self, Unfit> {
         let found: Vec<(f64, Vec<f64>)> = kept.get("meshes")?;
         let moved = |(t, x): (f64, Vec<f64>)| {
             let (x, rest) = x.as_chunks::<D>();

@@ -1,4 +1,4 @@
-use super::MovingMesh;
+use super::MovingStudy;
 use super::dimension::{GeneratorTable, Studied};
 use super::moving_mesh::StartMesh;
 use crate::density::{MonitorKind, Strength};
@@ -23,7 +23,7 @@ const NOT_FLAT: f64 = 1.5;
 /// What the density asks for is how far a node goes from the last mesh in one step of the mesh equation as long as τ. A
 /// density that is flat asks for nothing, but nobody means it.
 pub(super) fn at_rest<const D: usize>(
-    study: &MovingMesh<D>,
+    study: &MovingStudy<D>,
     simulation: &Simulation<D>,
     state: &State<D>,
     record: &Record,
@@ -76,7 +76,7 @@ where
     Ok(ends.1 - ends.0 > 1e-12 * ends.0.abs().max(ends.1.abs()))
 }
 
-fn held_back<const D: usize>(study: &MovingMesh<D>, record: &Record) -> String
+fn held_back<const D: usize>(study: &MovingStudy<D>, record: &Record) -> String
 where
     Mesh<D>: Studied<D>,
 {
@@ -104,7 +104,7 @@ where
 }
 
 fn flattened<const D: usize>(
-    study: &MovingMesh<D>,
+    study: &MovingStudy<D>,
     simulation: &Simulation<D>,
     state: &State<D>,
     spread: f64,
