@@ -1,4 +1,5 @@
-use super::chain::{Chain, End, Step};
+use super::chain::{Chain, Step};
+use super::conditions::End;
 use crate::error::Failure;
 use crate::numerics::linear::tridiagonal;
 

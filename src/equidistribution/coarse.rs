@@ -1,7 +1,8 @@
 //! A coarse correction between sweeps. It reaches all subdomains at once, so that the number of iterations does not
 //! grow with theirs.
 
-use super::chain::{End, Step};
+use super::chain::Step;
+use super::conditions::End;
 use super::cumulative::Cumulative;
 use super::schwarz::{Coarse, Iteration, owner};
 use crate::error::Failure;

@@ -1,6 +1,7 @@
 use super::beyond::Beyond;
-use super::chain::{Chain, End, Law, Step};
+use super::chain::{Chain, Step};
 use super::coarse;
+use super::conditions::{End, Law};
 use crate::error::Failure;
 use crate::parallel;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -253,7 +254,7 @@ impl Iteration<'_> {
         };
         // in time the flux at the cut is that in the middle of the cell beside it, and what half a cell adds
         let more = self.old.map_or(0.0, |(old, ratio)| Step { old, ratio }.half(self.chain.h, cut, x)[0]);
-        Ok(End::Flux { g: flux + sign * more - self.chain.law(law, x)?, law })
+        Ok(End::Flux { g: flux + sign * more - law.at(&self.chain, x)?[0], law })
     }
 
     /// p that makes the flux answer a displacement of the node as the rest of the line, of length L in ξ, would: M̃/L
