@@ -1,4 +1,4 @@
-use super::{LatticeMatrix, larger};
+use super::{LatticeMatrix, larger, refill};
 use crate::geometry::Patch;
 use crate::parallel;
 
@@ -60,10 +60,7 @@ impl Adi {
         self.factors.resize_with(self.sweeps * D, Vec::new);
         let mut sound = spread.is_finite();
         for (sweep, factors) in self.factors.chunks_exact_mut(D).enumerate() {
-            for factors in factors.iter_mut() {
-                factors.clear();
-                factors.resize(a.patch.padded_len(), Factor::default());
-            }
+            factors.iter_mut().for_each(|factors| refill(factors, a.patch.padded_len(), Factor::default()));
             let part = spread.powf((sweep as f64 + 0.5) / self.sweeps as f64 - 0.5);
             for (row, k) in a.rows.iter().zip(a.patch.places()) {
                 let (own, lowest, highest) = parts(row);
