@@ -28,7 +28,8 @@ impl End<'_> {
 
 impl Chain<'_> {
     /// The nodes of a piece where M is averaged exactly. All its cells have the same ∫M, so that one unknown is left,
-    /// the flux F. With G(x) = ∫M from the beginning of the line to x, G_left and G_right at the end nodes, and n cells,
+    /// the flux F. With G(x) = ∫M from the beginning of the line to x, its values G_left and G_right at the end nodes,
+    /// and n cells,
     ///
     /// ```text
     /// G_right(F) − G_left(F) = n h F,   G_end(F) = G(x),   G(to) − length (F − g)   or   G((F − g)/slope)

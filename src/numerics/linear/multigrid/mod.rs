@@ -44,8 +44,8 @@ impl<const D: usize, const K: usize> Default for Multigrid<D, K> {
     }
 }
 
-/// Relaxation sweeps on the coarsest level, where no axis can be halved any more: these all but solve for the nodes that
-/// are left, a handful.
+/// Relaxation sweeps on the coarsest level, where no axis can be halved any more: these all but solve for the handful
+/// of nodes that is left.
 const SWEEPS_ON_THE_COARSEST: usize = 8;
 
 impl<const D: usize, const K: usize> Multigrid<D, K> {
