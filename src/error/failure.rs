@@ -1,6 +1,6 @@
 //! What the mathematics can do wrong in a step.
 
-use super::words::{given_as, line_rule, node_at, noisy, place, plural, short, tuple};
+use super::words::{counted, given_as, line_rule, node_at, noisy, place, short, tuple};
 use super::{Cause, Error, Remedy};
 use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
@@ -219,9 +219,8 @@ pub enum Failure {
     },
     /// The mesh glued from the subdomains of a line is out of order.
     #[error(
-        "the subdomains do not agree on an order: after {iterations} iteration{} node {node} is at x = {x}, and the \
-         one before it at {left}",
-        plural(*.iterations)
+        "the subdomains do not agree on an order: after {} node {node} is at x = {x}, and the one before it at {left}",
+        counted(*.iterations)
     )]
     LineFolded {
         /// The node.
@@ -234,10 +233,7 @@ pub enum Failure {
         iterations: usize,
     },
     /// An iteration between subdomains of a line did not converge.
-    #[error(
-        "not converged: the {measure} is {last:.2e} after {iterations} iteration{}, {tolerance:.0e} asked for{advice}",
-        plural(*.iterations)
-    )]
+    #[error("not converged: the {measure} is {last:.2e} after {}, {tolerance:.0e} asked for{advice}", counted(*.iterations))]
     NotConverged {
         /// What is measured.
         measure: &'static str,
@@ -371,20 +367,13 @@ impl Failure {
         match error {
             Error::Failed { failure, .. } => failure,
             Error::Invalid { key, value, rule } => Self::OutOfRange { what: format!("`{key}`"), value, rule },
-            other => Self::OutOfRange { what: "a setting".into(), value: "not usable".into(), rule: other.to_string() },
+            other => Self::out_of_range("a setting", "not usable", &other.to_string()),
         }
     }
 
-    /// Refuses a number that is not finite and above 0.
-    pub(crate) fn unless_positive(what: &str, value: f64) -> Result<(), Self> {
-        match value.is_finite() && value > 0.0 {
-            true => Ok(()),
-            false => Err(Self::OutOfRange {
-                what: what.into(),
-                value: value.to_string(),
-                rule: "must be a finite number above 0".into(),
-            }),
-        }
+    /// What refuses a setting or an argument of a step.
+    pub(crate) fn out_of_range(what: &str, value: impl std::fmt::Display, rule: &str) -> Self {
+        Self::OutOfRange { what: what.into(), value: value.to_string(), rule: rule.into() }
     }
 
     /// Short name of the variant, for `summary.json`.

@@ -15,9 +15,9 @@ pub(super) fn node_at(node: &[usize; 2], x: &[f64; 2]) -> String {
     format!("node {}, {}", tuple(node), place(x))
 }
 
-/// The end of a noun after a number.
-pub(super) fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
+/// A number of iterations.
+pub(super) fn counted(iterations: usize) -> String {
+    if iterations == 1 { "1 iteration".into() } else { format!("{iterations} iterations") }
 }
 
 /// What noise may have to do with a mesh that folded.
