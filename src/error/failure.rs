@@ -1,7 +1,7 @@
 //! What the mathematics can do wrong in a step.
 
 use super::words::{counted, given_as, line_rule, node_at, noisy, place, short, tuple};
-use super::{Cause, Error, Remedy};
+use super::{Cause, Remedy};
 use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
 /// A numerical failure inside one step. It never carries a time: the loop that knows it adds it ([`Error::Failed`]).
@@ -233,7 +233,10 @@ pub enum Failure {
         iterations: usize,
     },
     /// An iteration between subdomains of a line did not converge.
-    #[error("not converged: the {measure} is {last:.2e} after {}, {tolerance:.0e} asked for{advice}", counted(*.iterations))]
+    #[error(
+        "not converged: the {measure} is {last:.2e} after {}, {tolerance:.0e} asked for{advice}",
+        counted(*.iterations)
+    )]
     NotConverged {
         /// What is measured.
         measure: &'static str,
@@ -362,15 +365,6 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// What refuses a setting, where a step cannot return it as an [`Error`].
-    pub(crate) fn refusing(error: Error) -> Self {
-        match error {
-            Error::Failed { failure, .. } => failure,
-            Error::Invalid { key, value, rule } => Self::OutOfRange { what: format!("`{key}`"), value, rule },
-            other => Self::out_of_range("a setting", "not usable", &other.to_string()),
-        }
-    }
-
     /// What refuses a setting or an argument of a step.
     pub(crate) fn out_of_range(what: &str, value: impl std::fmt::Display, rule: &str) -> Self {
         Self::OutOfRange { what: what.into(), value: value.to_string(), rule: rule.into() }
