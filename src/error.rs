@@ -202,6 +202,11 @@ impl Error {
         Self::Invalid { key: key.into(), value, rule: rule.into() }
     }
 
+    /// The error of a file or directory that could not be written, from the reason.
+    pub(crate) fn unwritable<E: std::fmt::Display>(path: &std::path::Path) -> impl Fn(E) -> Self + Copy {
+        |reason| Self::Unwritable { path: path.into(), reason: reason.to_string() }
+    }
+
     /// The same error with its key seen from one table further out: `viscosity` becomes `pde.viscosity`.
     pub fn within(self, table: &str) -> Self {
         match self {

@@ -68,6 +68,14 @@ pub(super) struct Chain<'a> {
     pub cumulative: Option<&'a Cumulative>,
 }
 
+/// The equations of a piece: a chain with conditions at its ends, in a time step or, where there is none, without time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Equations<'a> {
+    pub chain: &'a Chain<'a>,
+    pub ends: [End<'a>; 2],
+    pub step: Option<Step<'a>>,
+}
+
 impl Chain<'_> {
     /// ∫M from a to b.
     pub fn integral(&self, a: f64, b: f64) -> Result<f64, Failure> {
@@ -111,43 +119,6 @@ impl Chain<'_> {
         Ok(self.faces(&[left, right])?[0].flux(right - left, self.h))
     }
 
-    /// Residuals at all nodes, 0 where the node is given, and their derivatives: below, own, above.
-    pub fn linearised(
-        &self,
-        x: &[f64],
-        ends: [End<'_>; 2],
-        step: Option<Step<'_>>,
-    ) -> Result<(Vec<f64>, Vec<[f64; 3]>), Failure> {
-        let faces = self.faces(x)?;
-        let n = faces.len();
-        let mut residual = vec![0.0; n + 1];
-        let mut rows = vec![[0.0, 1.0, 0.0]; n + 1];
-        let flux = |i: usize| faces[i].flux(x[i + 1] - x[i], self.h);
-        let mut below = flux(0);
-        for i in 1..n {
-            let above = flux(i);
-            residual[i] = above[0] - below[0];
-            rows[i] = [-below[1], above[1] - below[2], above[2]];
-            if let Some(Step { old, ratio }) = step {
-                residual[i] -= ratio * self.h * (x[i] - old[i]);
-                rows[i][1] -= ratio * self.h;
-            }
-            below = above;
-        }
-        for (end, i) in ends.into_iter().zip([0, n]) {
-            if let End::Flux { g, law } = end {
-                let ([f, by_left, by_right], [phi, slope]) = (flux(i.min(n - 1)), law.at(self, x[i])?);
-                // from the middle of the outermost cell to the end node the flux changes by half a cell's share
-                let [more, by_node] = step.map_or([0.0; 2], |step| step.half(self.h, i, x[i]));
-                let sign = if i == 0 { -1.0 } else { 1.0 };
-                residual[i] = f + sign * more - g - phi;
-                let own = sign * by_node - slope;
-                rows[i] = if i == 0 { [0.0, by_left + own, by_right] } else { [by_left, by_right + own, 0.0] };
-            }
-        }
-        Ok((residual, rows))
-    }
-
     /// One linear solve with the face densities of given nodes frozen.
     ///
     /// # Errors
@@ -167,6 +138,41 @@ impl Chain<'_> {
             }
         }
         Ok(tridiagonal(&rows, &right))
+    }
+}
+
+impl Equations<'_> {
+    /// Residuals at all nodes, 0 where the node is given, and their derivatives: below, own, above.
+    pub fn linearised(&self, x: &[f64]) -> Result<(Vec<f64>, Vec<[f64; 3]>), Failure> {
+        let Self { chain, ends, step } = *self;
+        let (faces, h) = (chain.faces(x)?, chain.h);
+        let n = faces.len();
+        let mut residual = vec![0.0; n + 1];
+        let mut rows = vec![[0.0, 1.0, 0.0]; n + 1];
+        let flux = |i: usize| faces[i].flux(x[i + 1] - x[i], h);
+        let mut below = flux(0);
+        for i in 1..n {
+            let above = flux(i);
+            residual[i] = above[0] - below[0];
+            rows[i] = [-below[1], above[1] - below[2], above[2]];
+            if let Some(Step { old, ratio }) = step {
+                residual[i] -= ratio * h * (x[i] - old[i]);
+                rows[i][1] -= ratio * h;
+            }
+            below = above;
+        }
+        for (end, i) in ends.into_iter().zip([0, n]) {
+            if let End::Flux { g, law } = end {
+                let ([f, by_left, by_right], [phi, slope]) = (flux(i.min(n - 1)), law.at(chain, x[i])?);
+                // from the middle of the outermost cell to the end node the flux changes by half a cell's share
+                let [more, by_node] = step.map_or([0.0; 2], |step| step.half(h, i, x[i]));
+                let sign = if i == 0 { -1.0 } else { 1.0 };
+                residual[i] = f + sign * more - g - phi;
+                let own = sign * by_node - slope;
+                rows[i] = if i == 0 { [0.0, by_left + own, by_right] } else { [by_left, by_right + own, 0.0] };
+            }
+        }
+        Ok((residual, rows))
     }
 }
 

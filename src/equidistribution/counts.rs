@@ -1,7 +1,7 @@
 //! Linear solves of Newton's method on the first of several pieces, counted as in table 8.1 of Gander and Haynes
 //! (2012).
 
-use super::chain::{Chain, largest};
+use super::chain::{Chain, Equations, largest};
 use super::conditions::{End, pin};
 use super::schwarz::Iteration;
 use super::{Line, Method, pieces};
@@ -10,7 +10,7 @@ use crate::numerics::linear::tridiagonal;
 
 /// Newton's method has converged once no node moves by more than this, in the unit of x.
 const STEP: f64 = 1e-12;
-/// Steps after which Newton's method without damping is given up.
+/// Steps after which Newton's method without damping is given up: where it converges it takes fewer than ten.
 const MOST: usize = 100;
 
 impl Line {
@@ -49,10 +49,11 @@ impl Line {
 
 /// Newton's method without damping, on `x`; returns the number of linear solves.
 fn whole_steps(chain: &Chain<'_>, x: &mut [f64], ends: [End; 2]) -> Result<usize, Failure> {
+    let equations = Equations { chain, ends, step: None };
     pin(x, ends);
     let mut moves = f64::INFINITY;
     for solves in 1..=MOST {
-        let (residual, rows) = chain.linearised(x, ends, None)?;
+        let (residual, rows) = equations.linearised(x)?;
         let change = tridiagonal(&rows, &residual);
         x.iter_mut().zip(&change).for_each(|(x, change)| *x -= change);
         moves = largest(change.into_iter());

@@ -36,7 +36,7 @@ pub use predict::Prediction;
 pub use schwarz::{Coarse, Method, Robin, Sweep};
 
 use crate::error::{Error, Failure, Result};
-use chain::{Chain, Step};
+use chain::{Chain, Equations, Step};
 use conditions::End;
 use cumulative::Cumulative;
 
@@ -112,10 +112,11 @@ impl Line {
     /// [`Failure::LineDensity`]; [`Failure::LineUnresolved`] where so many cells lie in so thin a layer that
     /// neighbouring nodes are the same floating-point number.
     pub fn equidistributed(&self, t: f64) -> Result<Vec<f64>, Failure> {
-        self.in_order(self.cumulative(t)?.divided(self.ends, self.cells))
+        self.divided(&self.cumulative(t)?)
     }
 
-    fn in_order(&self, mesh: Vec<f64>) -> Result<Vec<f64>, Failure> {
+    fn divided(&self, cumulative: &Cumulative) -> Result<Vec<f64>, Failure> {
+        let mesh = cumulative.divided(self.ends, self.cells);
         match (1..mesh.len()).find(|&i| mesh[i] <= mesh[i - 1]) {
             None => Ok(mesh),
             Some(i) => Err(Failure::LineUnresolved { node: i, x: mesh[i], cells: self.cells }),
@@ -141,16 +142,18 @@ impl Line {
         guess: &[f64],
         before: Before<'_>,
     ) -> Result<(Vec<f64>, usize), Failure> {
-        let (chain, ends) = (self.chain(t, Some(cumulative)), self.ends.map(End::Value));
-        if let Some((old, ratio)) = before {
-            return chain.solve(guess, ends, Some(Step { old, ratio }));
+        let step = before.map(|(old, ratio)| Step { old, ratio });
+        let chain = &self.chain(t, Some(cumulative));
+        let equations = Equations { chain, ends: self.ends.map(End::Value), step };
+        if before.is_some() {
+            return equations.solve(guess);
         }
-        let near = self.in_order(cumulative.divided(self.ends, self.cells))?;
+        let near = self.divided(cumulative)?;
         if self.face == FaceDensity::Exact {
             return Ok((near, 0));
         }
-        match chain.newton(&near, ends, None) {
-            Err(Failure::LineStalled { .. }) => chain.newton(guess, ends, None),
+        match equations.newton(&near) {
+            Err(Failure::LineStalled { .. }) => equations.newton(guess),
             other => other,
         }
     }
@@ -165,7 +168,7 @@ impl Line {
         match self.solved(t, &cumulative, &self.uniform(), None) {
             Ok((mesh, linear_solves)) => Ok(Settled { mesh, linear_solves, stalled: None }),
             Err(stalled @ Failure::LineStalled { .. }) => {
-                let mesh = self.in_order(cumulative.divided(self.ends, self.cells))?;
+                let mesh = self.divided(&cumulative)?;
                 Ok(Settled { mesh, linear_solves: 0, stalled: Some(stalled) })
             }
             Err(other) => Err(other),

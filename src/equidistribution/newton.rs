@@ -1,7 +1,7 @@
 //! Newton's method for the nodes of a piece of a line, damped so that nodes keep their order.
 
 use super::FaceDensity;
-use super::chain::{Chain, Step, largest};
+use super::chain::{Equations, largest};
 use super::conditions::{End, pin};
 use super::cumulative::Cumulative;
 use crate::error::{Act, Failure, Remedy, Setting};
@@ -46,18 +46,6 @@ fn ways(free: bool) -> impl Iterator<Item = (bool, Way, f64)> {
         .chain(halved(false, Way::Straight, 0..if free { HALVINGS } else { 0 }))
 }
 
-/// The equations of a piece for Newton's method.
-struct Newton<'a> {
-    chain: &'a Chain<'a>,
-    ends: [End<'a>; 2],
-    step: Option<Step<'a>>,
-    /// Whether there are conditions on the flux: an iterate may then run backwards, and nodes may pass through each
-    /// other on the way there.
-    free: bool,
-    /// The largest coordinate at the start.
-    size: f64,
-}
-
 /// Nodes with their residuals, and the derivatives of these: below, own, above.
 struct Iterate {
     x: Vec<f64>,
@@ -65,9 +53,84 @@ struct Iterate {
     rows: Vec<[f64; 3]>,
 }
 
-impl Newton<'_> {
+/// The nodes after a share of a Newton step along ∫M: each moves to where ∫M has changed by share × change × M(x).
+fn along(cumulative: &Cumulative, x: &[f64], change: &[f64], share: f64) -> Vec<f64> {
+    let moved = |(x, change): (&f64, &f64)| {
+        let [g, m] = cumulative.at(*x);
+        cumulative.place(g - share * change * m)
+    };
+    x.iter().zip(change).map(moved).collect()
+}
+
+impl Equations<'_> {
+    /// The nodes of a piece, and the number of linear solves that they took. Where M is averaged exactly the nodes
+    /// follow from inverting ∫M, without any. Else Newton's method starts from a guess and, if that stalls, from the
+    /// nodes that exact averages have.
+    ///
+    /// # Errors
+    /// [`Failure::LineDensity`], [`Failure::LineStalled`].
+    pub fn solve(&self, guess: &[f64]) -> Result<(Vec<f64>, usize), Failure> {
+        if self.chain.face == FaceDensity::Exact
+            && self.step.is_none()
+            && let Some(nodes) = self.chain.even(guess, self.ends)
+        {
+            return Ok((nodes, 0));
+        }
+        match self.newton(guess) {
+            Err(stalled @ Failure::LineStalled { .. }) => match self.chain.even(guess, self.ends) {
+                Some(near) if near.is_sorted_by(|a, b| a < b) => self.newton(&near).map_err(|_| stalled),
+                _ => Err(stalled),
+            },
+            other => other,
+        }
+    }
+
+    /// The remedies to offer where Newton's method stalls.
+    fn unstalling(&self) -> Remedy {
+        let exact = Act::Set(Setting::FaceDensity, &["\"exact\""]);
+        let finer = [Act::Lower(Setting::TimeStep), Act::Refine(Setting::Cells)];
+        match (self.chain.face, self.step.is_some()) {
+            (FaceDensity::Exact, true) => Remedy::any(finer),
+            (FaceDensity::Exact, false) => {
+                Remedy::any([Act::Set(Setting::Integral, &["\"exact\""]), Act::Refine(Setting::Cells)])
+            }
+            (_, true) => Remedy::any([exact, finer[0], finer[1]]),
+            (_, false) => Remedy::any([exact])
+                .with(": a density that jumps or peaks within a cell has no mesh by trapezoids or midpoints"),
+        }
+    }
+
+    /// Newton's method from a guess; returns the nodes and the number of linear solves.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn newton(&self, guess: &[f64]) -> Result<(Vec<f64>, usize), Failure> {
+        let x = stretched(guess, self.ends);
+        let size = largest_of(&x).max(f64::MIN_POSITIVE);
+        let stalled = |at: &Iterate, iterations: usize| Failure::LineStalled {
+            residual: norm(&at.residual),
+            iterations,
+            remedies: vec![self.unstalling()],
+        };
+        let mut at = self.at(x)?;
+        let mut last = f64::INFINITY;
+        let most = if self.is_free() { MOST_FREE_STEPS } else { MOST_STEPS };
+        for solves in 1..=most {
+            let change = tridiagonal(&at.rows, &at.residual);
+            let moves = largest_of(&change);
+            let Some((next, share)) = self.damped(&at, &change, size)? else { return Err(stalled(&at, solves)) };
+            at = next;
+            if share == 1.0 && moves <= NEAR * size && (moves >= NO_LONGER_SHRINKING * last || moves <= ROUNDING * size)
+            {
+                return Ok((at.x, solves));
+            }
+            last = moves;
+        }
+        Err(stalled(&at, most))
+    }
+
     fn at(&self, x: Vec<f64>) -> Result<Iterate, Failure> {
-        let (residual, rows) = self.chain.linearised(&x, self.ends, self.step)?;
+        let (residual, rows) = self.linearised(&x)?;
         Ok(Iterate { x, residual, rows })
     }
 
@@ -81,17 +144,25 @@ impl Newton<'_> {
         Some(moved)
     }
 
+    /// Whether there are conditions on the flux: an iterate may then run backwards, and nodes may pass through each other
+    /// on the way there.
+    fn is_free(&self) -> bool {
+        self.ends.iter().any(|end| matches!(end, End::Flux { .. }))
+    }
+
     fn is_ordered(&self, x: &[f64]) -> bool {
-        x.windows(2).all(|x| x[1] > x[0]) || self.free && x.windows(2).all(|x| x[1] < x[0])
+        x.windows(2).all(|x| x[1] > x[0]) || self.is_free() && x.windows(2).all(|x| x[1] < x[0])
     }
 
     /// The next iterate, and the share of the Newton step that leads there: the first of the steps to try that lowers
-    /// the residual, or any where the iterate is `near` the solution. None where no step does.
-    fn damped(&self, from: &Iterate, change: &[f64], near: bool) -> Result<Option<(Iterate, f64)>, Failure> {
+    /// the residual, or any where the iterate is near the solution. None where no step does. `size` is the largest
+    /// coordinate.
+    fn damped(&self, from: &Iterate, change: &[f64], size: f64) -> Result<Option<(Iterate, f64)>, Failure> {
+        let near = largest_of(change) <= NEAR * size;
         // a residual that moving each node by its last bits would change as much
-        let rounding = ROUNDING * self.size * from.rows.iter().fold(0.0, |m: f64, row| m.max(row[1].abs()));
+        let rounding = ROUNDING * size * from.rows.iter().fold(0.0, |m: f64, row| m.max(row[1].abs()));
         let enough = norm(&from.residual).max(rounding);
-        for (ordered, way, share) in ways(self.free) {
+        for (ordered, way, share) in ways(self.is_free()) {
             let Some(x) = self.moved(&from.x, change, way, share) else { continue };
             if ordered && !self.is_ordered(&x) {
                 continue;
@@ -109,95 +180,6 @@ impl Newton<'_> {
     }
 }
 
-/// The nodes after a share of a Newton step along ∫M: each moves to where ∫M has changed by share × change × M(x).
-fn along(cumulative: &Cumulative, x: &[f64], change: &[f64], share: f64) -> Vec<f64> {
-    let moved = |(x, change): (&f64, &f64)| {
-        let [g, m] = cumulative.at(*x);
-        cumulative.place(g - share * change * m)
-    };
-    x.iter().zip(change).map(moved).collect()
-}
-
-impl Chain<'_> {
-    /// The nodes of a piece, and the number of linear solves that they took. Where M is averaged exactly the nodes
-    /// follow from inverting ∫M, without any. Else Newton's method starts from a guess and, if that stalls, from the
-    /// nodes that exact averages have.
-    ///
-    /// # Errors
-    /// [`Failure::LineDensity`], [`Failure::LineStalled`].
-    pub fn solve(
-        &self,
-        guess: &[f64],
-        ends: [End<'_>; 2],
-        step: Option<Step<'_>>,
-    ) -> Result<(Vec<f64>, usize), Failure> {
-        if self.face == FaceDensity::Exact
-            && step.is_none()
-            && let Some(nodes) = self.even(guess, ends)
-        {
-            return Ok((nodes, 0));
-        }
-        match self.newton(guess, ends, step) {
-            Err(stalled @ Failure::LineStalled { .. }) => match self.even(guess, ends) {
-                Some(near) if near.is_sorted_by(|a, b| a < b) => self.newton(&near, ends, step).map_err(|_| stalled),
-                _ => Err(stalled),
-            },
-            other => other,
-        }
-    }
-
-    /// The remedies to offer where Newton's method stalls.
-    fn unstalling(&self, in_time: bool) -> Remedy {
-        let exact = Act::Set(Setting::FaceDensity, &["\"exact\""]);
-        let finer = [Act::Lower(Setting::TimeStep), Act::Refine(Setting::Cells)];
-        match (self.face, in_time) {
-            (FaceDensity::Exact, true) => Remedy::any(finer),
-            (FaceDensity::Exact, false) => {
-                Remedy::any([Act::Set(Setting::Integral, &["\"exact\""]), Act::Refine(Setting::Cells)])
-            }
-            (_, true) => Remedy::any([exact, finer[0], finer[1]]),
-            (_, false) => Remedy::any([exact])
-                .with(": a density that jumps or peaks within a cell has no mesh by trapezoids or midpoints"),
-        }
-    }
-
-    /// Newton's method from a guess; returns the nodes and the number of linear solves.
-    ///
-    /// # Errors
-    /// As [`solve`](Self::solve).
-    pub fn newton(
-        &self,
-        guess: &[f64],
-        ends: [End<'_>; 2],
-        step: Option<Step<'_>>,
-    ) -> Result<(Vec<f64>, usize), Failure> {
-        let x = stretched(guess, ends);
-        let size = x.iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
-        let free = ends.iter().any(|end| matches!(end, End::Flux { .. }));
-        let newton = Newton { chain: self, ends, step, free, size };
-        let stalled = |at: &Iterate, iterations: usize| Failure::LineStalled {
-            residual: norm(&at.residual),
-            iterations,
-            remedies: vec![self.unstalling(step.is_some())],
-        };
-        let mut at = newton.at(x)?;
-        let mut last = f64::INFINITY;
-        let most = if free { MOST_FREE_STEPS } else { MOST_STEPS };
-        for solves in 1..=most {
-            let change = tridiagonal(&at.rows, &at.residual);
-            let moves = change.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
-            let near = moves <= NEAR * size;
-            let Some((next, share)) = newton.damped(&at, &change, near)? else { return Err(stalled(&at, solves)) };
-            at = next;
-            if share == 1.0 && near && (moves >= NO_LONGER_SHRINKING * last || moves <= ROUNDING * size) {
-                return Ok((at.x, solves));
-            }
-            last = moves;
-        }
-        Err(stalled(&at, most))
-    }
-}
-
 /// The guess with the end nodes that are given: the whole piece is stretched linearly, which keeps the order of nodes.
 fn stretched(guess: &[f64], ends: [End<'_>; 2]) -> Vec<f64> {
     let n = guess.len() - 1;
@@ -212,4 +194,9 @@ fn stretched(guess: &[f64], ends: [End<'_>; 2]) -> Vec<f64> {
 
 fn norm(residual: &[f64]) -> f64 {
     largest(residual.iter().copied())
+}
+
+/// The largest magnitude, NaN left out.
+fn largest_of(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m: f64, value| m.max(value.abs()))
 }

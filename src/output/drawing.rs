@@ -9,16 +9,16 @@ use std::fmt::Write as _;
 /// Opacities with which mesh lines may be drawn: a line beside wide cells is drawn more strongly than one between
 /// narrow cells, so that crowded lines do not hide the colours.
 const STRENGTHS: [f64; 8] = [0.04, 0.08, 0.13, 0.19, 0.26, 0.35, 0.46, 0.6];
-/// Steps from white to black lines.
+/// Number of tones of mesh lines, white and black included.
 const TONES: usize = 5;
-/// Share of the colour map up to which lines are white.
+/// Mesh lines are white over colours up to this share of the colour map, its dark end.
 const WHITE_UP_TO: f64 = 0.35;
-/// Share of the colour map from which lines are black.
+/// Mesh lines are black over colours from this share of the colour map on, its bright end.
 const BLACK_FROM: f64 = 0.65;
-/// From the middle of a white line beside a black one to that of both, in units of the drawing: half a pixel of the
-/// PNG.
+/// Between these shares a white and a black line run side by side, each this far from where one line would be, in units
+/// of the drawing: half a pixel of the PNG.
 const BESIDE: f64 = 0.25;
-/// Opacity that a line gains for each unit by which the cell beside it is wider than one.
+/// Opacity that a mesh line gains for each unit of the drawing by which the cell beside it is wider than one unit.
 const FADES: f64 = 0.08;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
 const MAX_CELLS: usize = 240;

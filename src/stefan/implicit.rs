@@ -46,7 +46,7 @@ impl Front {
             let u = self.conduct(problem, state, &h, t)?;
             work.linear_solves += 2;
             work.newton_iterations += 1;
-            let slopes = front::slopes(&self.columns, &self.heights(&h), &u);
+            let slopes = self.slopes(&h, &u);
             let target = self.moved(problem, &state.front, &h, &slopes, t, dt)?;
             let residual: Vec<f64> = h.iter().zip(&target).map(|(h, target)| h - target).collect();
             miss = residual.iter().copied().fold(0.0, larger);

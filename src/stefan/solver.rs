@@ -114,19 +114,14 @@ impl Front {
     /// # Errors
     /// [`Error::Invalid`] unless diffusivities and mobility are positive.
     pub fn new(columns: Columns, diffusivity: [f64; 2], mobility: f64) -> Result<Self> {
-        for (key, value) in
-            [("phase.lower.diffusivity", diffusivity[LOWER]), ("phase.upper.diffusivity", diffusivity[UPPER])]
-        {
+        for (key, value, rule) in [
+            ("phase.lower.diffusivity", diffusivity[LOWER], "must be above 0"),
+            ("phase.upper.diffusivity", diffusivity[UPPER], "must be above 0"),
+            ("front.mobility", mobility, "must be above 0: it is the inverse of the latent heat"),
+        ] {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::invalid(key, value, "must be above 0"));
+                return Err(Error::invalid(key, value, rule));
             }
-        }
-        if !(mobility > 0.0 && mobility.is_finite()) {
-            return Err(Error::invalid(
-                "front.mobility",
-                mobility,
-                "must be above 0: it is the inverse of the latent heat",
-            ));
         }
         Ok(Self {
             columns,
@@ -171,7 +166,7 @@ impl Front {
             }
         }
         let mut state = FrontState { t, step: 0, front, u, energy: Energy::default() };
-        let slopes = self.slopes(&state);
+        let slopes = self.slopes(&state.front, &state.u);
         front::check_warm_below(&self.columns, &state.front, &slopes, self.diffusivity)?;
         let content = self.contents(&state.front, &state.u).map(|content| content[0]);
         let energy = total(&self.columns, &state.front, content, self.mobility);
@@ -183,8 +178,9 @@ impl Front {
         [LOWER, UPPER].map(|phase| self.columns.heights(phase, h))
     }
 
-    fn slopes(&self, state: &FrontState) -> [Vec<f64>; 2] {
-        front::slopes(&self.columns, &self.heights(&state.front), &state.u)
+    /// Slopes of the temperatures u of both phases at a front.
+    pub(super) fn slopes(&self, h: &[f64], u: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+        front::slopes(&self.columns, &self.heights(h), u)
     }
 
     fn contents(&self, h: &[f64], u: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
@@ -194,7 +190,7 @@ impl Front {
 
     /// The longest step for which the explicit front is stable, as estimated from the temperatures at the front.
     pub fn limit(&self, state: &FrontState) -> f64 {
-        front::limit(&self.columns, &self.slopes(state), self.diffusivity, self.mobility, self.filter)
+        front::limit(&self.columns, &self.slopes(&state.front, &state.u), self.diffusivity, self.mobility, self.filter)
     }
 
     /// A step to time `t`; the state changes only if it succeeds.
@@ -204,7 +200,7 @@ impl Front {
     /// [`Failure::WrongSide`]; [`Failure::NonFinite`]; [`Failure::NewtonStalled`]; [`Failure::LinearStalled`].
     pub fn step(&mut self, problem: &dyn Problem, state: &mut FrontState, t: f64) -> Result<Work> {
         let dt = t - state.t;
-        let slopes = self.slopes(state);
+        let slopes = self.slopes(&state.front, &state.u);
         front::check_warm_below(&self.columns, &state.front, &slopes, self.diffusivity)?;
         let mut work = Work::default();
         let (h, u) = match self.stepping {
@@ -221,7 +217,7 @@ impl Front {
             }
             Stepping::Implicit => self.newton(problem, state, &slopes, t, &mut work)?,
         };
-        let slopes = front::slopes(&self.columns, &self.heights(&h), &u);
+        let slopes = self.slopes(&h, &u);
         front::check_warm_below(&self.columns, &h, &slopes, self.diffusivity)?;
         state.energy = self.balance(state, &h, &u, dt);
         (state.front, state.u, state.t) = (h, u, t);

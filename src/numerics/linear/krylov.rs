@@ -10,7 +10,8 @@ pub(super) struct Krylov<const K: usize> {
 
 /// Iterations (products with the matrix, or sweeps of the preconditioner) after which a system counts as not solved.
 const MAX_PRODUCTS: usize = 2000;
-/// Largest number of restarts from the true residual, each of which gains what rounding of the recursive one has lost.
+/// Largest number of starts from the residual b − A x. The one that the iteration updates drifts from it by rounding, and
+/// each start makes that good.
 const RESTARTS: usize = 4;
 
 impl<const K: usize> Krylov<K> {
