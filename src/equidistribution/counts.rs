@@ -10,7 +10,7 @@ use crate::numerics::linear::tridiagonal;
 
 /// Newton's method has converged once no node moves by more than this, in the unit of x.
 const STEP: f64 = 1e-12;
-/// Steps after which Newton's method without damping is given up: where it converges it takes fewer than ten.
+/// Steps after which Newton's method without damping is given up: where it converges it takes a few.
 const MOST: usize = 100;
 
 impl Line {

@@ -30,8 +30,9 @@ impl Line {
     /// [`History::converged`].
     ///
     /// # Errors
-    /// [`Error::Invalid`] for ranges that do not fit the method ([`pieces::check`]) or a start that is no mesh;
-    /// [`Error::Failed`] with [`Failure::LineDensity`] or [`Failure::LineStalled`].
+    /// [`Error::Invalid`](crate::Error::Invalid) for ranges that do not fit the method ([`pieces::check`]) or a start
+    /// that is no mesh; [`Error::Failed`](crate::Error::Failed) with
+    /// [`Failure::LineDensity`](crate::Failure::LineDensity) or [`Failure::LineStalled`](crate::Failure::LineStalled).
     pub fn iterate(
         &self,
         t: f64,

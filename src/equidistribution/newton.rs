@@ -144,8 +144,8 @@ impl Equations<'_> {
         Some(moved)
     }
 
-    /// Whether there are conditions on the flux: an iterate may then run backwards, and nodes may pass through each other
-    /// on the way there.
+    /// Whether there are conditions on the flux: an iterate may then run backwards, and nodes may pass through each
+    /// other on the way there.
     fn is_free(&self) -> bool {
         self.ends.iter().any(|end| matches!(end, End::Flux { .. }))
     }

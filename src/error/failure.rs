@@ -4,7 +4,8 @@ use super::words::{counted, given_as, line_rule, node_at, noisy, place, short, t
 use super::{Cause, Remedy};
 use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
-/// A numerical failure inside one step. It never carries a time: the loop that knows it adds it ([`Error::Failed`]).
+/// A numerical failure inside one step. It never carries a time: the loop that knows it adds it
+/// ([`Error::Failed`](super::Error::Failed)).
 #[derive(Debug, Clone, PartialEq, thiserror::Error, EnumIter, EnumMessage, IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Failure {

@@ -1,3 +1,4 @@
+use super::krylov::add;
 use super::{LatticeMatrix, larger, refill};
 use crate::geometry::Patch;
 use crate::parallel;
@@ -98,9 +99,7 @@ impl Adi {
             } else {
                 a.difference(v, x, scratch);
                 solve(&a.patch, factors, scratch);
-                for (x, e) in x.iter_mut().zip(scratch.iter()) {
-                    (0..K).for_each(|c| x[c] += e[c]);
-                }
+                add(x, [1.0; K], scratch);
             }
             a.patch.wrap(x);
         }

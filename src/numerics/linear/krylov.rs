@@ -10,8 +10,8 @@ pub(super) struct Krylov<const K: usize> {
 
 /// Iterations (products with the matrix, or sweeps of the preconditioner) after which a system counts as not solved.
 const MAX_PRODUCTS: usize = 2000;
-/// Largest number of starts from the residual b − A x. The one that the iteration updates drifts from it by rounding, and
-/// each start makes that good.
+/// Largest number of starts from the residual b − A x. The one that the iteration updates drifts from it by rounding,
+/// which each start makes good.
 const RESTARTS: usize = 4;
 
 impl<const K: usize> Krylov<K> {
