@@ -179,6 +179,17 @@ impl From<Failure> for Error {
     }
 }
 
+impl Failure {
+    /// The failure that stands for an error where a step cannot return it.
+    pub(crate) fn refusing(error: Error) -> Self {
+        match error {
+            Error::Failed { failure, .. } => failure,
+            Error::Invalid { key, value, rule } => Self::OutOfRange { what: format!("`{key}`"), value, rule },
+            other => Self::out_of_range("a setting", "not usable", &other.to_string()),
+        }
+    }
+}
+
 impl Error {
     /// A setting out of range.
     pub fn invalid(key: impl Into<String>, value: impl std::fmt::Display, rule: impl Into<String>) -> Self {
@@ -189,6 +200,11 @@ impl Error {
             _ => text,
         };
         Self::Invalid { key: key.into(), value, rule: rule.into() }
+    }
+
+    /// The error of a file or directory that could not be written, from the reason.
+    pub(crate) fn unwritable<E: std::fmt::Display>(path: &std::path::Path) -> impl Fn(E) -> Self + Copy {
+        |reason| Self::Unwritable { path: path.into(), reason: reason.to_string() }
     }
 
     /// The same error with its key seen from one table further out: `viscosity` becomes `pde.viscosity`.

@@ -1,11 +1,11 @@
 //! How a study writes a setting.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::de::{self, IntoDeserializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::marker::PhantomData;
 
 /// A setting that a study gives as a value, or leaves to the program with `"auto"`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -26,33 +26,58 @@ impl<T: Serialize> Serialize for Auto<T> {
     }
 }
 
+/// A number or a text in a study.
+pub(crate) enum Scalar<'a> {
+    Text(&'a str),
+    Signed(i64),
+    Unsigned(u64),
+    Real(f64),
+}
+
+/// Reads a number or a text. A message says what was `expected`.
+pub(crate) fn scalar<'de, D: Deserializer<'de>, T>(
+    deserializer: D,
+    expected: &'static str,
+    read: impl FnOnce(Scalar<'_>) -> Result<T, de::value::Error>,
+) -> Result<T, D::Error> {
+    struct Visitor<F>(&'static str, F);
+    impl<T, F: FnOnce(Scalar<'_>) -> Result<T, de::value::Error>> de::Visitor<'_> for Visitor<F> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str(self.0)
+        }
+
+        fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
+            (self.1)(Scalar::Text(text)).map_err(E::custom)
+        }
+
+        fn visit_i64<E: de::Error>(self, value: i64) -> Result<T, E> {
+            (self.1)(Scalar::Signed(value)).map_err(E::custom)
+        }
+
+        fn visit_u64<E: de::Error>(self, value: u64) -> Result<T, E> {
+            (self.1)(Scalar::Unsigned(value)).map_err(E::custom)
+        }
+
+        fn visit_f64<E: de::Error>(self, value: f64) -> Result<T, E> {
+            (self.1)(Scalar::Real(value)).map_err(E::custom)
+        }
+    }
+    deserializer.deserialize_any(Visitor(expected, read))
+}
+
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Auto<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Visitor<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> de::Visitor<'de> for Visitor<T> {
-            type Value = Auto<T>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number or \"auto\"")
-            }
-
-            fn visit_str<E: de::Error>(self, text: &str) -> Result<Auto<T>, E> {
-                if text == "auto" { Ok(Auto::Auto) } else { Err(E::invalid_value(de::Unexpected::Str(text), &self)) }
-            }
-
-            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Auto<T>, E> {
-                T::deserialize(de::value::I64Deserializer::new(value)).map(Auto::Value)
-            }
-
-            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Auto<T>, E> {
-                T::deserialize(de::value::U64Deserializer::new(value)).map(Auto::Value)
-            }
-
-            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Auto<T>, E> {
-                T::deserialize(de::value::F64Deserializer::new(value)).map(Auto::Value)
-            }
-        }
-        deserializer.deserialize_any(Visitor(PhantomData))
+        const EXPECTED: &str = "a number or \"auto\"";
+        let value = scalar(deserializer, EXPECTED, |found| match found {
+            Scalar::Text("auto") => Ok(None),
+            Scalar::Text(text) => Err(de::Error::invalid_value(de::Unexpected::Str(text), &EXPECTED)),
+            Scalar::Signed(value) => T::deserialize(value.into_deserializer()).map(Some),
+            Scalar::Unsigned(value) => T::deserialize(value.into_deserializer()).map(Some),
+            Scalar::Real(value) => T::deserialize(value.into_deserializer()).map(Some),
+        });
+        Ok(value?.map_or(Self::Auto, Self::Value))
     }
 }
 
@@ -95,31 +120,15 @@ impl JsonSchema for Text {
 
 impl<'de> Deserialize<'de> for Text {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Visitor;
-        impl de::Visitor<'_> for Visitor {
-            type Value = Text;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a formula as a string")
-            }
-
-            fn visit_str<E: de::Error>(self, text: &str) -> Result<Text, E> {
-                Ok(Text(text.into()))
-            }
-
-            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Text, E> {
-                Ok(Text(value.to_string()))
-            }
-
-            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Text, E> {
-                Ok(Text(value.to_string()))
-            }
-
-            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Text, E> {
-                Ok(Text(format!("{value:?}")))
-            }
-        }
-        deserializer.deserialize_any(Visitor)
+        let text = scalar(deserializer, "a formula as a string", |found| {
+            Ok(match found {
+                Scalar::Text(text) => text.into(),
+                Scalar::Signed(value) => value.to_string(),
+                Scalar::Unsigned(value) => value.to_string(),
+                Scalar::Real(value) => format!("{value:?}"),
+            })
+        });
+        text.map(Self)
     }
 }
 

@@ -20,10 +20,26 @@ fn study(n: u64) -> (String, MovingMesh) {
     (text, study)
 }
 
+/// The study as text. Dice are cast in the order of the tables, so that a number stays the study that it is.
 fn text(n: u64, dice: &mut Dice) -> String {
     let cells = [dice.whole(24, 40), dice.whole(24, 40)];
+    let (pde, start, periodic) = pde(dice);
+    let span = dice.between(0.05, 0.5) * if pde.contains("shallow-water") { 0.4 } else { 1.0 };
+    let step = step(dice, span);
+    let monitor = monitor(dice);
+    let mesh = mesh(n, dice);
+    format!(
+        "[study]\nname = \"sweep-{n}\"\nkind = \"moving-mesh\"\n[domain]\nperiodic = {:?}\n[grid]\ncells = {cells:?}\n\
+         [time]\nstart = {start}\nend = {}\n{step}\n[pde]\n{pde}\n[monitor]\n{monitor}\n[mesh]\n{mesh}\n",
+        [periodic; 2],
+        start + span
+    )
+}
+
+/// An equation, the time at which it begins, and whether its axes are periodic.
+fn pde(dice: &mut Dice) -> (String, f64, bool) {
     let viscosity = dice.between(1e-3, 1e-1);
-    let (pde, start, periodic) = match dice.whole(0, 9) {
+    match dice.whole(0, 9) {
         0..=2 => {
             let convection = dice.of(["conservative", "advective", "flux"]);
             (format!("kind = \"burgers\"\nviscosity = {viscosity}\nconvection = \"{convection}\""), 0.25, false)
@@ -55,15 +71,20 @@ fn text(n: u64, dice: &mut Dice) -> String {
                         boundary = { u = \"0\", v = \"no-flux\" }";
             (format!("kind = \"formula\"\n{both}\ndiffusivity = {{ u = {viscosity}, v = 0.01 }}"), 0.0, false)
         }
-    };
-    let water = pde.contains("shallow-water");
-    let span = dice.between(0.05, 0.5) * if water { 0.4 } else { 1.0 };
-    let step = match dice.whole(0, 3) {
+    }
+}
+
+/// The time step of a run that lasts for `span`.
+fn step(dice: &mut Dice, span: f64) -> String {
+    match dice.whole(0, 3) {
         0 | 1 => format!("step = {}", span / dice.whole(20, 60) as f64),
         2 => "step = \"auto\"".into(),
         _ => format!("tolerance = {}", dice.between(1e-4, 1e-2)),
-    };
-    let monitor = match dice.whole(0, 5) {
+    }
+}
+
+fn monitor(dice: &mut Dice) -> String {
+    match dice.whole(0, 5) {
         0 => "kind = \"auto\"".into(),
         _ => {
             let (strength, smoothing) = (dice.between(1.0, 1000.0), dice.whole(0, 6));
@@ -73,7 +94,11 @@ fn text(n: u64, dice: &mut Dice) -> String {
                  gradient = \"{gradient}\""
             )
         }
-    };
+    }
+}
+
+/// How the mesh moves.
+fn mesh(n: u64, dice: &mut Dice) -> String {
     let relaxation = match dice.whole(0, 1) {
         0 => dice.between(0.05, 1.0).to_string(),
         _ => format!("{{ steps = {}, prediction = {} }}", dice.whole(10, 40), dice.of([0.0, 0.2])),
@@ -85,25 +110,23 @@ fn text(n: u64, dice: &mut Dice) -> String {
         1..=3 => "{ kind = \"whole\" }".into(),
         4..=5 => format!("{{ kind = \"schwarz\", subdomains = {subdomains:?}, overlap = {} }}", dice.whole(1, 2)),
         _ => {
-            let estimator = match dice.whole(0, 3) {
-                0 => "{ kind = \"residual-walk\" }".into(),
-                3 => "{ kind = \"strip\" }".into(),
-                1 => format!("{{ kind = \"grid-walk\", walks = {} }}", dice.whole(100, 1000)),
-                _ => {
-                    let (paths, substeps) = (dice.whole(100, 1000), dice.whole(1, 4));
-                    format!("{{ kind = \"monte-carlo\", paths = {paths}, substeps = {substeps} }}")
-                }
-            };
+            let estimator = estimator(dice);
             format!("{{ kind = \"stochastic\", subdomains = {subdomains:?}, seed = {n}, estimator = {estimator} }}")
         }
     };
-    format!(
-        "[study]\nname = \"sweep-{n}\"\nkind = \"moving-mesh\"\n[domain]\nperiodic = {:?}\n[grid]\ncells = {cells:?}\n\
-         [time]\nstart = {start}\nend = {}\n{step}\n[pde]\n{pde}\n[monitor]\n{monitor}\n\
-         [mesh]\nrelaxation = {relaxation}\nform = \"{form}\"\nstart = \"{begin}\"\ngenerator = {generator}\n",
-        [periodic; 2],
-        start + span
-    )
+    format!("relaxation = {relaxation}\nform = \"{form}\"\nstart = \"{begin}\"\ngenerator = {generator}")
+}
+
+fn estimator(dice: &mut Dice) -> String {
+    match dice.whole(0, 3) {
+        0 => "{ kind = \"residual-walk\" }".into(),
+        3 => "{ kind = \"strip\" }".into(),
+        1 => format!("{{ kind = \"grid-walk\", walks = {} }}", dice.whole(100, 1000)),
+        _ => {
+            let (paths, substeps) = (dice.whole(100, 1000), dice.whole(1, 4));
+            format!("{{ kind = \"monte-carlo\", paths = {paths}, substeps = {substeps} }}")
+        }
+    }
 }
 
 /// Looks at every state of a run.

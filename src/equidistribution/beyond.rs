@@ -1,4 +1,5 @@
-use super::chain::{Chain, End, Step};
+use super::chain::{Chain, Equations, Step};
+use super::conditions::End;
 use crate::error::Failure;
 use crate::numerics::linear::tridiagonal;
 
@@ -30,9 +31,10 @@ impl Beyond<'_> {
         let n = old.len() - 1;
         let step = Step { old, ratio };
         let ends = if cut_at_left { [x, old[n]] } else { [old[0], x] }.map(End::Value);
-        let (y, _) = chain.newton(old, ends, Some(step))?;
+        let equations = Equations { chain, ends, step: Some(step) };
+        let (y, _) = equations.newton(old)?;
         // the derivative of each node y_i by the node at the cut
-        let (_, rows) = chain.linearised(&y, ends, Some(step))?;
+        let (_, rows) = equations.linearised(&y)?;
         let mut right = vec![0.0; n + 1];
         right[if cut_at_left { 0 } else { n }] = 1.0;
         let follows = tridiagonal(&rows, &right);

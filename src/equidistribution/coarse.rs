@@ -1,7 +1,8 @@
 //! A coarse correction between sweeps. It reaches all subdomains at once, so that the number of iterations does not
 //! grow with theirs.
 
-use super::chain::{End, Step};
+use super::chain::{Equations, Step};
+use super::conditions::End;
 use super::cumulative::Cumulative;
 use super::schwarz::{Coarse, Iteration, owner};
 use crate::error::Failure;
@@ -38,7 +39,8 @@ pub(super) fn corrected(iteration: &Iteration<'_>, mesh: Vec<f64>, coarse: Coars
         return Ok(mesh);
     }
     let step = iteration.old.map(|(old, ratio)| Step { old, ratio });
-    let (residual, rows) = chain.linearised(&mesh, [End::Value(mesh[0]), End::Value(mesh[n])], step)?;
+    let ends = [mesh[0], mesh[n]].map(End::Value);
+    let (residual, rows) = Equations { chain, ends, step }.linearised(&mesh)?;
     let m = chain.density.at_each(chain.t, &mesh)?;
     // for each node the interval between coarse nodes that it lies in, and its place there from 0 to 1
     let mut places = Vec::with_capacity(n + 1);

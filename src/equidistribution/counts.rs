@@ -1,7 +1,8 @@
 //! Linear solves of Newton's method on the first of several pieces, counted as in table 8.1 of Gander and Haynes
 //! (2012).
 
-use super::chain::{Chain, End};
+use super::chain::{Chain, Equations, largest};
+use super::conditions::{End, pin};
 use super::schwarz::Iteration;
 use super::{Line, Method, pieces};
 use crate::error::{Act, Failure, Remedy, Result};
@@ -9,7 +10,7 @@ use crate::numerics::linear::tridiagonal;
 
 /// Newton's method has converged once no node moves by more than this, in the unit of x.
 const STEP: f64 = 1e-12;
-/// Steps after which Newton's method without damping is given up.
+/// Steps after which Newton's method without damping is given up: where it converges it takes a few.
 const MOST: usize = 100;
 
 impl Line {
@@ -48,25 +49,23 @@ impl Line {
 
 /// Newton's method without damping, on `x`; returns the number of linear solves.
 fn whole_steps(chain: &Chain<'_>, x: &mut [f64], ends: [End; 2]) -> Result<usize, Failure> {
-    let last = x.len() - 1;
-    if let End::Value(value) = ends[1] {
-        x[last] = value;
-    }
-    let mut largest = f64::INFINITY;
+    let equations = Equations { chain, ends, step: None };
+    pin(x, ends);
+    let mut moves = f64::INFINITY;
     for solves in 1..=MOST {
-        let (residual, rows) = chain.linearised(x, ends, None)?;
+        let (residual, rows) = equations.linearised(x)?;
         let change = tridiagonal(&rows, &residual);
         x.iter_mut().zip(&change).for_each(|(x, change)| *x -= change);
-        largest = change.iter().fold(0.0, |m: f64, c| if c.is_nan() { f64::INFINITY } else { m.max(c.abs()) });
-        if largest <= STEP {
+        moves = largest(change.into_iter());
+        if moves <= STEP {
             return Ok(solves);
         }
-        if !largest.is_finite() {
+        if !moves.is_finite() {
             break;
         }
     }
     let remedy = Remedy::any([Act::Say("begin nearer to the mesh: whole steps are counted, none is halved")]);
-    Err(Failure::LineStalled { residual: largest, iterations: MOST, remedies: vec![remedy] })
+    Err(Failure::LineStalled { residual: moves, iterations: MOST, remedies: vec![remedy] })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use super::LineDensity;
+use super::polynomial::{POINTS, Piece, Tail, clenshaw, points, transform};
 use crate::error::Failure;
-use std::f64::consts::PI;
 
 /// G(x) = ∫M from the beginning of a line to x, and its inverse
 ///
@@ -22,33 +22,6 @@ pub(super) struct Cumulative {
     whole: f64,
 }
 
-/// A piece of the line, with `half` its half length: G(lower + half (1 + s)) = below + half Σ c_k T_k(s), −1 ≤ s ≤ 1.
-#[derive(Debug, Clone)]
-struct Piece {
-    lower: f64,
-    upper: f64,
-    /// G at the beginning of the piece.
-    below: f64,
-    /// ∫M over the piece.
-    integral: f64,
-    /// Chebyshev coefficients c_k of ∫M ds, which is 0 at s = −1.
-    coefficients: Vec<f64>,
-}
-
-/// The last coefficients of the polynomial of a piece.
-struct Tail {
-    /// Sum of their absolute values.
-    size: f64,
-    /// The size that rounding of the places alone gives them.
-    rounding: f64,
-}
-
-/// Distance of the Chebyshev points in the middle of a piece, about sin(π/16)/2, as a share of its width: changes of M
-/// from point to point over it estimate the largest slope of M.
-const PLACES_APART: f64 = 0.1;
-/// Degree of the polynomials: smooth M is resolved to round-off on few pieces.
-const DEGREE: usize = 16;
-const POINTS: usize = DEGREE + 1;
 /// Pieces at the start: with 17 points each, some 2000 places, between which a spike can be overlooked.
 const FIRST: usize = 128;
 /// Pieces beyond which none is halved any more: M is then taken as its polynomials have it.
@@ -62,8 +35,10 @@ const ROUNDING: f64 = 1e-16;
 const NOISY: f64 = 1e-6;
 /// Share by which the chord of a piece may exceed its arc: rounding of u.
 const CHORD: f64 = 1e-9;
-/// Steps of Newton's method or of bisection for one place. Bisection alone takes 53.
-const MOST_NEWTON: usize = 100;
+/// u jumps between two neighbouring floating-point numbers where its chord is longer than this multiple of the arc.
+const JUMP: f64 = 2.0;
+/// A chord shorter than this share of the arc length of the whole line is no jump: it may be rounding of u.
+const NOTICEABLE: f64 = 1e-12;
 
 impl Cumulative {
     /// ∫M of a density over a line.
@@ -172,30 +147,31 @@ impl Cumulative {
         self.at(x)[0]
     }
 
+    /// The place beyond an end of the line where G has a value; none for the values that it has on the line.
+    fn beyond(&self, g: f64) -> Option<f64> {
+        let [a, b] = self.ends();
+        match g {
+            _ if g < 0.0 => Some(a + g / self.at(a)[1]),
+            _ if g > self.whole => Some(b + (g - self.whole) / self.at(b)[1]),
+            _ => None,
+        }
+    }
+
     /// The place where G has a value.
     pub fn place(&self, g: f64) -> f64 {
-        let [a, b] = self.ends();
-        if g < 0.0 {
-            return a + g / self.at(a)[1];
-        }
-        if g > self.whole {
-            return b + (g - self.whole) / self.at(b)[1];
-        }
-        let piece = &self.pieces[self.pieces.partition_point(|piece| piece.below <= g).max(1) - 1];
-        piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + piece.inverted(g, -1.0, None)[0])
+        self.beyond(g).unwrap_or_else(|| {
+            let piece = &self.pieces[self.pieces.partition_point(|piece| piece.below <= g).max(1) - 1];
+            piece.place(piece.inverted(g, -1.0, None)[0])
+        })
     }
 
     /// The places where G has some values, which must grow.
     pub fn inverted(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut k = 0;
         let (mut s, mut near) = (-1.0, None);
-        let [a, b] = self.ends();
         let place = |g: f64| {
-            if g < 0.0 {
-                return a + g / self.at(a)[1];
-            }
-            if g > self.whole {
-                return b + (g - self.whole) / self.at(b)[1];
+            if let Some(beyond) = self.beyond(g) {
+                return beyond;
             }
             while k + 1 < self.pieces.len() && g >= self.pieces[k + 1].below {
                 (k, s, near) = (k + 1, -1.0, None);
@@ -205,7 +181,7 @@ impl Cumulative {
             let guess = near.map(|(before, slope)| s + (g - before) / slope);
             let [found, slope] = piece.inverted(g, s, guess);
             (s, near) = (found, Some((g, slope)));
-            piece.lower + 0.5 * (piece.upper - piece.lower) * (1.0 + s)
+            piece.place(s)
         };
         values.map(place).collect()
     }
@@ -229,98 +205,10 @@ impl Cumulative {
     }
 }
 
-/// u jumps between two neighbouring floating-point numbers where its chord is longer than this multiple of the arc.
-const JUMP: f64 = 2.0;
-/// A chord shorter than this share of the arc length of the whole line is no jump: it may be rounding of u.
-const NOTICEABLE: f64 = 1e-12;
-
-impl Piece {
-    /// The polynomial through the values of M in the Chebyshev points between two places, integrated, and its last
-    /// coefficients.
-    fn through([lower, upper]: [f64; 2], values: &[f64], transform: &[[f64; POINTS]; POINTS]) -> (Self, Tail) {
-        let c: [f64; POINTS] =
-            std::array::from_fn(|k| transform[k].iter().zip(values).map(|(weight, value)| weight * value).sum());
-        // ∫T_k = (T_{k+1}/(k + 1) − T_{k−1}/(k − 1))/2, ∫T_0 = T_1, ∫T_1 = T_2/4
-        let at = |k: usize| c.get(k).copied().unwrap_or(0.0);
-        let mut coefficients: Vec<f64> = (0..=POINTS)
-            .map(|k| match k {
-                0 => 0.0,
-                1 => at(0) - 0.5 * at(2),
-                k => (at(k - 1) - at(k + 1)) / (2.0 * k as f64),
-            })
-            .collect();
-        // T_k(−1) = (−1)^k, T_k(1) = 1
-        coefficients[0] = (1..=POINTS).map(|k| if k % 2 == 1 { coefficients[k] } else { -coefficients[k] }).sum();
-        let integral = 0.5 * (upper - lower) * coefficients.iter().sum::<f64>();
-        let size = c[DEGREE - 2..].iter().map(|c| c.abs()).sum();
-        let steepest =
-            values.windows(2).map(|m| (m[1] - m[0]).abs()).fold(0.0, f64::max) / (PLACES_APART * (upper - lower));
-        let rounding = 2.0 * f64::EPSILON * lower.abs().max(upper.abs()) * steepest;
-        (Self { lower, upper, below: 0.0, integral, coefficients }, Tail { size, rounding })
-    }
-
-    /// s where G is `g`, in from ≤ s ≤ 1, and dG/ds there. The search begins at a guess.
-    fn inverted(&self, g: f64, from: f64, guess: Option<f64>) -> [f64; 2] {
-        let half = 0.5 * (self.upper - self.lower);
-        let wanted = (g - self.below) / half;
-        let (mut low, mut high) = (from, 1.0_f64);
-        let mut s =
-            guess.filter(|s| s.is_finite()).unwrap_or(2.0 * (g - self.below) / self.integral - 1.0).clamp(low, high);
-        let mut slope = 0.0;
-        for _ in 0..MOST_NEWTON {
-            let value;
-            [value, slope] = clenshaw(&self.coefficients, s);
-            let off = value - wanted;
-            *(if off > 0.0 { &mut high } else { &mut low }) = s;
-            let newton = s - off / slope;
-            // once the Newton step is within rounding of s, so is the error
-            if (newton - s).abs() <= f64::EPSILON || high - low <= f64::EPSILON {
-                return [newton.clamp(low, high), half * slope];
-            }
-            s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        }
-        [s, half * slope]
-    }
-}
-
-/// Σ c_k T_k(s) and its derivative, by Clenshaw's recurrence.
-fn clenshaw(c: &[f64], s: f64) -> [f64; 2] {
-    let (mut b, mut b_next) = (0.0, 0.0);
-    let (mut d, mut d_next) = (0.0, 0.0);
-    for &c in c[1..].iter().rev() {
-        (d, d_next) = (2.0 * b + 2.0 * s * d - d_next, d);
-        (b, b_next) = (c + 2.0 * s * b - b_next, b);
-    }
-    [c[0] + s * b - b_next, b + s * d - d_next]
-}
-
-/// The Chebyshev points between two places, which include both ends.
-fn points([lower, upper]: &[f64; 2]) -> impl Iterator<Item = f64> + use<> {
-    let [lower, upper] = [*lower, *upper];
-    let half = 0.5 * (upper - lower);
-    (0..POINTS).map(move |j| match j {
-        0 => upper,
-        DEGREE => lower,
-        // measured from the nearer end, so that rounding puts no point outside the piece
-        j if 2 * j < DEGREE => upper - half * 2.0 * (0.5 * PI * j as f64 / DEGREE as f64).sin().powi(2),
-        j => lower + half * 2.0 * (0.5 * PI * j as f64 / DEGREE as f64).cos().powi(2),
-    })
-}
-
-/// From values in the Chebyshev points, s_j = cos(jπ/n), to coefficients: c_k = (2/n) Σ″ f_j cos(jkπ/n), halved for k =
-/// 0 and n.
-fn transform() -> [[f64; POINTS]; POINTS] {
-    let half = |k: usize| if k == 0 || k == DEGREE { 0.5 } else { 1.0 };
-    std::array::from_fn(|k| {
-        std::array::from_fn(|j| {
-            2.0 / DEGREE as f64 * half(k) * half(j) * (PI * (j * k % (2 * DEGREE)) as f64 / DEGREE as f64).cos()
-        })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     fn of(m: &str) -> Cumulative {
         Cumulative::new(&LineDensity::formula(m).unwrap(), 0.0, [0.0, 1.0]).unwrap()

@@ -1,6 +1,7 @@
 use super::{Coarse, Line, Method, Robin, Sweep};
 use crate::error::Failure;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// The contraction of the error in two iterations, by theory
 ///
@@ -24,7 +25,13 @@ pub struct Prediction {
     pub bound: Option<f64>,
 }
 
+/// Powers of A² after which its spectral radius is taken as it is.
+const MOST_POWERS: usize = 20_000;
+/// The spectral radius of A² has settled once another power changes it by no more than this, which is near rounding.
+const SETTLED: f64 = 1e-14;
+
 impl Prediction {
+    /// The prediction for an iteration that leads to `mesh`; `ratio` is τ/Δt, none without time.
     pub(super) fn of(
         line: &Line,
         t: f64,
@@ -40,59 +47,19 @@ impl Prediction {
             (Method::Classical { linearized: true, .. }, _) => Self::default(),
             (Method::Classical { coarse: Coarse::Galerkin | Coarse::Integral, .. }, _) => Self::default(),
             (Method::Classical { sweep, .. }, Some(ratio)) if count == 2 => {
-                let (alpha, beta) = (xi(ranges[1][0]), xi(ranges[0][1]));
                 let root = (ratio / extremes()?[1]).sqrt();
-                // as logarithms: for a small time step the sinh themselves overflow
-                let sinh = |s: f64| root * s + (0.5 * -(-2.0 * root * s).exp_m1()).ln();
-                let bound = sinh(alpha) + sinh(1.0 - beta) - sinh(beta) - sinh(1.0 - alpha);
-                // the theorem is for two parallel sweeps; one alternating sweep contracts as much
-                let iterations = if sweep == Sweep::Alternating { 2.0 } else { 1.0 };
-                Self { predicted: None, bound: Some((iterations * bound).exp()) }
+                Self { predicted: None, bound: Some(bound_in_time(root, xi(ranges[1][0]), xi(ranges[0][1]), sweep)) }
             }
             // this holds for averages that are not exact, too, since the discrete problem beyond a cut is solved
             (Method::Optimal { .. }, Some(_)) => Self { predicted: Some(0.0), bound: None },
             (_, Some(_)) => Self::default(),
-            (Method::Classical { sweep, .. }, None) => {
-                let radius = interface_radius(&ranges.iter().map(|r| r.map(xi)).collect::<Vec<_>>());
-                let predicted = match sweep {
-                    Sweep::Parallel => Some(radius * radius),
-                    Sweep::Alternating if count == 2 => Some(radius.powi(4)),
-                    Sweep::Alternating => None,
-                };
-                let widths: Vec<usize> = ranges.iter().map(|[first, last]| last - first).collect();
-                let overlaps: Vec<usize> = ranges.windows(2).map(|r| r[0][1] - r[1][0]).collect();
-                let equal = widths.iter().all(|w| *w == widths[0]) && overlaps.iter().all(|o| *o == overlaps[0]);
-                let bound = (equal && sweep == Sweep::Parallel && count > 1).then(|| {
-                    let r = overlaps[0] as f64 / widths[0] as f64;
-                    let sine = (std::f64::consts::PI / (2.0 * (count as f64 + 1.0))).sin();
-                    1.0 - 4.0 * r * (1.0 - r) * sine * sine
-                });
-                Self { predicted, bound }
-            }
+            (Method::Classical { sweep, .. }, None) => Self::classical(ranges, sweep, xi),
             (Method::Optimal { .. }, None) => Self { predicted: Some(0.0), bound: (count == 2).then_some(0.0) },
             (Method::Optimized { robin }, None) if count == 2 => {
                 let cut = ranges[0][1];
-                let alpha = xi(cut);
                 let m = line.density.at(t, mesh[cut])?[0];
-                let rate = |left: f64, right: f64| {
-                    let factor = |p: f64, m: f64| (p - m).abs() / (p + m);
-                    factor(left, m / (1.0 - alpha)) * factor(right, m / alpha)
-                };
-                match robin {
-                    Robin::Value(p) => {
-                        // p is optimal for both pieces at once only where M/α = M/(1 − α)
-                        let predicted = (p - m / alpha).abs() * (p - m / (1.0 - alpha)).abs()
-                            / ((p + m / alpha) * (p + m / (1.0 - alpha)));
-                        let [low, high] = extremes()?;
-                        let factor = |width: f64| {
-                            let (square, product) = (p * p + (high / width).powi(2), 2.0 * p * low / width);
-                            ((square - product) / (square + product)).sqrt()
-                        };
-                        Self { predicted: Some(predicted), bound: Some(factor(alpha) * factor(1.0 - alpha)) }
-                    }
-                    Robin::Auto => Self { predicted: Some(rate(m / alpha, m / alpha)), bound: None },
-                    Robin::Lagged => Self { predicted: Some(rate(m / (1.0 - alpha), m / alpha)), bound: None },
-                }
+                let extremes = if let Robin::Value(_) = robin { extremes()? } else { [m; 2] };
+                Self::optimized(robin, xi(cut), m, extremes)
             }
             (Method::Optimized { .. }, None) => Self::default(),
         };
@@ -100,6 +67,59 @@ impl Prediction {
         let [predicted, bound] = [predicted, bound].map(|rate| rate.filter(|rate| rate.is_finite()));
         Ok(Self { predicted, bound })
     }
+
+    /// Of the classical method without time.
+    fn classical(ranges: &[[usize; 2]], sweep: Sweep, xi: impl Fn(usize) -> f64) -> Self {
+        let count = ranges.len();
+        let radius = interface_radius(&ranges.iter().map(|r| r.map(&xi)).collect::<Vec<_>>());
+        let predicted = match sweep {
+            Sweep::Parallel => Some(radius * radius),
+            Sweep::Alternating if count == 2 => Some(radius.powi(4)),
+            Sweep::Alternating => None,
+        };
+        let widths: Vec<usize> = ranges.iter().map(|[first, last]| last - first).collect();
+        let overlaps: Vec<usize> = ranges.windows(2).map(|r| r[0][1] - r[1][0]).collect();
+        let equal = widths.iter().all(|w| *w == widths[0]) && overlaps.iter().all(|o| *o == overlaps[0]);
+        let bound = (equal && sweep == Sweep::Parallel && count > 1).then(|| {
+            let r = overlaps[0] as f64 / widths[0] as f64;
+            let sine = (PI / (2.0 * (count as f64 + 1.0))).sin();
+            1.0 - 4.0 * r * (1.0 - r) * sine * sine
+        });
+        Self { predicted, bound }
+    }
+
+    /// Of Robin conditions between two pieces that meet at ξ = α, where M is `m`; without time. The bound takes the
+    /// smallest and the largest M of the line.
+    fn optimized(robin: Robin, alpha: f64, m: f64, [low, high]: [f64; 2]) -> Self {
+        let rate = |left: f64, right: f64| {
+            let factor = |p: f64, m: f64| (p - m).abs() / (p + m);
+            Some(factor(left, m / (1.0 - alpha)) * factor(right, m / alpha))
+        };
+        match robin {
+            Robin::Value(p) => {
+                // p is optimal for both pieces at once only where M/α = M/(1 − α)
+                let predicted =
+                    (p - m / alpha).abs() * (p - m / (1.0 - alpha)).abs() / ((p + m / alpha) * (p + m / (1.0 - alpha)));
+                let factor = |width: f64| {
+                    let (square, product) = (p * p + (high / width).powi(2), 2.0 * p * low / width);
+                    ((square - product) / (square + product)).sqrt()
+                };
+                Self { predicted: Some(predicted), bound: Some(factor(alpha) * factor(1.0 - alpha)) }
+            }
+            Robin::Auto => Self { predicted: rate(m / alpha, m / alpha), bound: None },
+            Robin::Lagged => Self { predicted: rate(m / (1.0 - alpha), m / alpha), bound: None },
+        }
+    }
+}
+
+/// The bound of theorem 7.2 for two pieces that overlap from ξ = α to β, in time; `root` is √(τ/(Δt max M)).
+fn bound_in_time(root: f64, alpha: f64, beta: f64, sweep: Sweep) -> f64 {
+    // as logarithms: for a small time step the sinh themselves overflow
+    let sinh = |s: f64| root * s + (0.5 * -(-2.0 * root * s).exp_m1()).ln();
+    let bound = sinh(alpha) + sinh(1.0 - beta) - sinh(beta) - sinh(1.0 - alpha);
+    // the theorem is for two parallel sweeps; one alternating sweep contracts as much
+    let iterations = if sweep == Sweep::Alternating { 2.0 } else { 1.0 };
+    (iterations * bound).exp()
 }
 
 /// The spectral radius of A: errors of ∫M are linear in ξ within a piece, so that the error at an inner node is a mean
@@ -129,7 +149,7 @@ fn interface_radius(pieces: &[[f64; 2]]) -> f64 {
     let norm = |e: &[[f64; 2]]| e.iter().flatten().map(|e| e * e).sum::<f64>().sqrt();
     let mut rate = 0.0;
     // by powers of A²: A itself exchanges two classes of ends, and its iterates would alternate
-    for _ in 0..20_000 {
+    for _ in 0..MOST_POWERS {
         let after = next(&next(&errors));
         let size = norm(&after);
         let new = size / norm(&errors);
@@ -137,7 +157,7 @@ fn interface_radius(pieces: &[[f64; 2]]) -> f64 {
             return 0.0;
         }
         errors = after.iter().map(|e| e.map(|e| e / size)).collect();
-        if (new - rate).abs() <= 1e-14 {
+        if (new - rate).abs() <= SETTLED {
             rate = new;
             break;
         }

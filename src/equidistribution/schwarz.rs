@@ -1,12 +1,13 @@
 use super::beyond::Beyond;
-use super::chain::{Chain, End, Law, Step};
+use super::chain::{Chain, Equations, Step};
 use super::coarse;
+use super::conditions::{End, Law};
 use crate::error::Failure;
 use crate::parallel;
+use crate::setting::{Scalar, scalar};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::borrow::Cow;
-use std::fmt;
 
 /// What neighbouring subdomains of a line exchange in each iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,35 +94,15 @@ impl JsonSchema for Robin {
 
 impl<'de> Deserialize<'de> for Robin {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Visitor;
-        impl de::Visitor<'_> for Visitor {
-            type Value = Robin;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, \"auto\" or \"lagged\"")
-            }
-
-            fn visit_str<E: de::Error>(self, text: &str) -> Result<Robin, E> {
-                match text {
-                    "auto" => Ok(Robin::Auto),
-                    "lagged" => Ok(Robin::Lagged),
-                    _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
-                }
-            }
-
-            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Robin, E> {
-                Ok(Robin::Value(value as f64))
-            }
-
-            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Robin, E> {
-                Ok(Robin::Value(value as f64))
-            }
-
-            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Robin, E> {
-                Ok(Robin::Value(value))
-            }
-        }
-        deserializer.deserialize_any(Visitor)
+        const EXPECTED: &str = "a number, \"auto\" or \"lagged\"";
+        scalar(deserializer, EXPECTED, |found| match found {
+            Scalar::Text("auto") => Ok(Self::Auto),
+            Scalar::Text("lagged") => Ok(Self::Lagged),
+            Scalar::Text(text) => Err(de::Error::invalid_value(de::Unexpected::Str(text), &EXPECTED)),
+            Scalar::Signed(value) => Ok(Self::Value(value as f64)),
+            Scalar::Unsigned(value) => Ok(Self::Value(value as f64)),
+            Scalar::Real(value) => Ok(Self::Value(value)),
+        })
     }
 }
 
@@ -222,7 +203,7 @@ impl Iteration<'_> {
             (Method::Classical { linearized: true, .. }, [End::Value(left), End::Value(right)]) => {
                 Ok((self.chain.frozen(&pieces[s], [left, right], self.step(s))?, 1))
             }
-            _ => self.chain.solve(&pieces[s], ends, self.step(s)),
+            _ => Equations { chain: &self.chain, ends, step: self.step(s) }.solve(&pieces[s]),
         }
     }
 
@@ -253,7 +234,7 @@ impl Iteration<'_> {
         };
         // in time the flux at the cut is that in the middle of the cell beside it, and what half a cell adds
         let more = self.old.map_or(0.0, |(old, ratio)| Step { old, ratio }.half(self.chain.h, cut, x)[0]);
-        Ok(End::Flux { g: flux + sign * more - self.chain.law(law, x)?, law })
+        Ok(End::Flux { g: flux + sign * more - law.at(&self.chain, x)?[0], law })
     }
 
     /// p that makes the flux answer a displacement of the node as the rest of the line, of length L in ξ, would: M̃/L

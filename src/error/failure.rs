@@ -1,18 +1,19 @@
 //! What the mathematics can do wrong in a step.
 
-use super::words::{given_as, line_rule, noisy, short, tuple};
-use super::{Cause, Error, Remedy};
+use super::words::{counted, given_as, line_rule, node_at, noisy, place, short, tuple};
+use super::{Cause, Remedy};
 use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
-/// A numerical failure inside one step. It never carries a time: the loop that knows it adds it ([`Error::Failed`]).
+/// A numerical failure inside one step. It never carries a time: the loop that knows it adds it
+/// ([`Error::Failed`](super::Error::Failed)).
 #[derive(Debug, Clone, PartialEq, thiserror::Error, EnumIter, EnumMessage, IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Failure {
     /// A mesh cell has a corner whose Jacobian is not positive.
     #[strum(serialize = "mesh-folded")]
     #[error(
-        "the mesh folded: cell ({}, {}) has a corner of scaled Jacobian {jacobian:.1e} at x = {}, y = {}{}",
-        cell[0], cell[1], short(x[0]), short(x[1]), noisy(*noise)
+        "the mesh folded: cell {} has a corner of scaled Jacobian {jacobian:.1e} at {}{}",
+        tuple(cell), place(x), noisy(*noise)
     )]
     Folded {
         /// Indices of the cell along ξ and η.
@@ -25,7 +26,7 @@ pub enum Failure {
         noise: Option<f64>,
     },
     /// A quantity stopped being finite.
-    #[error("{what} is {value} at node ({}, {}), x = {}, y = {}", node[0], node[1], short(x[0]), short(x[1]))]
+    #[error("{what} is {value} at {}", node_at(node, x))]
     NonFinite {
         /// The quantity, in the reader's words.
         what: &'static str,
@@ -37,10 +38,7 @@ pub enum Failure {
         x: [f64; 2],
     },
     /// A formula of the study has no finite value, or what it makes of an unknown has none.
-    #[error(
-        "{what} is {value} at node ({}, {}), x = {}, y = {}{}",
-        node[0], node[1], short(x[0]), short(x[1]), given_as(.given)
-    )]
+    #[error("{what} is {value} at {}{}", node_at(node, x), given_as(.given))]
     Formula {
         /// The formula's dotted key, in the reader's words.
         what: String,
@@ -54,10 +52,7 @@ pub enum Failure {
         given: Vec<(String, f64)>,
     },
     /// A quantity that must be positive is not.
-    #[error(
-        "{what} is {value:.3e}, not positive, at node ({}, {}), x = {}, y = {}",
-        node[0], node[1], short(x[0]), short(x[1])
-    )]
+    #[error("{what} is {value:.3e}, not positive, at {}", node_at(node, x))]
     NotPositive {
         /// The quantity, in the reader's words.
         what: &'static str,
@@ -77,11 +72,7 @@ pub enum Failure {
         axis: usize,
     },
     /// An equation that is made for the uniform mesh met another, or one that moves.
-    #[error(
-        "the stepper rk4 needs the uniform mesh, but along axis {axis} node ({}, {}), x = {}, y = {}, is off by \
-         {off:.1e}",
-        node[0], node[1], short(x[0]), short(x[1])
-    )]
+    #[error("the stepper rk4 needs the uniform mesh, but along axis {axis} {}, is off by {off:.1e}", node_at(node, x))]
     NotUniform {
         /// Distance from the place in the uniform mesh.
         off: f64,
@@ -136,7 +127,7 @@ pub enum Failure {
     /// The density is so steep that the weights of the mesh equation are no probabilities.
     #[error(
         "the density is too steep for random walks: |b|h = {skew:.3} at node {}, x = {}, and must be at most 2",
-        tuple(node.iter()), tuple(x.iter().map(|&x| short(x)))
+        tuple(node), tuple(x.iter().map(|&x| short(x)))
     )]
     SteepDensity {
         /// Largest |b|h of the node.
@@ -229,9 +220,8 @@ pub enum Failure {
     },
     /// The mesh glued from the subdomains of a line is out of order.
     #[error(
-        "the subdomains do not agree on an order: after {iterations} iteration{} node {node} is at x = {x}, and the \
-         one before it at {left}",
-        if *.iterations == 1 { "" } else { "s" }
+        "the subdomains do not agree on an order: after {} node {node} is at x = {x}, and the one before it at {left}",
+        counted(*.iterations)
     )]
     LineFolded {
         /// The node.
@@ -245,8 +235,8 @@ pub enum Failure {
     },
     /// An iteration between subdomains of a line did not converge.
     #[error(
-        "not converged: the {measure} is {last:.2e} after {iterations} iteration{}, {tolerance:.0e} asked for{advice}",
-        if *.iterations == 1 { "" } else { "s" }
+        "not converged: the {measure} is {last:.2e} after {}, {tolerance:.0e} asked for{advice}",
+        counted(*.iterations)
     )]
     NotConverged {
         /// What is measured.
@@ -264,8 +254,8 @@ pub enum Failure {
     },
     /// The sides of a mesh touch or cross each other, although no cell is folded.
     #[error(
-        "the mesh touches itself: its sides meet at x = {}, y = {}, in cells ({}, {}) and ({}, {})",
-        short(x[0]), short(x[1]), cells[0][0], cells[0][1], cells[1][0], cells[1][1]
+        "the mesh touches itself: its sides meet at {}, in cells {} and {}",
+        place(x), tuple(cells[0]), tuple(cells[1])
     )]
     SelfTouching {
         /// The cells at both sides.
@@ -274,10 +264,7 @@ pub enum Failure {
         x: [f64; 2],
     },
     /// The nodes around a node determine no Laplacian.
-    #[error(
-        "the nodes around node ({}, {}), x = {}, y = {}, give no Laplacian: condition number {condition:.1e}",
-        node[0], node[1], short(x[0]), short(x[1])
-    )]
+    #[error("the nodes around {}, give no Laplacian: condition number {condition:.1e}", node_at(node, x))]
     DegenerateStencil {
         /// Indices of the node along ξ and η.
         node: [usize; 2],
@@ -312,10 +299,7 @@ pub enum Failure {
         of: f64,
     },
     /// The front turns over, or is too steep for the distance of the columns.
-    #[error(
-        "the front stops being a graph over x at x = {}, y = {}: its slope is {slope:.1e}",
-        short(x[0]), short(x[1])
-    )]
+    #[error("the front stops being a graph over x at {}: its slope is {slope:.1e}", place(x))]
     NotAGraph {
         /// Where.
         x: [f64; 2],
@@ -332,9 +316,9 @@ pub enum Failure {
     },
     /// The warm phase lies on the wrong side of the front: the problem is ill-posed.
     #[error(
-        "the warm phase is on the wrong side of the front at x = {}, y = {}: D₀ ∂u₀/∂y + D₁ ∂u₁/∂y = {slope:.3e} is \
-         above 0, and the problem ill-posed",
-        short(x[0]), short(x[1])
+        "the warm phase is on the wrong side of the front at {}: D₀ ∂u₀/∂y + D₁ ∂u₁/∂y = {slope:.3e} is above 0, and \
+         the problem ill-posed",
+        place(x)
     )]
     WrongSide {
         /// Where.
@@ -344,9 +328,10 @@ pub enum Failure {
     },
     /// A mesh generator met a mesh whose sides are not those of the box around it: it would pull them straight.
     #[error(
-        "the mesh does not fill its box: node ({}, {}) of a side across axis {axis}, x = {}, y = {}, is off that side \
-         of the box by {off:.1e}",
-        node[0], node[1], short(x[0]), short(x[1])
+        "the mesh does not fill its box: node {} of a side across axis {axis}, {}, is off that side of the box by \
+         {off:.1e}",
+        tuple(node),
+        place(x)
     )]
     NotABox {
         /// Distance from the side of the box.
@@ -381,41 +366,9 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// False for what no step is short enough, and for formulas without a value, which a shorter step might only step
-    /// over.
-    pub(crate) fn is_curable(&self) -> bool {
-        !matches!(
-            self,
-            Self::Formula { .. }
-                | Self::NotPeriodic { .. }
-                | Self::NotUniform { .. }
-                | Self::ManySubsteps { .. }
-                | Self::Subdomains { .. }
-                | Self::NotABox { .. }
-                | Self::OutOfRange { .. }
-                | Self::WrongLength { .. }
-        )
-    }
-
-    /// What refuses a setting, where a step cannot return it as an [`Error`].
-    pub(crate) fn refusing(error: Error) -> Self {
-        match error {
-            Error::Failed { failure, .. } => failure,
-            Error::Invalid { key, value, rule } => Self::OutOfRange { what: format!("`{key}`"), value, rule },
-            other => Self::OutOfRange { what: "a setting".into(), value: "not usable".into(), rule: other.to_string() },
-        }
-    }
-
-    /// Refuses a number that is not finite and above 0.
-    pub(crate) fn unless_positive(what: &str, value: f64) -> Result<(), Self> {
-        match value.is_finite() && value > 0.0 {
-            true => Ok(()),
-            false => Err(Self::OutOfRange {
-                what: what.into(),
-                value: value.to_string(),
-                rule: "must be a finite number above 0".into(),
-            }),
-        }
+    /// What refuses a setting or an argument of a step.
+    pub(crate) fn out_of_range(what: &str, value: impl std::fmt::Display, rule: &str) -> Self {
+        Self::OutOfRange { what: what.into(), value: value.to_string(), rule: rule.into() }
     }
 
     /// Short name of the variant, for `summary.json`.

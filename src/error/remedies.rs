@@ -42,6 +42,22 @@ impl Cause {
 }
 
 impl Failure {
+    /// Whether a shorter step may cure it: not what is wrong with a setting or an array, and not a formula without a
+    /// value, over which a shorter step might only step.
+    pub(crate) fn is_curable(&self) -> bool {
+        !matches!(
+            self,
+            Self::Formula { .. }
+                | Self::NotPeriodic { .. }
+                | Self::NotUniform { .. }
+                | Self::ManySubsteps { .. }
+                | Self::Subdomains { .. }
+                | Self::NotABox { .. }
+                | Self::OutOfRange { .. }
+                | Self::WrongLength { .. }
+        )
+    }
+
     /// What may cure it, by meaning: the first is the best.
     pub fn remedies(&self) -> Vec<Remedy> {
         match self {

@@ -1,8 +1,23 @@
 //! Parts of messages.
 
 /// Items in parentheses.
-pub(super) fn tuple(items: impl Iterator<Item = impl std::fmt::Display>) -> String {
-    format!("({})", items.map(|item| item.to_string()).collect::<Vec<_>>().join(", "))
+pub(super) fn tuple(items: impl IntoIterator<Item = impl std::fmt::Display>) -> String {
+    format!("({})", items.into_iter().map(|item| item.to_string()).collect::<Vec<_>>().join(", "))
+}
+
+/// A place in the plane.
+pub(super) fn place(x: &[f64; 2]) -> String {
+    format!("x = {}, y = {}", short(x[0]), short(x[1]))
+}
+
+/// A node with its place.
+pub(super) fn node_at(node: &[usize; 2], x: &[f64; 2]) -> String {
+    format!("node {}, {}", tuple(node), place(x))
+}
+
+/// A number of iterations.
+pub(super) fn counted(iterations: usize) -> String {
+    if iterations == 1 { "1 iteration".into() } else { format!("{iterations} iterations") }
 }
 
 /// What noise may have to do with a mesh that folded.

@@ -254,29 +254,10 @@ impl Tree {
             Self::Variable(v) => [at[*v], if *v == 0 { 1.0 } else { 0.0 }, 0.0],
             Self::Unary(f, a) => {
                 let a = a.jet(at, hard);
-                let x = a[0];
-                let tan = x.tan();
-                let tanh = x.tanh();
-                let bell = std::f64::consts::FRAC_2_SQRT_PI * (-x * x).exp();
-                let outer = match *f {
-                    "-" => [-x, -1.0, 0.0],
-                    "sin" => [x.sin(), x.cos(), -x.sin()],
-                    "cos" => [x.cos(), -x.sin(), -x.cos()],
-                    "tan" => [tan, 1.0 / x.cos().powi(2), 2.0 * tan / x.cos().powi(2)],
-                    "sinh" => [x.sinh(), x.cosh(), x.sinh()],
-                    "cosh" => [x.cosh(), x.sinh(), x.cosh()],
-                    "tanh" => [tanh, 1.0 / x.cosh().powi(2), -2.0 * tanh / x.cosh().powi(2)],
-                    "exp" => [x.exp(); 3],
-                    "log" => [x.ln(), 1.0 / x, -1.0 / (x * x)],
-                    "sqrt" => [x.sqrt(), 0.5 / x.sqrt(), -0.25 / x.powf(1.5)],
-                    "abs" => [x.abs(), x.signum(), 0.0],
-                    "erf" => [libm::erf(x), bell, -2.0 * x * bell],
-                    _ => unreachable!(),
-                };
                 if ["abs", "sqrt", "log"].contains(f) {
-                    *hard = hard.max(1.0 / x.abs());
+                    *hard = hard.max(1.0 / a[0].abs());
                 }
-                composed(outer, a)
+                composed(unary(f, a[0]), a)
             }
             Self::Power(a, n) => {
                 let a = a.jet(at, hard);
@@ -284,33 +265,7 @@ impl Tree {
                 *hard = hard.max(if *n < 0 { 1.0 / a[0].abs() } else { 0.0 });
                 (0..n.abs()).fold([1.0, 0.0, 0.0], |p, _| product(p, factor))
             }
-            Self::Binary(f, a, b) => {
-                let (a, b) = (a.jet(at, hard), b.jet(at, hard));
-                match *f {
-                    "+" => std::array::from_fn(|k| a[k] + b[k]),
-                    "-" => std::array::from_fn(|k| a[k] - b[k]),
-                    "*" => product(a, b),
-                    "/" => {
-                        *hard = hard.max(1.0 / b[0].abs());
-                        product(a, inverse(b))
-                    }
-                    "^" => {
-                        // exp(g log f), for a positive base only
-                        *hard = hard.max(1.0 / a[0].abs());
-                        if a[0] <= 0.0 {
-                            *hard = f64::INFINITY;
-                        }
-                        let log = composed([a[0].ln(), 1.0 / a[0], -1.0 / (a[0] * a[0])], a);
-                        let exponent = product(b, log);
-                        composed([exponent[0].exp(); 3], exponent)
-                    }
-                    "min" | "max" => {
-                        *hard = hard.max(1.0 / (a[0] - b[0]).abs());
-                        if (a[0] < b[0]) == (*f == "min") { a } else { b }
-                    }
-                    _ => unreachable!(),
-                }
-            }
+            Self::Binary(f, a, b) => binary(f, a.jet(at, hard), b.jet(at, hard), hard),
             Self::If(c, parts) => {
                 let [l, r, a, b] = parts.each_ref().map(|part| part.jet(at, hard));
                 *hard = hard.max(1.0 / (l[0] - r[0]).abs());
@@ -320,6 +275,54 @@ impl Tree {
         let size = result.iter().fold(0.0, |m: f64, v| if v.is_finite() { m.max(v.abs()) } else { f64::INFINITY });
         *hard = hard.max(size);
         result
+    }
+}
+
+/// g, g′, g″ of a function at x.
+fn unary(name: &str, x: f64) -> Jet {
+    let (tan, tanh) = (x.tan(), x.tanh());
+    let bell = std::f64::consts::FRAC_2_SQRT_PI * (-x * x).exp();
+    match name {
+        "-" => [-x, -1.0, 0.0],
+        "sin" => [x.sin(), x.cos(), -x.sin()],
+        "cos" => [x.cos(), -x.sin(), -x.cos()],
+        "tan" => [tan, 1.0 / x.cos().powi(2), 2.0 * tan / x.cos().powi(2)],
+        "sinh" => [x.sinh(), x.cosh(), x.sinh()],
+        "cosh" => [x.cosh(), x.sinh(), x.cosh()],
+        "tanh" => [tanh, 1.0 / x.cosh().powi(2), -2.0 * tanh / x.cosh().powi(2)],
+        "exp" => [x.exp(); 3],
+        "log" => [x.ln(), 1.0 / x, -1.0 / (x * x)],
+        "sqrt" => [x.sqrt(), 0.5 / x.sqrt(), -0.25 / x.powf(1.5)],
+        "abs" => [x.abs(), x.signum(), 0.0],
+        "erf" => [libm::erf(x), bell, -2.0 * x * bell],
+        _ => unreachable!(),
+    }
+}
+
+fn binary(name: &str, a: Jet, b: Jet, hard: &mut f64) -> Jet {
+    match name {
+        "+" => std::array::from_fn(|k| a[k] + b[k]),
+        "-" => std::array::from_fn(|k| a[k] - b[k]),
+        "*" => product(a, b),
+        "/" => {
+            *hard = hard.max(1.0 / b[0].abs());
+            product(a, inverse(b))
+        }
+        "^" => {
+            // exp(g log f), for a positive base only
+            *hard = hard.max(1.0 / a[0].abs());
+            if a[0] <= 0.0 {
+                *hard = f64::INFINITY;
+            }
+            let log = composed([a[0].ln(), 1.0 / a[0], -1.0 / (a[0] * a[0])], a);
+            let exponent = product(b, log);
+            composed([exponent[0].exp(); 3], exponent)
+        }
+        "min" | "max" => {
+            *hard = hard.max(1.0 / (a[0] - b[0]).abs());
+            if (a[0] < b[0]) == (name == "min") { a } else { b }
+        }
+        _ => unreachable!(),
     }
 }
 

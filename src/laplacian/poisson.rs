@@ -2,7 +2,7 @@
 
 use super::{NEAR_DEGENERATE, Stencils};
 use crate::error::Failure;
-use crate::geometry::{Lattice, Mesh};
+use crate::geometry::{Lattice, Mesh, check_length};
 use crate::numerics::lanes::{Lanes, Qr};
 use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport, SparseSystem};
@@ -52,12 +52,7 @@ impl Poisson<'_> {
     /// singular, as it is with Neumann sides alone.
     pub fn solve(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<Vec<f64>, Failure> {
         let lattice = mesh.lattice();
-        let expected = lattice.len();
-        for (what, values) in [("the source", self.source), ("the side data", self.side)] {
-            if values.len() != expected {
-                return Err(Failure::WrongLength { what, found: values.len(), expected });
-            }
-        }
+        let expected = self.check(lattice)?;
         let known = |index: usize| lattice.on_side(index) && self.neumann_side(lattice, index).is_none();
         let mut place = vec![usize::MAX; expected];
         let unknown: Vec<usize> = (0..expected).filter(|&index| !known(index)).collect();
@@ -91,6 +86,13 @@ impl Poisson<'_> {
         Ok(u)
     }
 
+    /// Refuses arrays that do not fit the lattice; returns its number of nodes.
+    fn check(&self, lattice: &Lattice<2>) -> Result<usize, Failure> {
+        check_length(lattice, "the source", self.source.len())?;
+        check_length(lattice, "the side data", self.side.len())?;
+        Ok(lattice.len())
+    }
+
     /// The solution by an iterative solver, for nine-point stencils on a mesh with given values on all sides. It takes
     /// less memory than the direct solver and is faster on fine meshes. The work counts iterations, and the systems
     /// that needed the direct solver after all.
@@ -100,12 +102,7 @@ impl Poisson<'_> {
     /// cannot solve.
     pub fn iterate(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<(Vec<f64>, Work), Failure> {
         let lattice = mesh.lattice();
-        let expected = lattice.len();
-        for (what, values) in [("the source", self.source), ("the side data", self.side)] {
-            if values.len() != expected {
-                return Err(Failure::WrongLength { what, found: values.len(), expected });
-            }
-        }
+        let expected = self.check(lattice)?;
         let patch = *stencils.patch();
         let nine = match stencils.nine_points() {
             Some(nine) if self.neumann == [[false; 2]; 2] && patch.padded_len() == expected => nine,

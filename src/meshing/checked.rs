@@ -17,17 +17,15 @@ pub(super) fn check_given<const D: usize>(
     rho: &[f64],
     dt: f64,
 ) -> Result<(), Failure> {
-    Failure::unless_positive("the time step", dt)?;
+    if !(dt.is_finite() && dt > 0.0) {
+        return Err(Failure::out_of_range("the time step", dt, "must be a finite number above 0"));
+    }
     equation.check().map_err(Failure::refusing)?;
     if let Relaxation::Steps(Steps { prediction, .. }) = equation.relaxation
         && prediction != 0.0
     {
-        let rule = "a generator by itself keeps no velocity of the nodes; set it to 0, or step with a Mover".into();
-        return Err(Failure::OutOfRange {
-            what: "`relaxation.prediction`".into(),
-            value: prediction.to_string(),
-            rule,
-        });
+        let rule = "a generator by itself keeps no velocity of the nodes; set it to 0, or step with a Mover";
+        return Err(Failure::out_of_range("`relaxation.prediction`", prediction, rule));
     }
     check_length(mesh.lattice(), "the density", rho.len())?;
     check_positive(mesh, "the mesh density", rho)

@@ -1,6 +1,6 @@
 use super::Relaxation;
 use crate::error::{Failure, Result};
-use crate::geometry::{Lattice, Mesh, Patch};
+use crate::geometry::{Lattice, Mesh, Patch, check_length};
 use crate::numerics::difference::Gradient;
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Pcg};
@@ -85,9 +85,7 @@ impl Mmpde {
         rho: &[f64],
         dt: f64,
     ) -> Result<MeshOperator<D>, Failure> {
-        if rho.len() != lattice.len() {
-            return Err(Failure::WrongLength { what: "the density", found: rho.len(), expected: lattice.len() });
-        }
+        check_length(lattice, "the density", rho.len())?;
         let Form::Gradient(gradient) = self.form else {
             return Ok(self.on_cells(lattice, &cell_means(lattice, rho), dt));
         };

@@ -94,10 +94,8 @@ impl RunDirectory {
     /// As [`RunDirectory::claim`].
     pub fn open(path: &Path) -> Result<Self> {
         Self::check(path)?;
-        let unwritable =
-            |path: &Path, error: std::io::Error| Error::Unwritable { path: path.into(), reason: error.to_string() };
-        std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))?;
-        let lock = File::create(path.join(LOCK)).map_err(|error| unwritable(path, error))?;
+        std::fs::create_dir_all(path).map_err(Error::unwritable(path))?;
+        let lock = File::create(path.join(LOCK)).map_err(Error::unwritable(path))?;
         lock.try_lock().map_err(|_| Error::Busy { path: path.into() })?;
         Ok(Self { path: path.into(), lock })
     }
@@ -228,9 +226,7 @@ fn part(path: &Path) -> PathBuf {
 /// Removes a file, if it is there.
 pub(crate) fn remove(path: &Path) -> Result<()> {
     match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(Error::Unwritable { path: path.into(), reason: error.to_string() })
-        }
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(Error::unwritable(path)(error)),
         _ => Ok(()),
     }
 }
@@ -246,7 +242,7 @@ pub(crate) fn write_file(path: &Path, contents: &[u8]) -> Result<()> {
     };
     write().map_err(|error| {
         let _ = std::fs::remove_file(&part);
-        Error::Unwritable { path: path.into(), reason: error.to_string() }
+        Error::unwritable(path)(error)
     })
 }
 
@@ -255,7 +251,7 @@ pub(crate) fn sync_directory(path: &Path) -> Result<()> {
     // elsewhere directories cannot be opened, and renaming does it
     if cfg!(unix) {
         let synced = File::open(path).and_then(|directory| directory.sync_all());
-        synced.map_err(|error| Error::Unwritable { path: path.into(), reason: error.to_string() })?;
+        synced.map_err(Error::unwritable(path))?;
     }
     Ok(())
 }

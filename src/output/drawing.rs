@@ -1,9 +1,7 @@
 //! A scene as a drawing: cells in the colours of its first values, the lines of the mesh, a curve, axes, a colour bar.
 
-use super::picture::{
-    BAR, BOTTOM, Canvas, LEFT, LONGER, Picture, RIGHT, SHORTER_AT_LEAST, TOP, add_point, axes, colour, colour_bar,
-    heading, point,
-};
+use super::picture::{Canvas, Picture, add_point, point};
+use super::sheet::{LEFT, LONGER, SHORTER_AT_LEAST, Sheet, TOP, colour};
 use crate::simulation::{Scene, Values};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,16 +9,16 @@ use std::fmt::Write as _;
 /// Opacities with which mesh lines may be drawn: a line beside wide cells is drawn more strongly than one between
 /// narrow cells, so that crowded lines do not hide the colours.
 const STRENGTHS: [f64; 8] = [0.04, 0.08, 0.13, 0.19, 0.26, 0.35, 0.46, 0.6];
-/// Steps from white to black lines.
+/// Number of tones of mesh lines, white and black included.
 const TONES: usize = 5;
-/// Share of the colour map up to which lines are white.
+/// Mesh lines are white over colours up to this share of the colour map, its dark end.
 const WHITE_UP_TO: f64 = 0.35;
-/// Share of the colour map from which lines are black.
+/// Mesh lines are black over colours from this share of the colour map on, its bright end.
 const BLACK_FROM: f64 = 0.65;
-/// From the middle of a white line beside a black one to that of both, in units of the drawing: half a pixel of the
-/// PNG.
+/// Between these shares a white and a black line run side by side, each this far from where one line would be, in units
+/// of the drawing: half a pixel of the PNG.
 const BESIDE: f64 = 0.25;
-/// Opacity that a line gains for each unit by which the cell beside it is wider than one.
+/// Opacity that a mesh line gains for each unit of the drawing by which the cell beside it is wider than one unit.
 const FADES: f64 = 0.08;
 /// Cells drawn along an axis; a finer mesh shows every second, third … line.
 const MAX_CELLS: usize = 240;
@@ -41,16 +39,9 @@ pub(crate) fn svg(title: &str, scene: &Scene, range: Option<[f64; 2]>) -> String
         _ => ("", &nothing[..]),
     };
     let drawing = Drawing::of(scene, u, range);
-    let [width, height] = drawing.size;
-    let (w, h) = (LEFT + width + RIGHT, TOP + height + BOTTOM);
-    let mut s = String::new();
-    let _ = writeln!(
-        s,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.0} {h:.0}\" width=\"{w:.0}\" height=\"{h:.0}\" \
-         font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"13\" fill=\"#222\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
-    );
-    heading(&mut s, title, width);
+    let sheet = drawing.sheet;
+    let [width, height] = sheet.size;
+    let mut s = sheet.begin(title);
     if scene.periodic.contains(&true) {
         let _ = writeln!(
             s,
@@ -64,11 +55,10 @@ pub(crate) fn svg(title: &str, scene: &Scene, range: Option<[f64; 2]>) -> String
     drawing.mesh_lines(&mut s);
     drawing.curve(&mut s);
     s.push_str("</g>\n");
-    axes(&mut s, scene.lower, scene.extent, drawing.size, &drawing.names());
-    let [low, high] = drawing.range;
-    colour_bar(&mut s, unknown, low, high, LEFT + width + BAR, height);
+    sheet.axes(&mut s, &drawing.names());
+    sheet.colour_bar(&mut s, unknown, drawing.range);
     if !scene.curve.is_empty() {
-        let (x, y) = (LEFT + width + BAR, TOP + height + 20.0);
+        let (x, y) = (sheet.bar(), TOP + height + 20.0);
         let _ = writeln!(
             s,
             "<path d=\"M{x:.1} {:.1}h16\" stroke=\"{CURVE}\" stroke-width=\"2.5\"/>\
@@ -86,8 +76,8 @@ struct Drawing<'a> {
     scene: &'a Scene,
     u: &'a [f64],
     range: [f64; 2],
-    /// Width and height of the box around the domain.
-    size: [f64; 2],
+    /// The box around the domain.
+    sheet: Sheet,
     /// Lines of the mesh that are drawn, along each axis.
     lines: [Vec<usize>; 2],
     /// By how much the mesh is moved each time that it is drawn: a periodic mesh leaves the box on one side and enters
@@ -110,13 +100,8 @@ impl<'a> Drawing<'a> {
         let reach = scene.periodic.map(|periodic| if periodic { vec![-1.0, 0.0, 1.0] } else { vec![0.0] });
         let shifts = reach[0].iter().flat_map(|&i| reach[1].iter().map(move |&j| [i * wx, j * wy])).collect();
         let size = [wx, wy].map(|w| (w * scale).max(SHORTER_AT_LEAST));
-        Self { scene, u, range: range.unwrap_or_else(ends), size, lines, shifts }
-    }
-
-    /// Where a point of the plane is on the paper.
-    fn to(&self, p: [f64; 2]) -> [f64; 2] {
-        let (Scene { lower, extent, .. }, [width, height]) = (self.scene, self.size);
-        [LEFT + (p[0] - lower[0]) / extent[0] * width, TOP + height - (p[1] - lower[1]) / extent[1] * height]
+        let sheet = Sheet { lower: scene.lower, extent: scene.extent, size };
+        Self { scene, u, range: range.unwrap_or_else(ends), sheet, lines, shifts }
     }
 
     fn at(&self, i: usize, j: usize) -> usize {
@@ -127,7 +112,7 @@ impl<'a> Drawing<'a> {
     fn names(&self) -> Vec<String> {
         let extent = self.scene.extent;
         let scale = LONGER / extent[0].max(extent[1]);
-        let stretched = [0, 1].map(|d| self.size[d] / extent[d] / scale);
+        let stretched = [0, 1].map(|d| self.sheet.size[d] / extent[d] / scale);
         let names = ["x", "y"].into_iter().zip(stretched).map(|(name, factor)| match factor > 1.0 + 1e-9 {
             true => format!("{name}, stretched {} times", factor.round()),
             false => name.into(),
@@ -149,7 +134,7 @@ impl<'a> Drawing<'a> {
         for (n, k) in nodes.enumerate() {
             let x = self.scene.points[k];
             path.push(if n == 0 { 'M' } else { 'L' });
-            add_point(path, self.to([x[0] + shift[0], x[1] + shift[1]]));
+            add_point(path, self.sheet.place([x[0] + shift[0], x[1] + shift[1]]));
         }
     }
 
@@ -204,7 +189,7 @@ impl<'a> Drawing<'a> {
     /// Adds one line through these nodes; `beside` are those of the line beside it.
     fn mesh_line(&self, nodes: &[usize], beside: &[usize], paths: &mut Paths) {
         let look = |e: &[usize], beside: usize| {
-            let [a, b, c] = [e[0], e[1], beside].map(|k| self.to(self.scene.points[k]));
+            let [a, b, c] = [e[0], e[1], beside].map(|k| self.sheet.place(self.scene.points[k]));
             let [e, f] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
             let wide = (e[0] * f[1] - e[1] * f[0]).abs() / e[0].hypot(e[1]);
             let strength = STRENGTHS.iter().rposition(|strength| FADES * (wide - 1.0) >= *strength)?;
@@ -231,7 +216,7 @@ impl<'a> Drawing<'a> {
         if self.scene.curve.is_empty() {
             return;
         }
-        let points: Vec<String> = self.scene.curve.iter().map(|p| point(self.to(*p))).collect();
+        let points: Vec<String> = self.scene.curve.iter().map(|p| point(self.sheet.place(*p))).collect();
         let points = points.join(" ");
         for (colour, width) in [("white", 4.5), (CURVE, 2.5)] {
             let _ = writeln!(

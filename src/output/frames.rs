@@ -183,8 +183,7 @@ impl Frames {
         }
         if self.grid.is_none() {
             let folder = self.directory.join(self.names[0]);
-            std::fs::create_dir_all(&folder)
-                .map_err(|error| Error::Unwritable { path: folder, reason: error.to_string() })?;
+            std::fs::create_dir_all(&folder).map_err(Error::unwritable(&folder))?;
             self.grid = Some(Arc::new(vtu::Grid::new(scene.cells)));
         }
         self.written.push((scene.t, scene.step));

@@ -2,6 +2,7 @@
 //! them.
 
 mod arrays;
+mod chart;
 mod checkpoints;
 mod curves;
 mod directory;
@@ -11,7 +12,9 @@ mod frames;
 mod history;
 mod picture;
 mod rows;
+mod sheet;
 mod summary;
+mod ticks;
 mod vtu;
 
 pub use arrays::final_arrays;
@@ -26,7 +29,8 @@ pub(crate) use figure::COLOURS;
 pub use figure::{Curve, Figure, Scale};
 pub use frames::{Frames, FramesAt};
 pub use history::History;
+pub(crate) use picture::Canvas;
 pub use picture::Picture;
-pub(crate) use picture::{Canvas, moment};
 pub(crate) use rows::Rows;
 pub use summary::{Ended, Failed, Figures, Parallel, Spent, Summary};
+pub(crate) use ticks::moment;

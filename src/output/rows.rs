@@ -24,10 +24,8 @@ impl Rows {
     /// # Errors
     /// [`Error::Unwritable`].
     pub fn create(path: &Path) -> Result<Self> {
-        match File::create(path) {
-            Ok(file) => Ok(Self::of(path, file, 0)),
-            Err(error) => Err(Error::Unwritable { path: path.into(), reason: error.to_string() }),
-        }
+        let file = File::create(path).map_err(Error::unwritable(path))?;
+        Ok(Self::of(path, file, 0))
     }
 
     fn of(path: &Path, file: File, length: u64) -> Self {
@@ -66,7 +64,7 @@ impl Rows {
     /// # Errors
     /// [`Error::Unwritable`] for what is no row.
     pub fn add(&mut self, row: impl Serialize) -> Result<()> {
-        self.waiting.serialize(row).map_err(|error| self.unwritable(error.to_string()))
+        self.waiting.serialize(row).map_err(Error::unwritable(&self.path))
     }
 
     /// Writes the rows that wait. Those for which there is no space go on waiting.
@@ -75,7 +73,7 @@ impl Rows {
     /// [`Error::Unwritable`].
     pub fn flush(&mut self) -> Result<()> {
         let rows = std::mem::replace(&mut self.waiting, table(false)).into_inner();
-        self.unwritten.extend(rows.map_err(|error| self.unwritable(error.to_string()))?);
+        self.unwritten.extend(rows.map_err(Error::unwritable(&self.path))?);
         let written = self.file.write_all(&self.unwritten);
         let whole = match &written {
             Ok(()) => self.unwritten.len(),
@@ -91,7 +89,7 @@ impl Rows {
         written.map_err(|error| {
             let end = SeekFrom::Start(self.length);
             let _ = self.file.set_len(self.length).and_then(|()| self.file.seek(end));
-            self.unwritable(error.to_string())
+            Error::unwritable(&self.path)(error)
         })
     }
 
@@ -101,12 +99,8 @@ impl Rows {
     /// [`Error::Unwritable`].
     pub fn sync(&mut self) -> Result<u64> {
         self.flush()?;
-        self.file.sync_data().map_err(|error| self.unwritable(error.to_string()))?;
+        self.file.sync_data().map_err(Error::unwritable(&self.path))?;
         Ok(self.length)
-    }
-
-    fn unwritable(&self, reason: String) -> Error {
-        Error::Unwritable { path: self.path.clone(), reason }
     }
 }
 

@@ -49,7 +49,7 @@ pub fn write(run: &mut RunFiles) -> Result<()> {
     let Some(draw) = drawing(run, &frames) else { return Ok(()) };
     let each = (WHOLE / frames.len()).clamp(ONE[0], ONE[1]) as u16;
 
-    let unwritable = |error: gif::EncodingError| Error::Unwritable { path: path.clone(), reason: error.to_string() };
+    let unwritable = Error::unwritable::<gif::EncodingError>(&path);
     let mut palette = if first.cells[1] == 0 { Palette::of_curves() } else { Palette::of_maps() };
     let mut encoder: Option<Encoder<Vec<u8>>> = None;
     let mut canvas = Canvas::default();

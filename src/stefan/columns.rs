@@ -75,6 +75,12 @@ impl Columns {
         self.rows[phase]
     }
 
+    /// The failure of a quantity that is not finite at the k-th node of a phase, whose height is y.
+    pub(super) fn not_finite(&self, what: &'static str, value: f64, phase: usize, k: usize, y: f64) -> Failure {
+        let [i, j] = [k / (self.rows[phase] + 1), k % (self.rows[phase] + 1)];
+        Failure::NonFinite { what, value, node: [i, j], x: [self.x[i], y] }
+    }
+
     /// Height of the wall of a phase, the bottom for the lower one.
     pub fn wall(&self, phase: usize) -> &[f64] {
         &self.walls[phase]

@@ -1,7 +1,7 @@
 //! One implicit step of the heat equation in one phase.
 
 use super::columns::Columns;
-use crate::error::{Failure, Result};
+use crate::error::Result;
 use crate::geometry::Patch;
 use crate::laplacian::{Laplacian, unchecked};
 use crate::numerics::larger;
@@ -37,78 +37,94 @@ pub(super) fn end_slope(y: [f64; 3], u: [f64; 3]) -> f64 {
     (u[1] - u[0]) * b / (a * (b - a)) - (u[2] - u[0]) * a / (b * (b - a))
 }
 
+/// The largest residual of the linear system, as a share of its largest entry times the largest temperature: the
+/// round-off of a sum of nine terms.
+const ROUNDING: f64 = 2e-14;
+
 impl HeatStep<'_> {
     /// (u − uⁿ)/Δt − w ∂u/∂y = D Δu for u on the new mesh.
     pub fn solve(&self, solver: &mut Robust<1>, laplacian: Laplacian) -> Result<Vec<f64>> {
         let mesh = self.columns.mesh(self.phase, self.y, self.mirrored)?;
         let stencils = unchecked(&mesh, laplacian)?;
         let Some(nine) = stencils.nine_points() else { return Ok(self.sides.to_vec()) };
-        let nodes = self.columns.rows(self.phase) + 1;
-        let first = usize::from(!self.mirrored);
         let patch = Patch { wraps: [false; 2], ..*stencils.patch() };
-        let [count, inside] = patch.size;
-        let mut matrix = LatticeMatrix::<2, 9>::zero(patch);
-        let mut b = vec![[0.0]; patch.len()];
+        let (matrix, b) = self.system(patch, nine);
         let mut x = vec![[0.0]; patch.padded_len()];
-        let mut largest = 1.0_f64;
-        for i in 0..count {
-            for j in 0..inside {
-                let (k, own) = (i * inside + j, (i + first) * nodes + j + 1);
-                let mut row = nine[k].map(|a| -self.dt * self.diffusivity * a);
-                row[0] += 1.0;
-                if let Some(w) = self.velocity {
-                    let weights = slope([self.y[own - 1], self.y[own], self.y[own + 1]]);
-                    // the node and its neighbours along the column
-                    for (place, weight) in [3, 0, 4].into_iter().zip(weights) {
-                        row[place] -= self.dt * w[own] * weight;
-                    }
-                }
-                if self.mirrored {
-                    // (−,·) is the image of (+,·) beyond the left side, and the other way round
-                    let pairs = [(1, 2), (5, 7), (6, 8)];
-                    let fold = |(from, to): (usize, usize), row: &mut [f64; 9]| {
-                        row[to] += row[from];
-                        row[from] = 0.0;
-                    };
-                    if i == 0 {
-                        pairs.into_iter().for_each(|pair| fold(pair, &mut row));
-                    }
-                    if i + 1 == count {
-                        pairs.into_iter().for_each(|(a, b)| fold((b, a), &mut row));
-                    }
-                }
-                // Relative to the row itself: rows near a finely graded front are larger by orders of magnitude, and a
-                // common tolerance would be set by the rounding of these.
-                let own_size = row[0].abs().max(1.0);
-                let row = row.map(|a| a / own_size);
-                largest = row.iter().fold(largest, |m, a| m.max(a.abs()));
-                matrix.rows[k] = row;
-                b[k] = [self.u[own] / own_size];
-            }
-        }
-        // columns of the patch with the ring around them
-        let width = inside + 2;
+        let (nodes, width) = (self.nodes(), patch.size[1] + 2);
         for (p, x) in x.chunks_exact_mut(width).enumerate() {
-            let Some(i) = (p + first).checked_sub(1).filter(|&i| i < self.columns.x().len()) else { continue };
+            let Some(i) = self.column(p) else { continue };
             x.iter_mut().zip(&self.sides[i * nodes..]).for_each(|(x, side)| x[0] = *side);
         }
+        let largest = matrix.rows.as_flattened().iter().fold(1.0_f64, |m, a| m.max(a.abs()));
         let size = self.sides.iter().chain(self.u).copied().fold(0.0, larger);
-        // the round-off of a sum of nine terms
-        solver.solve(&matrix, &b, &mut x, [2e-14 * largest * size.max(f64::MIN_POSITIVE)])?;
+        solver.solve(&matrix, &b, &mut x, [ROUNDING * largest * size.max(f64::MIN_POSITIVE)])?;
         let mut u = self.sides.to_vec();
-        for (p, x) in x.chunks_exact(width).enumerate().skip(1).take(count) {
-            let i = p + first - 1;
-            for j in 1..=inside {
-                u[i * nodes + j] = x[j][0];
-            }
+        for (p, x) in x.chunks_exact(width).enumerate().skip(1).take(patch.size[0]) {
+            let Some(i) = self.column(p) else { continue };
+            u[i * nodes..][1..width - 1].iter_mut().zip(&x[1..]).for_each(|(u, x)| *u = x[0]);
         }
         match u.iter().position(|u| !u.is_finite()) {
             None => Ok(u),
-            Some(k) => {
-                let (i, j) = (k / nodes, k % nodes);
-                let x = [self.columns.x()[i], self.y[k]];
-                Err(Failure::NonFinite { what: "the temperature", value: u[k], node: [i, j], x }.into())
+            Some(k) => Err(self.columns.not_finite("the temperature", u[k], self.phase, k, self.y[k]).into()),
+        }
+    }
+
+    /// Number of nodes in a column of the phase.
+    fn nodes(&self) -> usize {
+        self.columns.rows(self.phase) + 1
+    }
+
+    /// The column that is the p-th of a padded vector, whose ring lies on sides with given values and beyond mirrored
+    /// ones.
+    fn column(&self, p: usize) -> Option<usize> {
+        (p + usize::from(!self.mirrored)).checked_sub(1).filter(|&i| i < self.columns.x().len())
+    }
+
+    /// The linear system for the nodes of a patch, of which `nine` holds the weights of the Laplacian. Each row is
+    /// divided by its own entry if that is above 1: rows near a finely graded front are larger by orders of magnitude,
+    /// and a common tolerance would be set by the rounding of these.
+    fn system(&self, patch: Patch<2>, nine: &[[f64; 9]]) -> (LatticeMatrix<2, 9>, Vec<[f64; 1]>) {
+        let [count, inside] = patch.size;
+        let mut matrix = LatticeMatrix::<2, 9>::zero(patch);
+        let mut b = vec![[0.0]; patch.len()];
+        for (k, laplacian) in nine.iter().enumerate() {
+            let (i, j) = (k / inside, k % inside);
+            let own = (i + usize::from(!self.mirrored)) * self.nodes() + j + 1;
+            let mut row = self.row(own, laplacian);
+            if self.mirrored {
+                fold(&mut row, [i == 0, i + 1 == count]);
             }
+            let size = row[0].abs().max(1.0);
+            matrix.rows[k] = row.map(|a| a / size);
+            b[k] = [self.u[own] / size];
+        }
+        (matrix, b)
+    }
+
+    /// The coefficients of 1 − Δt (D Δ + w ∂/∂y) at node `own`.
+    fn row(&self, own: usize, laplacian: &[f64; 9]) -> [f64; 9] {
+        let mut row = laplacian.map(|a| -self.dt * self.diffusivity * a);
+        row[0] += 1.0;
+        if let Some(w) = self.velocity {
+            let weights = slope([self.y[own - 1], self.y[own], self.y[own + 1]]);
+            // the node and its neighbours along the column
+            for (place, weight) in [3, 0, 4].into_iter().zip(weights) {
+                row[place] -= self.dt * w[own] * weight;
+            }
+        }
+        row
+    }
+}
+
+/// Adds the coefficients of the points beyond a mirrored left or right side to those of their images.
+fn fold(row: &mut [f64; 9], [left, right]: [bool; 2]) {
+    // (−,·) is the image of (+,·) beyond the left side, and the other way round
+    for (low, high) in [(1, 2), (5, 7), (6, 8)] {
+        if left {
+            row[high] += std::mem::take(&mut row[low]);
+        }
+        if right {
+            row[low] += std::mem::take(&mut row[high]);
         }
     }
 }

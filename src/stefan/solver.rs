@@ -86,13 +86,7 @@ pub struct Front {
     /// Linear solvers of both phases.
     solvers: [Robust<1>; 2],
     /// Time step and response of the last step.
-    response: Option<(f64, Response)>,
-}
-
-impl std::fmt::Debug for Response {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Response")
-    }
+    pub(super) response: Option<(f64, Response)>,
 }
 
 /// A front with the temperatures of both phases.
@@ -110,16 +104,9 @@ pub struct FrontState {
     pub energy: Energy,
 }
 
-/// Newton's method has converged once the residual of the front is below this share of the height of the box, or of
-/// that times the largest temperature if it is above 1.
-const NEWTON: f64 = 1e-11;
 /// Names, for messages, of the initial temperatures by phase.
 pub(crate) const INITIAL: [&str; 2] =
     ["the initial temperature of the lower phase", "the initial temperature of the upper phase"];
-/// Round-off of a height, as a share of it.
-const ROUNDING: f64 = 1e-14;
-/// Newton steps after which a time step is given up.
-const NEWTON_ITERATIONS: usize = 40;
 
 impl Front {
     /// A front with the default method: graph, ALE, filter (1, 6, 1), explicit, no flux through the sides.
@@ -127,19 +114,14 @@ impl Front {
     /// # Errors
     /// [`Error::Invalid`] unless diffusivities and mobility are positive.
     pub fn new(columns: Columns, diffusivity: [f64; 2], mobility: f64) -> Result<Self> {
-        for (key, value) in
-            [("phase.lower.diffusivity", diffusivity[LOWER]), ("phase.upper.diffusivity", diffusivity[UPPER])]
-        {
+        for (key, value, rule) in [
+            ("phase.lower.diffusivity", diffusivity[LOWER], "must be above 0"),
+            ("phase.upper.diffusivity", diffusivity[UPPER], "must be above 0"),
+            ("front.mobility", mobility, "must be above 0: it is the inverse of the latent heat"),
+        ] {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::invalid(key, value, "must be above 0"));
+                return Err(Error::invalid(key, value, rule));
             }
-        }
-        if !(mobility > 0.0 && mobility.is_finite()) {
-            return Err(Error::invalid(
-                "front.mobility",
-                mobility,
-                "must be above 0: it is the inverse of the latent heat",
-            ));
         }
         Ok(Self {
             columns,
@@ -156,7 +138,7 @@ impl Front {
         })
     }
 
-    fn mirrored(&self) -> bool {
+    pub(super) fn mirrored(&self) -> bool {
         self.sides == Sides::Neumann
     }
 
@@ -179,14 +161,12 @@ impl Front {
         });
         for phase in [LOWER, UPPER] {
             if let Some(k) = u[phase].iter().position(|u| !u.is_finite()) {
-                let nodes = self.columns.rows(phase) + 1;
-                let x = [self.columns.x()[k / nodes], self.columns.heights(phase, &front)[k]];
-                let value = u[phase][k];
-                return Err(Failure::NonFinite { what: INITIAL[phase], value, node: [k / nodes, k % nodes], x }.into());
+                let y = self.columns.heights(phase, &front)[k];
+                return Err(self.columns.not_finite(INITIAL[phase], u[phase][k], phase, k, y).into());
             }
         }
         let mut state = FrontState { t, step: 0, front, u, energy: Energy::default() };
-        let slopes = self.slopes(&state);
+        let slopes = self.slopes(&state.front, &state.u);
         front::check_warm_below(&self.columns, &state.front, &slopes, self.diffusivity)?;
         let content = self.contents(&state.front, &state.u).map(|content| content[0]);
         let energy = total(&self.columns, &state.front, content, self.mobility);
@@ -194,12 +174,13 @@ impl Front {
         Ok(state)
     }
 
-    fn heights(&self, h: &[f64]) -> [Vec<f64>; 2] {
+    pub(super) fn heights(&self, h: &[f64]) -> [Vec<f64>; 2] {
         [LOWER, UPPER].map(|phase| self.columns.heights(phase, h))
     }
 
-    fn slopes(&self, state: &FrontState) -> [Vec<f64>; 2] {
-        front::slopes(&self.columns, &self.heights(&state.front), &state.u)
+    /// Slopes of the temperatures u of both phases at a front.
+    pub(super) fn slopes(&self, h: &[f64], u: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+        front::slopes(&self.columns, &self.heights(h), u)
     }
 
     fn contents(&self, h: &[f64], u: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
@@ -209,7 +190,7 @@ impl Front {
 
     /// The longest step for which the explicit front is stable, as estimated from the temperatures at the front.
     pub fn limit(&self, state: &FrontState) -> f64 {
-        front::limit(&self.columns, &self.slopes(state), self.diffusivity, self.mobility, self.filter)
+        front::limit(&self.columns, &self.slopes(&state.front, &state.u), self.diffusivity, self.mobility, self.filter)
     }
 
     /// A step to time `t`; the state changes only if it succeeds.
@@ -219,7 +200,7 @@ impl Front {
     /// [`Failure::WrongSide`]; [`Failure::NonFinite`]; [`Failure::NewtonStalled`]; [`Failure::LinearStalled`].
     pub fn step(&mut self, problem: &dyn Problem, state: &mut FrontState, t: f64) -> Result<Work> {
         let dt = t - state.t;
-        let slopes = self.slopes(state);
+        let slopes = self.slopes(&state.front, &state.u);
         front::check_warm_below(&self.columns, &state.front, &slopes, self.diffusivity)?;
         let mut work = Work::default();
         let (h, u) = match self.stepping {
@@ -236,7 +217,7 @@ impl Front {
             }
             Stepping::Implicit => self.newton(problem, state, &slopes, t, &mut work)?,
         };
-        let slopes = front::slopes(&self.columns, &self.heights(&h), &u);
+        let slopes = self.slopes(&h, &u);
         front::check_warm_below(&self.columns, &h, &slopes, self.diffusivity)?;
         state.energy = self.balance(state, &h, &u, dt);
         (state.front, state.u, state.t) = (h, u, t);
@@ -245,7 +226,7 @@ impl Front {
     }
 
     /// The front after a step from `from`, moved by the jump of the heat flux that belongs to the front `at`.
-    fn moved(
+    pub(super) fn moved(
         &self,
         problem: &dyn Problem,
         from: &[f64],
@@ -262,17 +243,28 @@ impl Front {
             Method::Graph => front::graph(from, &tilt, &jump, factor),
             Method::Segments => front::segments(&self.columns, from, &tilt, &jump, factor, mirrored)?,
         };
-        if !mirrored {
+        self.hold_ends(problem, &mut h, t);
+        Ok(h)
+    }
+
+    /// Moves the ends of a front to where the exact one is at time `t`, if that is given on the sides.
+    pub(super) fn hold_ends(&self, problem: &dyn Problem, h: &mut [f64], t: f64) {
+        if !self.mirrored() {
             let last = h.len() - 1;
             for i in [0, last] {
                 h[i] = problem.exact_front(self.columns.x()[i], t).unwrap_or(h[i]);
             }
         }
-        Ok(h)
     }
 
     /// Temperatures at time `t`, when the front is at `h`.
-    fn conduct(&mut self, problem: &dyn Problem, state: &FrontState, h: &[f64], t: f64) -> Result<[Vec<f64>; 2]> {
+    pub(super) fn conduct(
+        &mut self,
+        problem: &dyn Problem,
+        state: &FrontState,
+        h: &[f64],
+        t: f64,
+    ) -> Result<[Vec<f64>; 2]> {
         let dt = t - state.t;
         let (old, new) = (self.heights(&state.front), self.heights(h));
         let mut out = [Vec::new(), Vec::new()];
@@ -281,17 +273,12 @@ impl Front {
             let [front, wall] = self.columns.ends(phase);
             let last = self.columns.x().len() - 1;
             let mut u = state.u[phase].clone();
-            let velocity: Vec<f64> = old[phase].iter().zip(&new[phase]).map(|(a, b)| (b - a) / dt).collect();
+            let velocity = velocity(&old[phase], &new[phase], dt);
             if self.transfer == Transfer::Interpolate {
                 for i in 0..=last {
                     let part = i * nodes..(i + 1) * nodes;
-                    carry(
-                        &old[phase][part.clone()],
-                        &state.u[phase][part.clone()],
-                        front,
-                        &new[phase][part.clone()],
-                        &mut u[part],
-                    );
+                    let [y, new] = [&old, &new].map(|y| &y[phase][part.clone()]);
+                    carry(y, &state.u[phase][part.clone()], front, new, &mut u[part]);
                 }
             }
             let mut sides = u.clone();
@@ -301,16 +288,11 @@ impl Front {
                 if j == front {
                     sides[k] = 0.0;
                 } else if given {
-                    let x = [self.columns.x()[i], new[phase][k]];
-                    sides[k] = problem.boundary(phase, x, t);
+                    let y = new[phase][k];
+                    sides[k] = problem.boundary(phase, [self.columns.x()[i], y], t);
                     if !sides[k].is_finite() {
-                        return Err(Failure::NonFinite {
-                            what: "the boundary temperature",
-                            value: sides[k],
-                            node: [i, j],
-                            x,
-                        }
-                        .into());
+                        let what = "the boundary temperature";
+                        return Err(self.columns.not_finite(what, sides[k], phase, k, y).into());
                     }
                 }
             }
@@ -323,75 +305,11 @@ impl Front {
                 velocity: (self.transfer == Transfer::Ale).then_some(&velocity),
                 u: &u,
                 sides: &sides,
-                mirrored: self.sides == Sides::Neumann,
+                mirrored: self.mirrored(),
             };
             out[phase] = step.solve(&mut self.solvers[phase], self.laplacian)?;
         }
         Ok(out)
-    }
-
-    /// Front and temperatures at time `t` that are consistent with each other.
-    #[allow(clippy::type_complexity)]
-    fn newton(
-        &mut self,
-        problem: &dyn Problem,
-        state: &FrontState,
-        slopes: &[Vec<f64>; 2],
-        t: f64,
-        work: &mut Work,
-    ) -> Result<(Vec<f64>, [Vec<f64>; 2])> {
-        let dt = t - state.t;
-        let response = match self.response.take() {
-            Some((known, response)) if known == dt => response,
-            _ => Response::new(&self.columns, self.diffusivity, dt),
-        };
-        let box_height =
-            self.columns.wall(UPPER).iter().zip(self.columns.wall(LOWER)).fold(0.0_f64, |m, (c, b)| m.max(c - b));
-        // the jump has the round-off of the temperatures
-        let size = state.u.iter().flatten().copied().fold(1.0, larger);
-        // and heights have that of their distance from the origin
-        let heights = LOWER..=UPPER;
-        let farthest = heights.flat_map(|phase| self.columns.wall(phase)).copied().fold(0.0, larger);
-        let tolerance = NEWTON * box_height * size + ROUNDING * farthest;
-        // the old front lies in the box, which a long explicit step might leave; where sides are given it follows them
-        let mut h = state.front.clone();
-        if !self.mirrored() {
-            let guess = self.moved(problem, &state.front, &state.front, slopes, state.t, 0.0)?;
-            h.clone_from(&guess);
-            let last = h.len() - 1;
-            for i in [0, last] {
-                h[i] = problem.exact_front(self.columns.x()[i], t).unwrap_or(h[i]);
-            }
-        }
-        let mut miss = f64::INFINITY;
-        for _ in 0..NEWTON_ITERATIONS {
-            self.columns.check(&h)?;
-            let u = self.conduct(problem, state, &h, t)?;
-            work.linear_solves += 2;
-            work.newton_iterations += 1;
-            let slopes = front::slopes(&self.columns, &self.heights(&h), &u);
-            let target = self.moved(problem, &state.front, &h, &slopes, t, dt)?;
-            let residual: Vec<f64> = h.iter().zip(&target).map(|(h, target)| h - target).collect();
-            miss = residual.iter().copied().fold(0.0, larger);
-            if miss <= tolerance {
-                self.response = Some((dt, response));
-                return Ok((h, u));
-            }
-            let tilt = front::tilt(&self.columns, &h, self.mirrored());
-            let stretch: Vec<f64> = tilt.iter().map(|s| 1.0 + s * s).collect();
-            let strength: [Vec<f64>; 2] =
-                [LOWER, UPPER].map(|phase| slopes[phase].iter().map(|s| self.diffusivity[phase] * s).collect());
-            let correction = response.correct(
-                [&strength[LOWER], &strength[UPPER]],
-                &stretch,
-                dt * self.mobility,
-                self.filter,
-                !self.mirrored(),
-                &residual,
-            )?;
-            h.iter_mut().zip(correction).for_each(|(h, c)| *h += c);
-        }
-        Err(Failure::NewtonStalled { residual: miss, tolerance, iterations: NEWTON_ITERATIONS }.into())
     }
 
     /// The balance of energy after a step to (h, u).
@@ -403,7 +321,7 @@ impl Front {
         for phase in [LOWER, UPPER] {
             let d = self.diffusivity[phase];
             let at = Phase { columns: &self.columns, phase, y: &new[phase], u: &u[phase] };
-            let velocity: Vec<f64> = old[phase].iter().zip(&new[phase]).map(|(a, b)| (b - a) / dt).collect();
+            let velocity = velocity(&old[phase], &new[phase], dt);
             energy.inflow += after[phase][1] - before[phase][1] + dt * at.flow(d, &velocity);
             energy.inflow_by_differences += dt * at.wall_flux(d);
             if !self.mirrored() {
@@ -430,4 +348,9 @@ impl Front {
         }
         Some(worst)
     }
+}
+
+/// Velocities of nodes that have moved from `old` to `new` heights.
+fn velocity(old: &[f64], new: &[f64], dt: f64) -> Vec<f64> {
+    old.iter().zip(new).map(|(a, b)| (b - a) / dt).collect()
 }

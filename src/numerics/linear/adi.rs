@@ -1,4 +1,5 @@
-use super::{LatticeMatrix, larger};
+use super::krylov::add;
+use super::{LatticeMatrix, larger, refill};
 use crate::geometry::Patch;
 use crate::parallel;
 
@@ -60,10 +61,7 @@ impl Adi {
         self.factors.resize_with(self.sweeps * D, Vec::new);
         let mut sound = spread.is_finite();
         for (sweep, factors) in self.factors.chunks_exact_mut(D).enumerate() {
-            for factors in factors.iter_mut() {
-                factors.clear();
-                factors.resize(a.patch.padded_len(), Factor::default());
-            }
+            factors.iter_mut().for_each(|factors| refill(factors, a.patch.padded_len(), Factor::default()));
             let part = spread.powf((sweep as f64 + 0.5) / self.sweeps as f64 - 0.5);
             for (row, k) in a.rows.iter().zip(a.patch.places()) {
                 let (own, lowest, highest) = parts(row);
@@ -101,9 +99,7 @@ impl Adi {
             } else {
                 a.difference(v, x, scratch);
                 solve(&a.patch, factors, scratch);
-                for (x, e) in x.iter_mut().zip(scratch.iter()) {
-                    (0..K).for_each(|c| x[c] += e[c]);
-                }
+                add(x, [1.0; K], scratch);
             }
             a.patch.wrap(x);
         }

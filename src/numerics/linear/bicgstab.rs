@@ -1,5 +1,5 @@
 use super::krylov::{Krylov, add};
-use super::{LatticeMatrix, LinearSolver, adi::Adi, solved, solved_in, stalled};
+use super::{LatticeMatrix, LinearSolver, adi::Adi, refill, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::work::Work;
 
@@ -46,8 +46,7 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
         tolerance: [f64; K],
     ) -> Result<Work, Failure> {
         let Self { adi, krylov, scratch } = self;
-        scratch.clear();
-        scratch.resize(a.patch.padded_len(), [0.0; K]);
+        refill(scratch, a.patch.padded_len(), [0.0; K]);
         let (r, hat) = krylov.prepare(a.patch.padded_len());
         let mut sizes = a.residual(b, x, r);
         if solved(sizes, tolerance) {

@@ -1,4 +1,4 @@
-use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalled};
+use super::{BlockMatrix, LinearSolver, krylov::Krylov, refill, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::parallel;
 use crate::work::Work;
@@ -31,8 +31,7 @@ impl<const D: usize, const S: usize, const B: usize> LinearSolver<D, S, B, [[f64
             return Ok(solved_in::<B, [[f64; B]; B]>(0));
         }
         let n = a.patch.pencil_len();
-        inverses.clear();
-        inverses.resize(a.rows.len(), [[0.0; B]; B]);
+        refill(inverses, a.rows.len(), [[0.0; B]; B]);
         parallel::for_each_row(inverses, n, |p, inverses| {
             for (inverse, row) in inverses.iter_mut().zip(&a.rows[p * n..]) {
                 *inverse = invert(row[0]);

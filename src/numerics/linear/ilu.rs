@@ -1,5 +1,5 @@
 use super::block::invert;
-use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalled};
+use super::{BlockMatrix, LinearSolver, krylov::Krylov, refill, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::work::Work;
 
@@ -74,8 +74,7 @@ impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for IluBicgstab<B> {
 
 /// Incomplete elimination; false where a pivot has no inverse.
 fn eliminate<const B: usize>(a: &BlockMatrix<2, 9, B>, factors: &mut Vec<[[[f64; B]; B]; 9]>) -> bool {
-    factors.clear();
-    factors.resize(a.patch.padded_len(), [[[0.0; B]; B]; 9]);
+    refill(factors, a.patch.padded_len(), [[[0.0; B]; B]; 9]);
     let offsets = a.offsets();
     let mut sound = true;
     for (row, k) in a.rows.iter().zip(a.patch.places()) {

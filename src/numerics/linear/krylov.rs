@@ -1,4 +1,4 @@
-use super::{Entry, LatticeMatrix, larger, solved, stalled};
+use super::{Entry, LatticeMatrix, larger, refill, solved, stalled};
 use crate::error::Failure;
 use crate::parallel;
 
@@ -10,16 +10,14 @@ pub(super) struct Krylov<const K: usize> {
 
 /// Iterations (products with the matrix, or sweeps of the preconditioner) after which a system counts as not solved.
 const MAX_PRODUCTS: usize = 2000;
-/// Largest number of restarts from the true residual, each of which gains what rounding of the recursive one has lost.
+/// Largest number of starts from the residual b − A x. The one that the iteration updates drifts from it by rounding,
+/// which each start makes good.
 const RESTARTS: usize = 4;
 
 impl<const K: usize> Krylov<K> {
     /// Vectors of zeros; returns two for use before [`solve`](Self::solve).
     pub fn prepare(&mut self, padded_len: usize) -> (&mut [[f64; K]], &mut [[f64; K]]) {
-        for v in &mut self.space {
-            v.clear();
-            v.resize(padded_len, [0.0; K]);
-        }
+        self.space.iter_mut().for_each(|v| refill(v, padded_len, [0.0; K]));
         let [r, .., hat] = &mut self.space;
         (r, hat)
     }

@@ -1,4 +1,4 @@
-use super::{Entry, LatticeMatrix, LinearSolver, solved, solved_in, stalled};
+use super::{Entry, LatticeMatrix, LinearSolver, krylov::add, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::geometry::Patch;
 use crate::work::Work;
@@ -95,9 +95,7 @@ impl<const D: usize, const S: usize, const K: usize, E: Entry<K>> LinearSolver<D
                     correction[k] = std::array::from_fn(|c| unknowns[at(i, c)]);
                 }
                 a.patch.wrap(&mut correction);
-                for (x, e) in x.iter_mut().zip(&correction) {
-                    (0..K).for_each(|c| x[c] += e[c]);
-                }
+                add(x, [1.0; K], &correction);
                 let before = std::mem::replace(&mut sizes, a.residual(b, x, &mut r));
                 if solved(sizes, tolerance) {
                     return Ok(solved_in::<K, E>(0));

@@ -193,6 +193,12 @@ impl<const D: usize, const S: usize, E> LatticeMatrix<D, S, E> {
     }
 }
 
+/// Sets a vector to so many copies of a value, in the memory that it has.
+fn refill<T: Clone>(v: &mut Vec<T>, len: usize, value: T) {
+    v.clear();
+    v.resize(len, value);
+}
+
 /// True where every right-hand side has met its tolerance; false where one is NaN.
 fn solved<const K: usize>(sizes: [f64; K], tolerance: [f64; K]) -> bool {
     sizes.iter().zip(tolerance).all(|(size, tolerance)| *size <= tolerance)

@@ -1,7 +1,8 @@
-use super::krylov::{divide, dot};
+use super::krylov::{add, divide, dot};
 use super::multigrid::Multigrid;
-use super::{LatticeMatrix, larger, solved, stalled};
+use super::{LatticeMatrix, larger, refill, solved, stalled};
 use crate::error::Failure;
+use crate::geometry::Patch;
 
 /// Conjugate gradients for symmetric M-matrices on a star, preconditioned by a V-cycle of multigrid for stiff matrices
 /// and by modified incomplete elimination for others
@@ -76,25 +77,12 @@ impl<const D: usize, const K: usize> Pcg<D, K> {
         tolerance: [f64; K],
     ) -> Result<usize, Failure> {
         let Self { multigrid, factors, space } = self;
-        for v in space.iter_mut() {
-            v.clear();
-            v.resize(a.patch.padded_len(), [0.0; K]);
-        }
+        space.iter_mut().for_each(|v| refill(v, a.patch.padded_len(), [0.0; K]));
         let [r, z, p, q] = space;
         a.residual(b, x, r);
         let unknowns = a.rows.len();
-        let n = a.patch.pencil_len();
         let inverse: Vec<f64> = weights.iter().map(|weight| 1.0 / weight).collect();
-        let size = |r: &[[f64; K]]| {
-            let mut sizes = [0.0; K];
-            for (start, inverse) in a.patch.pencils().zip(inverse.chunks_exact(n)) {
-                for (r, inverse) in r[start..start + n].iter().zip(inverse) {
-                    (0..K).for_each(|c| sizes[c] = larger(sizes[c], r[c] * inverse));
-                }
-            }
-            sizes
-        };
-        let mut sizes = size(r);
+        let mut sizes = largest(&a.patch, &inverse, r);
         if solved(sizes, tolerance) {
             return Ok(0);
         }
@@ -118,13 +106,9 @@ impl<const D: usize, const K: usize> Pcg<D, K> {
             a.patch.wrap(p);
             a.multiply(p, q);
             let step = divide(active, now, dot(p, q));
-            for (((x, p), r), q) in x.iter_mut().zip(p.iter()).zip(r.iter_mut()).zip(q.iter()) {
-                for c in 0..K {
-                    x[c] += step[c] * p[c];
-                    r[c] -= step[c] * q[c];
-                }
-            }
-            sizes = size(r);
+            add(x, step, p);
+            add(r, step.map(|step| -step), q);
+            sizes = largest(&a.patch, &inverse, r);
             if solved(sizes, tolerance) {
                 return Ok(iteration);
             }
@@ -136,18 +120,26 @@ impl<const D: usize, const K: usize> Pcg<D, K> {
     }
 }
 
+/// The largest residual of each right-hand side; that of each unknown is multiplied by its entry of `factors` first.
+fn largest<const D: usize, const K: usize>(patch: &Patch<D>, factors: &[f64], r: &[[f64; K]]) -> [f64; K] {
+    let n = patch.pencil_len();
+    let mut sizes = [0.0; K];
+    for (start, factors) in patch.pencils().zip(factors.chunks_exact(n)) {
+        for (r, factor) in r[start..start + n].iter().zip(factors) {
+            (0..K).for_each(|c| sizes[c] = larger(sizes[c], r[c] * factor));
+        }
+    }
+    sizes
+}
+
 impl Factors {
     /// Computes the incomplete factors; false where a pivot is not positive.
     fn eliminate<const D: usize, const S: usize>(&mut self, a: &LatticeMatrix<D, S>) -> bool {
         let (len, strides, n) = (a.patch.padded_len(), a.patch.padded_strides(), a.patch.pencil_len());
         let Self { pivots, couplings } = self;
-        pivots.clear();
-        pivots.resize(len, 0.0);
+        refill(pivots, len, 0.0);
         couplings.resize_with(D, Default::default);
-        for coupling in couplings.iter_mut().flatten() {
-            coupling.clear();
-            coupling.resize(len, 0.0);
-        }
+        couplings.iter_mut().flatten().for_each(|coupling| refill(coupling, len, 0.0));
         let mut sound = true;
         for (p, start) in a.patch.pencils().enumerate() {
             for (row, k) in a.rows[p * n..(p + 1) * n].iter().zip(start..) {
@@ -186,15 +178,9 @@ impl Factors {
             }
             for d in 0..D - 1 {
                 let below = &before[start - strides[d]..][..n];
-                for ((z, below), w) in here.iter_mut().zip(below).zip(&self.couplings[d][0][start..]) {
-                    (0..K).for_each(|c| z[c] -= w * below[c]);
-                }
+                subtract(here, &self.couplings[d][0][start..], below);
             }
-            let mut last = [0.0; K];
-            for (z, w) in here.iter_mut().zip(&self.couplings[D - 1][0][start..]) {
-                (0..K).for_each(|c| z[c] -= w * last[c]);
-                last = *z;
-            }
+            substitute(here.iter_mut().zip(&self.couplings[D - 1][0][start..]));
         }
         for p in (0..a.patch.pencil_count()).rev() {
             let start = a.patch.pencil(p);
@@ -202,15 +188,25 @@ impl Factors {
             let here = &mut here[start..];
             for d in 0..D - 1 {
                 let above = &after[strides[d] - n..][..n];
-                for ((z, above), w) in here.iter_mut().zip(above).zip(&self.couplings[d][1][start..]) {
-                    (0..K).for_each(|c| z[c] -= w * above[c]);
-                }
+                subtract(here, &self.couplings[d][1][start..], above);
             }
-            let mut last = [0.0; K];
-            for (z, w) in here.iter_mut().zip(&self.couplings[D - 1][1][start..start + n]).rev() {
-                (0..K).for_each(|c| z[c] -= w * last[c]);
-                last = *z;
-            }
+            substitute(here.iter_mut().zip(&self.couplings[D - 1][1][start..start + n]).rev());
         }
+    }
+}
+
+/// z ← z − w v along a pencil.
+fn subtract<const K: usize>(z: &mut [[f64; K]], w: &[f64], v: &[[f64; K]]) {
+    for ((z, w), v) in z.iter_mut().zip(w).zip(v) {
+        (0..K).for_each(|c| z[c] -= w * v[c]);
+    }
+}
+
+/// z_j ← z_j − w_j z_{j−1} along a pencil, in the order given.
+fn substitute<'a, const K: usize>(pencil: impl Iterator<Item = (&'a mut [f64; K], &'a f64)>) {
+    let mut last = [0.0; K];
+    for (z, w) in pencil {
+        (0..K).for_each(|c| z[c] -= w * last[c]);
+        last = *z;
     }
 }
