@@ -139,8 +139,14 @@ pub(crate) fn texts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeM
 }
 
 /// One entry for each of D axes, which a study writes as an array of exactly so many
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Axes<T, const D: usize>(pub [T; D]);
+
+impl<T: fmt::Debug, const D: usize> fmt::Debug for Axes<T, D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
 
 impl<T, const D: usize> std::ops::Deref for Axes<T, D> {
     type Target = [T; D];

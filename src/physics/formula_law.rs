@@ -1,6 +1,6 @@
 //! A user's equation as a conservation law.
 
-use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law};
+use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Stepper};
 use super::formula_pde::Formulas;
 use super::prescribed::evaluate;
 use super::{Motion, Physics, nodal};
@@ -23,6 +23,7 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     exact: Vec<(usize, Program<D, 1>)>,
     has_source: bool,
     diffuses: [bool; B],
+    stepper: Stepper,
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
 }
@@ -38,7 +39,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
     const QUANTITIES: usize = D + 2;
 
     /// The equation of some formulas, integrated over dual cells.
-    pub fn new(formulas: Formulas, cells: fn(&Mesh<D>) -> DualCells<D>) -> Self {
+    pub fn new(formulas: Formulas, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper) -> Self {
         let Formulas { names, nodal, initial, boundary, exact } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
@@ -50,6 +51,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
             boundary: std::array::from_fn(|c| boundary[c].clone()),
             exact: exact.collect(),
             cells,
+            stepper,
             volumes: FiniteVolumes::default(),
         }
     }
@@ -214,6 +216,10 @@ where
         self.diffuses
     }
 
+    fn stepper(&self) -> Stepper {
+        self.stepper
+    }
+
     fn cells(&self, mesh: &Mesh<D>) -> DualCells<D>
     where
         Mesh<D>: Cells<D>,
@@ -372,7 +378,8 @@ mod tests {
             "#,
         )
         .unwrap();
-        let law: FormulaLaw<2, 2, 4, 24, RobustTransport<2>> = FormulaLaw::new(pde.read().unwrap(), DualCells::new);
+        let law: FormulaLaw<2, 2, 4, 24, RobustTransport<2>> =
+            FormulaLaw::new(pde.read().unwrap(), DualCells::new, Stepper::Trapezoid);
         let square = Mesh::uniform(Lattice::bounded([9, 8]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         let mesh = |t: f64| {
             let bent = |x: f64, y: f64| x + 0.07 * (std::f64::consts::TAU * x).sin() * (5.0 * y + 3.0 * t).cos();
@@ -402,7 +409,7 @@ mod tests {
             "#
         ))
         .unwrap();
-        let mut written = pde.into_physics().unwrap();
+        let mut written = pde.stepped(Stepper::Trapezoid).unwrap();
         let mut builtin = Burgers::new(viscosity, Convection::Flux).unwrap();
         builtin.flux = BurgersFlux::Central;
         let (law, mut volumes) = (Tight(builtin.clone()), FiniteVolumes::<1>::default());

@@ -1,5 +1,5 @@
 use super::formula_law::FormulaLaw;
-use super::{AXES, Physics, formula, mistaken};
+use super::{AXES, Physics, Stepper, formula, mistaken};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
 use crate::geometry::{DualCells, Mesh};
@@ -21,8 +21,7 @@ use std::collections::BTreeMap;
 /// ∇u·N = 0. `exact`, the solution if it is known, is used for the errors in a report: the largest and the root mean
 /// square error over the unknowns that have one.
 ///
-/// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and Crank–Nicolson in time, solved by
-/// Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
+/// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and a [`Stepper`] in time, solved by Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
 /// of their values at the two nodes. Such central fluxes oscillate where the mesh does not resolve a front. Σ A u
 /// changes only by the flux through the sides and by S, on any moving mesh. A solution has one value for each node and
 /// unknown, in the order of `unknowns`.
@@ -122,7 +121,10 @@ impl<const D: usize> FormulaPde<D> {
         let missing = self.unknowns.iter().find(|name| !self.boundary.contains_key(*name));
         match (periodic.contains(&false), missing, self.boundary.keys().next()) {
             (false, _, Some(name)) => {
-                let rule = "all axes are periodic and have no sides; leave it out";
+                let rule = match D {
+                    1 => "a periodic line has no ends; leave it out",
+                    _ => "both axes are periodic and have no sides; leave it out",
+                };
                 Err(Error::invalid("boundary", format!("given for `{name}`"), rule))
             }
             (false, _, None) | (_, None, _) => Ok(()),
@@ -133,6 +135,16 @@ impl<const D: usize> FormulaPde<D> {
                 );
                 Err(Error::invalid("boundary", format!("not given for `{name}`"), rule))
             }
+        }
+    }
+
+    /// How it is stepped where nothing is said: with [`Stepper::TrBdf2`] where something diffuses or has a source, which
+    /// may decay faster than any step is short.
+    pub fn stepper(&self) -> Stepper {
+        let given = |texts: &BTreeMap<String, String>| texts.values().any(|text| text != "0");
+        match given(&self.diffusivity) || given(&self.source) {
+            true => Stepper::TrBdf2,
+            false => Stepper::Trapezoid,
         }
     }
 
@@ -262,13 +274,22 @@ impl FormulaPde {
     /// # Errors
     /// As [`FormulaPde::check`].
     pub fn into_physics(self) -> Result<Box<dyn Physics>> {
+        let stepper = self.stepper();
+        self.stepped(stepper)
+    }
+
+    /// The same, stepped as is said here.
+    ///
+    /// # Errors
+    /// As [`FormulaPde::check`].
+    pub fn stepped(self, stepper: Stepper) -> Result<Box<dyn Physics>> {
         let formulas = self.read()?;
         type Plane<const B: usize, const P: usize, const K: usize> = FormulaLaw<2, B, P, K, RobustTransport<B>>;
         Ok(match formulas.names.len() {
-            1 => Box::new(Plane::<1, 3, 8>::new(formulas, DualCells::new)),
-            2 => Box::new(Plane::<2, 4, 24>::new(formulas, DualCells::new)),
-            3 => Box::new(Plane::<3, 5, 48>::new(formulas, DualCells::new)),
-            _ => Box::new(Plane::<4, 6, 80>::new(formulas, DualCells::new)),
+            1 => Box::new(Plane::<1, 3, 8>::new(formulas, DualCells::new, stepper)),
+            2 => Box::new(Plane::<2, 4, 24>::new(formulas, DualCells::new, stepper)),
+            3 => Box::new(Plane::<3, 5, 48>::new(formulas, DualCells::new, stepper)),
+            _ => Box::new(Plane::<4, 6, 80>::new(formulas, DualCells::new, stepper)),
         })
     }
 }
@@ -278,18 +299,22 @@ impl FormulaPde<1> {
     ///
     /// # Errors
     /// As [`FormulaPde::check`].
-    pub fn into_physics_on_a_line(self, cells: fn(&Mesh<1>) -> DualCells<1>) -> Result<Box<dyn Physics<1>>> {
+    pub fn into_physics_on_a_line(
+        self,
+        cells: fn(&Mesh<1>) -> DualCells<1>,
+        stepper: Stepper,
+    ) -> Result<Box<dyn Physics<1>>> {
         let formulas = self.read()?;
         type Line<const B: usize, const P: usize, const K: usize> = FormulaLaw<1, B, P, K, RobustLine>;
         Ok(match formulas.names.len() {
-            1 => Box::new(Line::<1, 2, 6>::new(formulas, cells)),
-            2 => Box::new(Line::<2, 3, 18>::new(formulas, cells)),
-            3 => Box::new(Line::<3, 4, 36>::new(formulas, cells)),
-            4 => Box::new(Line::<4, 5, 60>::new(formulas, cells)),
-            5 => Box::new(Line::<5, 6, 90>::new(formulas, cells)),
-            6 => Box::new(Line::<6, 7, 126>::new(formulas, cells)),
-            7 => Box::new(Line::<7, 8, 168>::new(formulas, cells)),
-            _ => Box::new(Line::<8, 9, 216>::new(formulas, cells)),
+            1 => Box::new(Line::<1, 2, 6>::new(formulas, cells, stepper)),
+            2 => Box::new(Line::<2, 3, 18>::new(formulas, cells, stepper)),
+            3 => Box::new(Line::<3, 4, 36>::new(formulas, cells, stepper)),
+            4 => Box::new(Line::<4, 5, 60>::new(formulas, cells, stepper)),
+            5 => Box::new(Line::<5, 6, 90>::new(formulas, cells, stepper)),
+            6 => Box::new(Line::<6, 7, 126>::new(formulas, cells, stepper)),
+            7 => Box::new(Line::<7, 8, 168>::new(formulas, cells, stepper)),
+            _ => Box::new(Line::<8, 9, 216>::new(formulas, cells, stepper)),
         })
     }
 }

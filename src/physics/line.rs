@@ -2,7 +2,7 @@
 
 use super::finite_volumes::{Crossing, FiniteVolumes, Law};
 use super::prescribed::evaluate;
-use super::{BurgersFlux, FormulaPde, Motion, Physics, Prescribed, check_finite, formula, nodal};
+use super::{BurgersFlux, FormulaPde, Motion, Physics, Prescribed, Stepper, check_finite, formula, nodal};
 use crate::elementary::exp;
 use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
@@ -63,14 +63,17 @@ impl LinePdeKind {
         }
     }
 
-    /// The equation in these coordinates, ready to step.
+    /// The equation in these coordinates, ready to step; a formula as is said, or as suits it.
     ///
     /// # Errors
     /// As [`LinePdeKind::check`].
-    pub fn into_physics(self, coordinates: Coordinates) -> Result<Box<dyn Physics<1>>> {
+    pub fn into_physics(self, coordinates: Coordinates, stepper: Option<Stepper>) -> Result<Box<dyn Physics<1>>> {
         Ok(match self {
             Self::LineBurgers(burgers) => Box::new(burgers.compiled()?),
-            Self::LineFormulaPde(pde) => pde.into_physics_on_a_line(coordinates.dual_cells())?,
+            Self::LineFormulaPde(pde) => {
+                let stepper = stepper.unwrap_or(pde.stepper());
+                pde.into_physics_on_a_line(coordinates.dual_cells(), stepper)?
+            }
             Self::Prescribed(prescribed) => Box::new(prescribed.field::<1>()?),
         })
     }

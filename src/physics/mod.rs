@@ -11,6 +11,7 @@ mod shallow_water;
 mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
+pub use finite_volumes::Stepper;
 pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE};
 pub use line::{Coordinates, LineBurgers, LineFormulaPde, LinePdeKind};
 pub use prescribed::{Prescribed, PrescribedField};

@@ -4,7 +4,7 @@ use super::moving_mesh::{Domain, Stepper, Time};
 use crate::error::{Error, Result};
 use crate::geometry::{Lattice, Mesh};
 use crate::meshing::{GeneratorKind, LineGeneratorKind, MeshGenerator, Movable};
-use crate::physics::{Coordinates, LinePdeKind, PdeKind, Physics, UniformBurgers};
+use crate::physics::{self, Coordinates, LinePdeKind, PdeKind, Physics, UniformBurgers};
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
@@ -58,6 +58,9 @@ pub trait PdeTable<const D: usize>: Settings {
     /// The initial values and the side values that are both formulas of place and time, with their keys.
     fn starts_and_sides(&self) -> Vec<[(String, &str); 2]>;
 
+    /// How the equation is stepped where nothing is said; not at all where the solution is given.
+    fn stepper(&self) -> Option<Stepper>;
+
     /// Whether the solution is prescribed, and whether the density is.
     fn prescribes(&self) -> [bool; 2];
 }
@@ -78,6 +81,39 @@ pub trait GeneratorTable<const D: usize>: Settings + Default {
 
     /// The generator, ready to step.
     fn into_generator(self) -> Box<dyn MeshGenerator<D>>;
+}
+
+impl From<physics::Stepper> for Stepper {
+    fn from(stepper: physics::Stepper) -> Self {
+        match stepper {
+            physics::Stepper::Trapezoid => Self::Trapezoid,
+            physics::Stepper::TrBdf2 => Self::TrBdf2,
+        }
+    }
+}
+
+/// Refuses a stepper that is not the one that an equation has.
+fn check_stepper(stepper: Option<Stepper>, own: Option<Stepper>) -> Result<()> {
+    let (name, rule) = match stepper {
+        None => return Ok(()),
+        Some(given) if own == Some(given) => return Ok(()),
+        Some(Stepper::Rk4) => (
+            "rk4",
+            "steps pde.kind = \"burgers\" in two dimensions on a mesh that stays; set mesh.generator to \
+             { kind = \"fixed\" }, or leave time.stepper out",
+        ),
+        Some(Stepper::TrBdf2) => ("tr-bdf2", "steps pde.kind = \"formula\"; leave time.stepper out"),
+        Some(Stepper::Trapezoid) => ("trapezoid", "needs an equation; leave time.stepper out"),
+    };
+    Err(Error::invalid("time.stepper", format!("\"{name}\""), rule))
+}
+
+/// The key of an error of an equation; that of its stepper has one already.
+fn within_pde(error: Error) -> Error {
+    match &error {
+        Error::Invalid { key, .. } if key.starts_with("time.") => error,
+        _ => error.within("pde"),
+    }
 }
 
 impl PdeTable<2> for PdeKind {
@@ -118,18 +154,23 @@ impl PdeTable<2> for PdeKind {
     }
 
     fn physics(&self, _domain: &Domain<2>, time: &Time, stays: bool) -> Result<Box<dyn Physics<2>>> {
-        let physics = self.clone().into_physics().map_err(|error| error.within("pde"))?;
         match (self, time.stepper) {
-            (_, None) => Ok(physics),
+            (Self::FormulaPde(pde), Some(Stepper::Trapezoid)) => pde.clone().stepped(physics::Stepper::Trapezoid),
+            (Self::FormulaPde(pde), Some(Stepper::TrBdf2)) => pde.clone().stepped(physics::Stepper::TrBdf2),
             (Self::Burgers(burgers), Some(Stepper::Rk4)) if stays => {
                 let uniform = UniformBurgers::new(burgers.clone(), time.order.unwrap_or(2));
-                Ok(Box::new(uniform.map_err(|error| error.within("time"))?))
+                return Ok(Box::new(uniform.map_err(|error| error.within("time"))?));
             }
-            _ => {
-                let rule = "steps pde.kind = \"burgers\" on a mesh that stays; set mesh.generator to \
-                            { kind = \"fixed\" }, or leave time.stepper out";
-                Err(Error::invalid("time.stepper", "\"rk4\"", rule))
-            }
+            (_, stepper) => check_stepper(stepper, self.stepper()).and_then(|()| self.clone().into_physics()),
+        }
+        .map_err(within_pde)
+    }
+
+    fn stepper(&self) -> Option<Stepper> {
+        match self {
+            Self::FormulaPde(pde) => Some(pde.stepper().into()),
+            Self::Prescribed(_) => None,
+            Self::Burgers(_) | Self::ShallowWater(_) => Some(Stepper::Trapezoid),
         }
     }
 
@@ -214,12 +255,20 @@ impl PdeTable<1> for LinePdeKind {
     }
 
     fn physics(&self, domain: &Domain<1>, time: &Time, _stays: bool) -> Result<Box<dyn Physics<1>>> {
-        if time.stepper.is_some() {
-            let rule = "steps pde.kind = \"burgers\" in two dimensions; leave it out";
-            return Err(Error::invalid("time.stepper", "\"rk4\"", rule));
+        let stepper = match (self, time.stepper) {
+            (Self::LineFormulaPde(_), Some(Stepper::Trapezoid)) => Some(physics::Stepper::Trapezoid),
+            (Self::LineFormulaPde(_), Some(Stepper::TrBdf2)) => Some(physics::Stepper::TrBdf2),
+            (_, stepper) => check_stepper(stepper, self.stepper()).map(|()| None)?,
+        };
+        self.clone().into_physics(domain.coordinates.unwrap_or_default(), stepper).map_err(within_pde)
+    }
+
+    fn stepper(&self) -> Option<Stepper> {
+        match self {
+            Self::LineFormulaPde(pde) => Some(pde.stepper().into()),
+            Self::Prescribed(_) => None,
+            Self::LineBurgers(_) => Some(Stepper::Trapezoid),
         }
-        let coordinates = domain.coordinates.unwrap_or_default();
-        self.clone().into_physics(coordinates).map_err(|error| error.within("pde"))
     }
 
     fn formulas(&self) -> Vec<(String, &str)> {

@@ -107,17 +107,19 @@ where
 {
     /// Refuses a stepper that the rest of the study does not go with, and fills in its order.
     fn check_stepper(&mut self) -> Result<()> {
-        if let (None, Some(order)) = (self.time.stepper, self.time.order) {
+        let rk4 = self.time.stepper == Some(Stepper::Rk4);
+        if let (false, Some(order)) = (rk4, self.time.order) {
             return Err(Error::invalid(
                 "time.order",
                 order,
                 "only stepper = \"rk4\" has one; add it, or leave this out",
             ));
         }
-        if self.time.stepper.is_some() {
+        if rk4 {
             self.time.order.get_or_insert(2);
-            self.physics()?;
         }
+        self.physics()?;
+        self.time.stepper = self.time.stepper.or(self.pde.stepper());
         Ok(())
     }
 

@@ -134,18 +134,25 @@ pub struct Time {
     /// Times at which `summary.json` reports; the end where none are given.
     #[serde(default)]
     pub report: Vec<f64>,
-    /// How the equation is stepped; its own implicit scheme where nothing is said.
+    /// How the equation is stepped. Where nothing is said, formulas with diffusion or a source by `tr-bdf2`, all else by
+    /// the trapezoid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stepper: Option<Stepper>,
-    /// Order in space of `stepper`, 2 or 4; 2 where nothing is said.
+    /// Order in space of the stepper `rk4`, 2 or 4; 2 where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<usize>,
 }
 
-/// A stepper other than the equation's own.
+/// How the equation is stepped in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Stepper {
+    /// Implicit, half of the change at the start and half of that at the end of a step. What decays within a step swings
+    /// about zero from step to step.
+    Trapezoid,
+    /// Implicit, the trapezoid and then the second backward difference formula: what decays within a step is gone after
+    /// it. For formulas.
+    TrBdf2,
     /// Explicit, for Burgers' equation on a uniform mesh that stays; substeps of `time.step` are as long as is stable.
     Rk4,
 }
