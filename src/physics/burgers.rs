@@ -1,13 +1,14 @@
+mod differences;
+
 use super::finite_volumes::{Crossing, FiniteVolumes, Law};
 use super::prescribed::evaluate;
-use super::{Motion, Physics, check_finite, curvilinear::Stencils, formula, nodal};
+use super::{Motion, Physics, curvilinear::Stencils, formula, nodal};
 use crate::elementary::exp;
 use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
-use crate::geometry::{DualCells, Field, Mesh, Patch, node_areas};
-use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
-use crate::numerics::{larger, sum};
-use crate::parallel;
+use crate::geometry::{DualCells, Field, Mesh, node_areas};
+use crate::numerics::linear::Robust;
+use crate::numerics::sum;
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -101,11 +102,6 @@ impl BurgersFlux {
     }
 }
 
-/// Newton's method has converged once the largest residual is below this; u is of size one.
-const TOLERANCE: f64 = 1e-10;
-/// Newton steps after which a time step is given up.
-const MAX_NEWTON: usize = 20;
-
 impl Burgers {
     /// Burgers' equation with a viscosity and a form of its convection term.
     ///
@@ -181,15 +177,6 @@ impl Burgers {
         pulp::Arch::new().dispatch(FrontAt { burgers: self, t, x: mesh.x(), u: &mut u });
         Field::scalar(u)
     }
-
-    /// R at one node that moves with velocity v.
-    fn row(&self, gradient: &[[f64; 2]; 4], laplacian: &[f64; 9], v: [f64; 2]) -> Row {
-        let mut linear = laplacian.map(|w| self.viscosity * w);
-        for (l, g) in linear[1..5].iter_mut().zip(gradient) {
-            *l += v[0] * g[0] + v[1] * g[1];
-        }
-        Row { linear, flux: gradient.map(|g| g[0] + g[1]), convection: self.convection }
-    }
 }
 
 /// The exact front at many places as a task for [`pulp`], which compiles it for wider vectors too.
@@ -206,42 +193,6 @@ impl pulp::WithSimd for FrontAt<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         self.u.iter_mut().zip(self.x).for_each(|(u, &x)| *u = self.burgers.front(self.t, x));
-    }
-}
-
-/// R at one node: the coefficients of its linear part on the nine points, and those of ∂_x + ∂_y for the convection.
-#[derive(Clone, Copy)]
-struct Row {
-    linear: [f64; 9],
-    flux: [f64; 4],
-    convection: Convection,
-}
-
-impl Row {
-    const ZERO: Self = Self { linear: [0.0; 9], flux: [0.0; 4], convection: Convection::Conservative };
-
-    fn value(&self, u: &[f64; 9]) -> f64 {
-        let linear: f64 = self.linear.iter().zip(u).map(|(l, u)| l * u).sum();
-        let star = self.flux.iter().zip(&u[1..5]);
-        linear
-            - match self.convection {
-                Convection::Conservative | Convection::Flux => 0.5 * star.map(|(s, u)| s * u * u).sum::<f64>(),
-                Convection::Advective => u[0] * star.map(|(s, u)| s * u).sum::<f64>(),
-            }
-    }
-
-    fn derivative(&self, u: &[f64; 9]) -> [f64; 9] {
-        let mut row = self.linear;
-        for (k, s) in self.flux.iter().enumerate() {
-            match self.convection {
-                Convection::Conservative | Convection::Flux => row[k + 1] -= s * u[k + 1],
-                Convection::Advective => {
-                    row[k + 1] -= s * u[0];
-                    row[0] -= s * u[k + 1];
-                }
-            }
-        }
-        row
     }
 }
 
@@ -314,87 +265,6 @@ impl Physics for Burgers {
             self.volumes = volumes;
             return stepped.map(|(values, work)| (Field::nodal(values), work));
         }
-        let Motion { t, dt, old, new } = motion;
-        let lattice = new.lattice();
-        let patch = Patch::whole(lattice);
-        let [width, height] = new.extent();
-        let jump = [[width, 0.0], [0.0, height]];
-        let (x_old, x_new) = (patch.gather(lattice, old.x(), jump), patch.gather(lattice, new.x(), jump));
-        let velocity = |k: usize| [0, 1].map(|d| (x_new[k][d] - x_old[k][d]) / dt);
-
-        let mut matrix = LatticeMatrix::<2, 9>::zero(patch);
-        let offsets = matrix.offsets();
-        let around = |u: &[[f64; 1]], k: usize| offsets.map(|o| u[k.wrapping_add_signed(o)][0]);
-        let n = patch.pencil_len();
-        let places = |p: usize| (p * n..(p + 1) * n).zip(patch.pencil(p)..);
-
-        // the first half of the step, from known values
-        let stencils_old = match self.newest.take() {
-            Some((mesh, stencils)) if mesh == *old => stencils,
-            _ => Stencils::new(&patch, &x_old),
-        };
-        let u_old = patch.gather(lattice, start, [[0.0]; 2]);
-        let mut known = vec![0.0; patch.len()];
-        parallel::for_each_row(&mut known, n, |p, known| {
-            for (known, (i, k)) in known.iter_mut().zip(places(p)) {
-                let row = self.row(&stencils_old.gradient[i], &stencils_old.laplacian[i], velocity(k));
-                *known = u_old[k][0] + 0.5 * dt * row.value(&around(&u_old, k));
-            }
-        });
-
-        // the second half, from new side values and, as a first guess, the old values inside
-        let stencils = Stencils::new(&patch, &x_new);
-        let mut rows = vec![Row::ZERO; patch.len()];
-        parallel::for_each_row(&mut rows, n, |p, rows| {
-            for (row, (i, k)) in rows.iter_mut().zip(places(p)) {
-                *row = self.row(&stencils.gradient[i], &stencils.laplacian[i], velocity(k));
-            }
-        });
-        let mut solution = u.clone();
-        for k in lattice.sides() {
-            // a side without a formula keeps its values
-            solution.values_mut()[k] = self.side_value(t + dt, new.image(new.x()[k])).unwrap_or(u.values()[k]);
-        }
-        let mut u_new = patch.gather(lattice, solution.values().as_chunks::<1>().0, [[0.0]; 2]);
-
-        let size = u_new.iter().fold(1.0, |m, [u]| larger(m, *u));
-        // where Δt·ν/h² is large, round-off alone leaves residuals above the tolerance
-        let stiffest = rows.iter().fold(0.0, |m, row| larger(m, row.linear.iter().map(|l| l.abs()).sum()));
-        let wanted = size * TOLERANCE.max(8.0 * f64::EPSILON * (1.0 + dt * stiffest));
-        let mut work = Work::default();
-        let mut residual = vec![[0.0]; patch.len()];
-        let stalled = loop {
-            parallel::for_each_row(&mut residual, n, |p, residual| {
-                for (residual, (i, k)) in residual.iter_mut().zip(places(p)) {
-                    *residual = [known[i] - u_new[k][0] + 0.5 * dt * rows[i].value(&around(&u_new, k))];
-                }
-            });
-            let largest = residual.iter().fold(0.0, |m, [r]| larger(m, *r));
-            if largest <= wanted {
-                break None;
-            }
-            let iterations = work.newton_iterations;
-            if iterations == MAX_NEWTON || !largest.is_finite() {
-                break Some(Failure::NewtonStalled { residual: largest, tolerance: wanted, iterations });
-            }
-            parallel::for_each_row(&mut matrix.rows, n, |p, entries| {
-                for (entries, (i, k)) in entries.iter_mut().zip(places(p)) {
-                    *entries = rows[i].derivative(&around(&u_new, k)).map(|d| -0.5 * dt * d);
-                    entries[0] += 1.0;
-                }
-            });
-            let mut correction = vec![[0.0]; patch.padded_len()];
-            // Newton's method squares the residual, so that a much more accurate linear solve is wasted
-            let tolerance = [(0.01 * largest * (largest / size).min(1.0)).max(0.1 * wanted)];
-            work += self.solver.solve(&matrix, &residual, &mut correction, tolerance)?;
-            work.newton_iterations += 1;
-            for (u, c) in u_new.iter_mut().zip(&correction) {
-                u[0] += c[0];
-            }
-        };
-        patch.scatter(lattice, &u_new, solution.values_mut().as_chunks_mut::<1>().0, [[0.0]; 2]);
-        check_finite(["u"], new, solution.values().as_chunks().0)?;
-        self.newest = Some((new.clone(), stencils));
-        stalled.map_or(Ok((solution, work)), Err)
+        self.step_by_differences(motion, u)
     }
 }

@@ -2,8 +2,8 @@ use super::{Record, Schedule, Simulation, State, journey, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Cells, Field, Mesh, check_unfolded};
-use crate::meshing::{Interface, Relaxation};
-use crate::mover::{Predicted, Retries, Stride};
+use crate::meshing::{Interface, Moved, Relaxation};
+use crate::mover::{Mover, Predicted, Retries, Stride};
 use crate::numerics::larger;
 use crate::physics::{Motion, Physics};
 use crate::work::Work;
@@ -56,6 +56,48 @@ impl Coupling {
         }
     }
 
+    /// Whether sub-steps of the mesh are doubled until the mesh does not change.
+    fn doubles(&self) -> bool {
+        self.tolerance > 0.0 && self.mesh_steps > 1
+    }
+
+    /// The mesh of a step, in as many sub-steps as it says; `record` adds up tries and seconds.
+    fn move_mesh<const D: usize>(
+        &self,
+        mover: &mut Mover<D>,
+        predicted: &Predicted<D>,
+        rho: &[f64],
+        stride: Stride,
+        record: &mut Record,
+    ) -> Result<Moved<D>, Failure>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let seconds = &mut record.seconds;
+        let (mut retries, mut work, mut parts) = (Retries::default(), Work::default(), stride.parts);
+        let mut moved = timed(&mut seconds.mesh, || mover.relax(predicted, rho, stride, &mut retries));
+        while let (true, Ok(coarse)) = (self.doubles() && 2 * parts <= self.mesh_steps, &moved) {
+            parts *= 2;
+            let finer = Stride { parts, ..stride };
+            let again = timed(&mut seconds.mesh, || mover.relax(predicted, rho, finer, &mut retries));
+            let done = again.as_ref().is_ok_and(|again| self.same(&again.mesh, &coarse.mesh));
+            work += coarse.work;
+            moved = again;
+            if done {
+                break;
+            }
+        }
+        record.safety.substeps += retries.substeps;
+        record.safety.smoothed += retries.smoothed;
+        record.work.rejected_steps += retries.substeps + retries.smoothed;
+        let moved = moved?;
+        let spent = moved.interface.map_or(0.0, |i| i.seconds);
+        seconds.mesh -= spent;
+        seconds.interface += spent;
+        work += moved.work;
+        Ok(Moved { work, ..moved })
+    }
+
     /// Whether two meshes are the same for its tolerance.
     fn same<const D: usize>(&self, a: &Mesh<D>, b: &Mesh<D>) -> bool {
         let longest = a.extent().into_iter().fold(0.0, f64::max);
@@ -102,41 +144,20 @@ where
     let Stretch { t, dt, scale, estimated } = stretch;
     let Simulation { physics, monitor, mover, coupling, safety, schedule } = simulation;
     mover.care = safety.care();
-    let doubled = coupling.tolerance > 0.0 && coupling.mesh_steps > 1;
-    let stride = Stride { dt, scale, parts: if doubled { 1 } else { coupling.mesh_steps }, share: 1.0 };
+    let parts = if coupling.doubles() { 1 } else { coupling.mesh_steps };
+    let stride = Stride { dt, scale, parts, share: 1.0 };
     let mut work = Work::default();
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
-    let seconds = &mut record.seconds;
     let followed = monitor.followed(state.t, &state.mesh, &state.u)?;
-    let predicted = timed(&mut seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
+    let predicted = timed(&mut record.seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
     // a mesh whose way nobody has set goes no faster than is good for the solution
     let guarded = mover.equation.relaxation == Relaxation::Auto && !physics.is_given();
     type Round<const D: usize> = (Mesh<D>, Field, Option<Vec<f64>>, Vec<f64>, f64);
     let mut latest: Option<Round<D>> = None;
     for _ in 0..coupling.iterations {
-        let mut retries = Retries::default();
         let mixed = state.gait.mixed(&rho, mover.equation.relaxation);
-        let mut moved = timed(&mut seconds.mesh, || mover.relax(&predicted, &mixed, stride, &mut retries));
-        let mut parts = stride.parts;
-        while let (true, Ok(coarse)) = (doubled && 2 * parts <= coupling.mesh_steps, &moved) {
-            parts *= 2;
-            let finer = Stride { parts, ..stride };
-            let again = timed(&mut seconds.mesh, || mover.relax(&predicted, &mixed, finer, &mut retries));
-            let done = again.as_ref().is_ok_and(|again| coupling.same(&again.mesh, &coarse.mesh));
-            work += coarse.work;
-            moved = again;
-            if done {
-                break;
-            }
-        }
-        record.safety.substeps += retries.substeps;
-        record.safety.smoothed += retries.smoothed;
-        record.work.rejected_steps += retries.substeps + retries.smoothed;
-        let moved = moved?;
-        let spent = moved.interface.map_or(0.0, |i| i.seconds);
-        seconds.mesh -= spent;
-        seconds.interface += spent;
+        let moved = coupling.move_mesh(mover, &predicted, &mixed, stride, record)?;
         work += moved.work;
         interface = moved.interface;
         let (mesh, share) = match guarded {
@@ -144,6 +165,7 @@ where
             false => (moved.mesh, 1.0),
         };
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
+        let seconds = &mut record.seconds;
         let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))?;
         work += cost;
         rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;

@@ -210,22 +210,7 @@ impl Free {
     {
         let step = match step {
             Ok(step) => step,
-            Err(failure) => {
-                // the first step is a guess, which may be far too long where a layer begins at a side
-                let first = before.step == 0;
-                self.dt *= if first { FIRST_AGAIN } else { 0.5 };
-                self.failures += 1;
-                let overshoots = first && matches!(failure, Failure::Formula { .. });
-                if self.failures > simulation.safety.halvings
-                    || self.dt < SHORTEST * self.longest
-                    || !(failure.is_curable() || overshoots)
-                {
-                    return Err(failure);
-                }
-                record.work.rejected_steps += 1;
-                record.safety.shortened += 1;
-                return Ok(None);
-            }
+            Err(failure) => return self.try_shorter(before, failure, simulation.safety, record).map(|()| None),
         };
         self.failures = 0;
         let after = &step.state;
@@ -259,20 +244,56 @@ impl Free {
             record.work.rejected_steps += 1;
             return Ok(None);
         }
-        // a mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep
-        // faster: it keeps to the time in which the solution changes as much at a fixed place
-        let mut scale = self.dt;
-        if scale < self.scale {
-            let mut in_place = dt * CHANGE / share(change_in_place(before, after, 0), self.ranges[0]);
-            if in_place < DOUBTED * self.scale {
-                // the change at fixed places contains the errors of interpolation that the moving mesh makes; a τ
-                // shortened by these would move the mesh faster and make more of them
-                in_place = in_place.max(self.dt * CHANGE / self.share_at_rest(simulation, after));
-            }
-            scale = scale.max(in_place.min(self.scale));
-        }
-        self.scale = scale;
+        self.scale = self.scale_after(simulation, before, after, dt);
         Ok(Some(step))
+    }
+
+    /// After a step that failed: half of its length, or what it failed with where that is no use.
+    fn try_shorter<const D: usize>(
+        &mut self,
+        before: &State<D>,
+        failure: Failure,
+        safety: Safety,
+        record: &mut Record,
+    ) -> Result<(), Failure> {
+        // the first step is a guess, which may be far too long where a layer begins at a side
+        let first = before.step == 0;
+        self.dt *= if first { FIRST_AGAIN } else { 0.5 };
+        self.failures += 1;
+        let overshoots = first && matches!(failure, Failure::Formula { .. });
+        let curable = failure.is_curable() || overshoots;
+        if self.failures > safety.halvings || self.dt < SHORTEST * self.longest || !curable {
+            return Err(failure);
+        }
+        record.work.rejected_steps += 1;
+        record.safety.shortened += 1;
+        Ok(())
+    }
+
+    /// The time that τ is measured in after a step of length `dt`
+    ///
+    /// A mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep faster:
+    /// it keeps to the time in which the solution changes as much at a fixed place.
+    fn scale_after<const D: usize>(
+        &self,
+        simulation: &mut Simulation<D>,
+        before: &State<D>,
+        after: &State<D>,
+        dt: f64,
+    ) -> f64
+    where
+        Mesh<D>: Movable<D>,
+    {
+        if self.dt >= self.scale {
+            return self.dt;
+        }
+        let mut in_place = dt * CHANGE / share(change_in_place(before, after, 0), self.ranges[0]);
+        if in_place < DOUBTED * self.scale {
+            // the change at fixed places contains the errors of interpolation that the moving mesh makes; a τ
+            // shortened by these would move the mesh faster and make more of them
+            in_place = in_place.max(self.dt * CHANGE / self.share_at_rest(simulation, after));
+        }
+        self.dt.max(in_place.min(self.scale))
     }
 
     /// What makes steps as short as this one.

@@ -1,8 +1,10 @@
 //! Invariants of the fluxes, the geometric conservation law, and Newton's matrix against the residual.
 
 use super::*;
-use crate::geometry::Lattice;
-use crate::physics::{Burgers, BurgersFlux, Convection, Physics};
+use crate::geometry::{Lattice, diagonal, padded};
+use crate::numerics::larger;
+use crate::numerics::linear::BlockMatrix;
+use crate::physics::{Burgers, BurgersFlux, Convection, Motion, Physics};
 
 /// A mesh of the unit square with every node up to 0.3 cells away from its uniform place, side nodes on their
 /// sides.

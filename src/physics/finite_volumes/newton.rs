@@ -1,0 +1,140 @@
+//! Newton's method for the implicit part of a step.
+
+use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Side, inside};
+use crate::error::Failure;
+use crate::numerics::larger;
+use crate::numerics::linear::{BlockMatrix, LinearSolver};
+use crate::work::Work;
+
+/// Newton steps after which a time step is given up.
+const MAX_NEWTON: usize = 20;
+/// Newton's method is given up once residuals are larger than this multiple of those at its start.
+const DIVERGED: f64 = 10.0;
+/// Residuals below so many roundings of the largest terms are rounding.
+const ROUNDINGS: f64 = 16.0;
+
+/// Where Newton's method ended.
+pub(super) struct Solved<const B: usize> {
+    pub residual: Vec<[f64; B]>,
+    pub work: Work,
+    /// Why it did not converge, where it did not.
+    pub stalled: Option<Failure>,
+}
+
+impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
+    /// Newton's method for the padded values `u` at the end of a time step, from what is `known` of its beginning.
+    pub(super) fn newton<const S: usize, L: Law<B, D>>(
+        &mut self,
+        law: &L,
+        half: &Half<'_, D>,
+        excess: Option<&Excess<B, D, S>>,
+        known: &[[f64; B]],
+        sides: &[Side<B>],
+        u: &mut [[f64; B]],
+    ) -> Result<Solved<B>, Failure>
+    where
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
+        let patch = *half.cells.patch();
+        let seen = inside(half.mesh, half.x);
+        let mut scale = Scale::of(u);
+        let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
+        let mut residual = vec![[0.0; B]; patch.len()];
+        let mut work = Work::default();
+        let stalled = loop {
+            let nodes = law.nodes(half.t, &seen, u);
+            law.check(half.mesh, u, &nodes)?;
+            let faces = Around::<D, S>::faces(half, law, &nodes, u);
+            half.residual(law, excess, (&nodes, &faces), known, u, &mut residual);
+            for side in sides {
+                for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
+                    *residual = if given.is_some() { 0.0 } else { *residual };
+                }
+            }
+            let (largest, iterations) = (largest_of(&residual), work.newton_iterations);
+            if iterations == 0 {
+                scale.begin(largest);
+            }
+            // at least one Newton step is done: small changes, if left out, would add up over many time steps
+            let wanted = scale.wanted(if iterations == 0 { 0.0 } else { L::TOLERANCE });
+            if (0..B).all(|c| largest[c] <= wanted[c]) {
+                break None;
+            }
+            if iterations == MAX_NEWTON || scale.diverges(largest) {
+                let over = |c: &usize| largest[*c] / wanted[*c];
+                let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
+                break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
+            }
+            half.matrix(law, excess, (&nodes, &faces), sides, &mut matrix);
+            scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
+            let mut correction = vec![[0.0; B]; patch.padded_len()];
+            let enough = scale.enough(largest, L::TOLERANCE);
+            work += self.solver.solve(&matrix, &residual, &mut correction, enough)?;
+            work.newton_iterations += 1;
+            for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
+                *u += correction;
+            }
+            <Half<'_, D> as Around<D, S>>::repeat_sides(&patch, u);
+        };
+        Ok(Solved { residual, work, stalled })
+    }
+}
+
+/// How large unknowns and residuals are.
+struct Scale<const B: usize> {
+    /// Of each unknown: unknowns may differ much in size, and one that is 0 takes the size of its first change.
+    sizes: [f64; B],
+    /// The largest of these.
+    size: f64,
+    /// The largest residual at the start, in units of `sizes`.
+    at_first: f64,
+    /// The largest coefficient of the matrix: where the flux through a cell in a step is large, round-off alone leaves
+    /// residuals above the tolerance.
+    stiffest: f64,
+}
+
+impl<const B: usize> Scale<B> {
+    fn of(u: &[[f64; B]]) -> Self {
+        let sizes = largest_of(u);
+        let size = sizes.into_iter().fold(f64::MIN_POSITIVE, larger);
+        Self { sizes, size, at_first: f64::INFINITY, stiffest: 1.0 }
+    }
+
+    fn begin(&mut self, largest: [f64; B]) {
+        self.size = largest.into_iter().fold(self.size, larger);
+        self.sizes = std::array::from_fn(|c| larger(self.sizes[c], largest[c]).max(f64::EPSILON * self.size));
+        self.at_first = self.overall(largest);
+    }
+
+    fn overall(&self, largest: [f64; B]) -> f64 {
+        (0..B).fold(0.0, |m, c| larger(m, largest[c] / self.sizes[c]))
+    }
+
+    fn rounding(&self) -> f64 {
+        ROUNDINGS * f64::EPSILON * self.stiffest
+    }
+
+    /// Residuals that are small enough, as this share of each unknown.
+    fn wanted(&self, share: f64) -> [f64; B] {
+        std::array::from_fn(|c| (share * self.sizes[c]).max(self.rounding() * self.size))
+    }
+
+    fn diverges(&self, largest: [f64; B]) -> bool {
+        self.overall(largest) > DIVERGED * self.at_first || !largest.iter().all(|r| r.is_finite())
+    }
+
+    /// What a linear solve may leave: Newton's method squares the residual, so that a much more accurate solve is wasted.
+    fn enough(&self, largest: [f64; B], tolerance: f64) -> [f64; B] {
+        let share = self.overall(largest).min(1.0);
+        std::array::from_fn(|c| {
+            let newton = (0.01 * largest[c] * share).max(0.1 * tolerance * self.sizes[c]);
+            newton.min(1e-3 * largest[c]).max(0.1 * self.rounding() * self.size)
+        })
+    }
+}
+
+/// The largest absolute value of each unknown.
+fn largest_of<const B: usize>(values: &[[f64; B]]) -> [f64; B] {
+    std::array::from_fn(|c| values.iter().fold(0.0, |m, value| larger(m, value[c])))
+}

@@ -1,0 +1,189 @@
+//! Steps in time.
+
+use super::newton::Solved;
+use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Stepper, settle, sides, stretched};
+use crate::error::Failure;
+use crate::geometry::{Cells, DualCells, Mesh, diagonal, padded};
+use crate::numerics::linear::LinearSolver;
+use crate::physics::{Motion, check_finite};
+use crate::work::Work;
+
+/// A mesh with what is measured of it, and the time at which nodes stand there.
+struct Level<'a, const B: usize, const D: usize, const S: usize> {
+    t: f64,
+    mesh: &'a Mesh<D>,
+    cells: DualCells<D>,
+    /// Positions, padded.
+    x: Vec<[f64; D]>,
+    excess: Option<Excess<B, D, S>>,
+}
+
+impl<'a, const B: usize, const D: usize, const S: usize> Level<'a, B, D, S>
+where
+    Mesh<D>: Cells<D>,
+    for<'b> Half<'b, D>: Around<D, S>,
+{
+    fn new<L: Law<B, D>>(law: &L, t: f64, mesh: &'a Mesh<D>, known: Option<DualCells<D>>) -> Self {
+        let shares = law.shares_mass();
+        Self {
+            t,
+            mesh,
+            cells: known.unwrap_or_else(|| law.cells(mesh)),
+            x: padded(mesh.lattice(), mesh.x(), diagonal(mesh.extent())),
+            excess: shares.contains(&true).then(|| Excess::of(mesh, shares)),
+        }
+    }
+
+    /// What faces sweep on the way to a later level, and how they are stretched by it.
+    fn ways(&self, later: &Self) -> [Vec<[f64; D]>; 2] {
+        let stretched = match self.excess {
+            Some(_) => stretched([&self.cells, &later.cells], [&self.x, &later.x]),
+            None => Vec::new(),
+        };
+        [self.cells.swept(&later.cells), stretched]
+    }
+
+    fn half<'b>(&'b self, dt: f64, [swept, stretched]: &'b [Vec<[f64; D]>; 2]) -> Half<'b, D> {
+        Half { dt, t: self.t, mesh: self.mesh, cells: &self.cells, x: &self.x, swept, stretched }
+    }
+
+    /// M u for each node.
+    fn mass(&self, u: &[[f64; B]]) -> Vec<[f64; B]> {
+        let of = |(i, k): (usize, usize)| {
+            let area = self.cells.areas()[i];
+            let more = self.excess.as_ref().map_or([0.0; B], |excess| excess.product(i, k, |n| u[n]));
+            std::array::from_fn(|c| area * u[k][c] + more[c])
+        };
+        self.cells.patch().places().enumerate().map(of).collect()
+    }
+}
+
+/// γ, the share of a step that the trapezoid does: with it both stages have the same matrix.
+const FIRST_STAGE: f64 = 2.0 - std::f64::consts::SQRT_2;
+
+impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
+    /// The solution on the new mesh, with one value for each node and unknown.
+    #[allow(private_bounds)] // what lies around a face is known here alone
+    pub fn step<const S: usize, L: Law<B, D>>(
+        &mut self,
+        law: &L,
+        motion: Motion<'_, D>,
+        start: &[[f64; B]],
+    ) -> Result<(Vec<[f64; B]>, Work), Failure>
+    where
+        Mesh<D>: Cells<D>,
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
+        let Motion { t, dt, old, new } = motion;
+        let known = self.newest.take().filter(|(mesh, _)| mesh == old).map(|(_, cells)| cells);
+        let (old, new) = (Level::new(law, t, old, known), Level::new(law, t + dt, new, None));
+        let u = padded(old.mesh.lattice(), start, [[0.0; B]; D]);
+        let (values, work) = match law.stepper() {
+            Stepper::Trapezoid => self.trapezoid(law, [&old, &new], u.clone()),
+            Stepper::TrBdf2 => self.tr_bdf2(law, [&old, &new], u),
+        }?;
+        self.newest = Some((new.mesh.clone(), new.cells));
+        Ok((values, work))
+    }
+
+    /// ½ of the fluxes at both ends of a step.
+    fn trapezoid<const S: usize, L: Law<B, D>>(
+        &mut self,
+        law: &L,
+        [old, new]: [&Level<'_, B, D, S>; 2],
+        u: Vec<[f64; B]>,
+    ) -> Result<(Vec<[f64; B]>, Work), Failure>
+    where
+        Mesh<D>: Cells<D>,
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
+        let (dt, ways) = (new.t - old.t, old.ways(new));
+        let known = old.half(dt, &ways).known(law, old.excess.as_ref(), &u)?;
+        self.implicit(law, new, &new.half(dt, &ways), &known, u)
+    }
+
+    /// The trapezoid over the share γ of a step, then the second backward difference formula over the rest
+    ///
+    /// ```text
+    /// M³u³ + (1−γ)/(2−γ) Δt (fluxes − A S)³ = a₂ M²u² − a₁ M¹u¹,   a₂ = 1/(γ(2−γ)),   a₁ = (1−γ)²/(γ(2−γ))
+    /// ```
+    ///
+    /// It damps what decays fast in a step, however fast that is. Faces sweep s₁₃ − a₂ s₁₂ in the second stage, so that
+    /// constants stay constant.
+    ///
+    /// # Source
+    /// Bank et al., *Transient simulation of silicon devices and circuits* (1985); Hosea and Shampine, *Analysis and
+    /// implementation of TR-BDF2* (1996).
+    fn tr_bdf2<const S: usize, L: Law<B, D>>(
+        &mut self,
+        law: &L,
+        [old, new]: [&Level<'_, B, D, S>; 2],
+        u: Vec<[f64; B]>,
+    ) -> Result<(Vec<[f64; B]>, Work), Failure>
+    where
+        Mesh<D>: Cells<D>,
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
+        let gamma = FIRST_STAGE;
+        let (dt, lattice) = (new.t - old.t, old.mesh.lattice());
+        let between = old.mesh.x().iter().zip(new.mesh.x());
+        let between = between.map(|(a, b)| std::array::from_fn(|d| a[d] + gamma * (b[d] - a[d])));
+        let mesh = old.mesh.moved(between.collect())?;
+        let middle = Level::new(law, old.t + gamma * dt, &mesh, None);
+        let (there, mut work) = self.trapezoid(law, [old, &middle], u.clone())?;
+        let there = padded(lattice, &there, [[0.0; B]; D]);
+
+        let scale = 1.0 / (gamma * (2.0 - gamma));
+        let (later, earlier) = (scale, scale * (1.0 - gamma) * (1.0 - gamma));
+        let mut known = middle.mass(&there);
+        for (known, start) in known.iter_mut().zip(old.mass(&u)) {
+            *known = std::array::from_fn(|c| later * known[c] - earlier * start[c]);
+        }
+        // half of these counts, as half of Δt does
+        let [whole, first] = [old.ways(new), old.ways(&middle)];
+        let mut ways = whole;
+        for (way, first) in ways.iter_mut().flatten().zip(first.iter().flatten()) {
+            (0..D).for_each(|d| way[d] = 2.0 * (way[d] - later * first[d]));
+        }
+        let half = new.half(2.0 * (1.0 - gamma) / (2.0 - gamma) * dt, &ways);
+        let (values, cost) = self.implicit(law, new, &half, &known, there)?;
+        work += cost;
+        Ok((values, work))
+    }
+
+    /// The solution at the end of a stage from what is `known` of its beginning and a guess.
+    fn implicit<const S: usize, L: Law<B, D>>(
+        &mut self,
+        law: &L,
+        level: &Level<'_, B, D, S>,
+        half: &Half<'_, D>,
+        known: &[[f64; B]],
+        mut u: Vec<[f64; B]>,
+    ) -> Result<(Vec<[f64; B]>, Work), Failure>
+    where
+        Mesh<D>: Cells<D>,
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
+        // given values are set from the start
+        let sides = sides(law, level.t, level.mesh);
+        for side in &sides {
+            for (u, given) in u[side.k].iter_mut().zip(side.given) {
+                *u = given.unwrap_or(*u);
+            }
+        }
+        let patch = level.cells.patch();
+        <Half<'_, D> as Around<D, S>>::repeat_sides(patch, &mut u);
+        let Solved { residual, work, stalled } =
+            self.newton(law, half, level.excess.as_ref(), known, &sides, &mut u)?;
+        let mut values: Vec<[f64; B]> = patch.places().map(|k| u[k]).collect();
+        // an unknown that is given nowhere has no flux through the sides
+        settle(&level.cells, &residual, &mut values, |c| sides.iter().all(|side| side.given[c].is_none()));
+        // of values that are not finite, that is what is wrong
+        check_finite(law.names(), level.mesh, &values)?;
+        stalled.map_or(Ok((values, work)), Err)
+    }
+}
