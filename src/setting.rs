@@ -106,7 +106,7 @@ pub(crate) fn fixed<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usi
 }
 
 /// A formula: text, or a number in its place.
-pub(crate) struct Text(String);
+pub(crate) struct Text(pub String);
 
 impl JsonSchema for Text {
     fn schema_name() -> Cow<'static, str> {

@@ -120,13 +120,15 @@ impl<const D: usize> Lattice<D> {
     /// # Ok::<(), driftmesh::Error>(())
     /// ```
     pub fn sides(&self) -> impl Iterator<Item = usize> + use<D> {
-        let (nodes, strides, len, periodic) = (self.nodes(), self.strides(), self.len(), self.periodic);
-        (0..D).filter(move |&d| !periodic[d]).flat_map(move |d| {
-            let block = strides[d] * nodes[d];
-            let ends = [0, strides[d] * (nodes[d] - 1)];
-            let runs = ends.into_iter().flat_map(move |end| (0..len / block).map(move |b| b * block + end));
-            runs.flat_map(move |start| start..start + strides[d])
-        })
+        let (lattice, periodic) = (*self, self.periodic);
+        (0..D).filter(move |&d| !periodic[d]).flat_map(move |d| (0..2).flat_map(move |end| lattice.side(d, end)))
+    }
+
+    /// Positions in memory of the nodes at the lower (0) or the upper (1) end of an axis.
+    pub fn side(&self, axis: usize, end: usize) -> impl Iterator<Item = usize> + use<D> {
+        let (n, s) = (self.nodes()[axis], self.strides()[axis]);
+        let first = end * s * (n - 1);
+        (0..self.len() / (s * n)).flat_map(move |block| (0..s).map(move |k| block * s * n + first + k))
     }
 
     /// Position in memory of a node.

@@ -224,7 +224,7 @@ impl Law<1> for Burgers {
         [false]
     }
 
-    fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; 1] {
+    fn side(&self, t: f64, x: [f64; 2], _beyond: [[bool; 2]; 2]) -> [Option<f64>; 1] {
         [self.side_value(t, x)]
     }
 }
@@ -241,7 +241,7 @@ impl Physics for Burgers {
         }
     }
 
-    fn side_values(&self, t: f64, x: [f64; 2]) -> Vec<Option<f64>> {
+    fn side_values(&self, t: f64, x: [f64; 2], _beyond: [[bool; 2]; 2]) -> Vec<Option<f64>> {
         vec![self.side_value(t, x)]
     }
 

@@ -40,8 +40,24 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn source(&self, _node: &Self::Node) -> Option<([f64; B], Block<B>)> {
         None
     }
-    /// The unknowns that are given on bounded sides; for the others the flux through the sides is zero.
-    fn side(&self, t: f64, x: [f64; D]) -> [Option<f64>; B];
+    /// The unknowns that are given at a place on bounded sides, those at the lower or the upper ends of some axes; for the
+    /// others there is a flux through the sides.
+    fn side(&self, t: f64, x: [f64; D], beyond: [[bool; 2]; D]) -> [Option<f64>; B];
+    /// The sides through which something flows that is not given there, as (axis, end).
+    fn open_sides(&self) -> &[(usize, usize)] {
+        &[]
+    }
+    /// What flows out of the domain at a node on an open side whose outward normal N is as long as the part of the side
+    /// that belongs to the node, and its derivative by the unknowns there.
+    fn leaving(
+        &self,
+        _side: (usize, usize),
+        _place: (f64, [f64; D]),
+        _node: (&Self::Node, &[f64; B]),
+        _normal: [f64; D],
+    ) -> ([f64; B], Block<B>) {
+        ([0.0; B], [[0.0; B]; B])
+    }
     /// The unknowns for which neighbours have a share in the mass of a node where cells grow ([`Excess`]); for the others
     /// it is A u alone. Diffusion must damp what overshoots by that.
     fn shares_mass(&self) -> [bool; B] {
@@ -168,7 +184,7 @@ fn sides<const B: usize, const D: usize, L: Law<B, D>>(law: &L, t: f64, mesh: &M
     let lattice = mesh.lattice();
     let strides = strides(lattice.nodes().map(|n| n + 2));
     let place = |i: usize| lattice.node(i).iter().zip(strides).map(|(i, s)| (i + 1) * s).sum();
-    let side = |i: usize| Side { i, k: place(i), given: law.side(t, mesh.image(mesh.x()[i])) };
+    let side = |i: usize| Side { i, k: place(i), given: law.side(t, mesh.image(mesh.x()[i]), lattice.beyond(i)) };
     lattice.sides().map(side).collect()
 }
 

@@ -3,10 +3,11 @@
 use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Stepper};
 use super::formula_pde::Formulas;
 use super::prescribed::evaluate;
+use super::sides::Open;
 use super::{Motion, Physics, nodal};
 use crate::error::{Failure, Result};
-use crate::formula::{Formula, Program};
-use crate::geometry::{Cells, DualCells, Field, Mesh, dot, strides};
+use crate::formula::Program;
+use crate::geometry::{Cells, DualCells, Field, Mesh, dot, length, strides};
 use crate::numerics::linear::{RobustLine, RobustTransport};
 use crate::numerics::sum;
 use crate::parallel;
@@ -18,7 +19,9 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     names: [String; B],
     nodal: Program<P, K>,
     initial: Program<D, B>,
-    boundary: [Option<Formula>; B],
+    /// For each unknown and the lower and the upper end of each axis.
+    sides: [[[Open; 2]; D]; B],
+    open: Vec<(usize, usize)>,
     /// The exact solution, for the unknowns that have one.
     exact: Vec<(usize, Program<D, 1>)>,
     has_source: bool,
@@ -39,8 +42,12 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
     const QUANTITIES: usize = D + 2;
 
     /// The equation of some formulas, integrated over dual cells.
-    pub fn new(formulas: Formulas, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper) -> Self {
-        let Formulas { names, nodal, initial, boundary, exact } = formulas;
+    pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper) -> Self {
+        let Formulas { names, nodal, initial, sides, exact } = formulas;
+        let flows = |&(d, end): &(usize, usize)| {
+            sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
+        };
+        let open = (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(flows).collect();
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
@@ -48,7 +55,8 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
             has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
             initial: Program::new(std::array::from_fn(|c| &initial[c])),
-            boundary: std::array::from_fn(|c| boundary[c].clone()),
+            sides: std::array::from_fn(|c| sides[c].clone()),
+            open,
             exact: exact.collect(),
             cells,
             stepper,
@@ -119,16 +127,23 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         Ok(())
     }
 
-    /// The values given at a place on a side.
-    fn given(&self, t: f64, x: [f64; D]) -> [Option<f64>; B] {
+    /// The values given at a place on some sides; in a corner those of the first axis count.
+    fn given(&self, t: f64, x: [f64; D], beyond: [[bool; 2]; D]) -> [Option<f64>; B] {
         let place: Vec<f64> = x.into_iter().chain([t]).collect();
-        std::array::from_fn(|c| Some(self.boundary[c].as_ref()?.eval(&place)))
+        std::array::from_fn(|c| {
+            let ends = (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(|&(d, end)| beyond[d][end]);
+            ends.into_iter().find_map(|(d, end)| match &self.sides[c][d][end] {
+                Open::Value(formula) => Some(formula.eval(&place)),
+                _ => None,
+            })
+        })
     }
 
     /// Refuses boundary values that are not finite.
     fn check_sides(&self, t: f64, mesh: &Mesh<D>) -> Result<(), Failure> {
         for k in mesh.lattice().sides() {
-            for (c, value) in self.given(t, mesh.image(mesh.x()[k])).into_iter().enumerate() {
+            let beyond = mesh.lattice().beyond(k);
+            for (c, value) in self.given(t, mesh.image(mesh.x()[k]), beyond).into_iter().enumerate() {
                 if let Some(value) = value.filter(|value| !value.is_finite()) {
                     return Err(self.failure(format!("`pde.boundary.{}`", self.names[c]), value, mesh, k, None));
                 }
@@ -208,8 +223,38 @@ where
         self.has_source.then_some((value, slope))
     }
 
-    fn side(&self, t: f64, x: [f64; D]) -> [Option<f64>; B] {
-        self.given(t, x)
+    fn side(&self, t: f64, x: [f64; D], beyond: [[bool; 2]; D]) -> [Option<f64>; B] {
+        self.given(t, x, beyond)
+    }
+
+    fn open_sides(&self) -> &[(usize, usize)] {
+        &self.open
+    }
+
+    fn leaving(
+        &self,
+        (axis, end): (usize, usize),
+        (t, x): (f64, [f64; D]),
+        (node, u): (&[f64; K], &[f64; B]),
+        normal: [f64; D],
+    ) -> ([f64; B], Block<B>) {
+        let size = length(normal);
+        let place: Vec<f64> = x.into_iter().chain(*u).chain([t]).collect();
+        let (mut value, mut by) = ([0.0; B], [[0.0; B]; B]);
+        for c in 0..B {
+            match &self.sides[c][axis][end] {
+                Open::Value(_) | Open::Closed => {}
+                Open::Outflow => {
+                    value[c] = dot(std::array::from_fn(|d| Self::value(node, d, c)), normal);
+                    by[c] = std::array::from_fn(|e| dot(std::array::from_fn(|d| Self::slope(node, d, c, e)), normal));
+                }
+                Open::Flux(flux) => {
+                    value[c] = -size * flux.value.eval(&place);
+                    by[c] = std::array::from_fn(|e| -size * flux.slopes[e].eval(&place));
+                }
+            }
+        }
+        (value, by)
     }
 
     fn shares_mass(&self) -> [bool; B] {
@@ -259,8 +304,8 @@ where
         Field::nodal(evaluate(&self.initial, t, mesh))
     }
 
-    fn side_values(&self, t: f64, x: [f64; D]) -> Vec<Option<f64>> {
-        self.given(t, x).to_vec()
+    fn side_values(&self, t: f64, x: [f64; D], beyond: [[bool; 2]; D]) -> Vec<Option<f64>> {
+        self.given(t, x, beyond).to_vec()
     }
 
     fn check(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Result<(), Failure> {

@@ -1,4 +1,5 @@
 use super::formula_law::FormulaLaw;
+use super::sides::{Condition, Conditions, Open};
 use super::{AXES, Physics, Stepper, formula, mistaken};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
@@ -17,8 +18,7 @@ use std::collections::BTreeMap;
 ///
 /// for every unknown u. F (`flux`, along x and along y), D ≥ 0 (`diffusivity`) and S (`source`) may contain all
 /// unknowns, and are 0 by default. `initial`, a formula of x and y (and t, the start time), is required for each
-/// unknown. On bounded sides `boundary` gives the value, a formula of x, y and t, or is `"no-flux"`, that is F·N − D
-/// ∇u·N = 0. `exact`, the solution if it is known, is used for the errors in a report: the largest and the root mean
+/// unknown. On bounded sides `boundary` gives a [`Condition`](super::Condition), for all of them or by side. `exact`, the solution if it is known, is used for the errors in a report: the largest and the root mean
 /// square error over the unknowns that have one.
 ///
 /// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and a [`Stepper`] in time, solved by Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
@@ -72,11 +72,11 @@ pub struct FormulaPde<const D: usize = 2> {
     #[serde(deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub initial: BTreeMap<String, String>,
-    /// Value of each unknown on bounded sides, a formula of x, y and t, or `"no-flux"`. Required unless both axes are
-    /// periodic.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
-    #[schemars(with = "BTreeMap<String, Text>")]
-    pub boundary: BTreeMap<String, String>,
+    /// What holds for each unknown on bounded sides: a value, a formula of x, y and t; `"no-flux"`; `"outflow"`, no normal
+    /// derivative; `{ flux = "…" }`, what flows into the domain, a formula of the unknowns, x, y and t. One for all sides,
+    /// or a table of them by side: `left`, `right`, `bottom`, `top`. Required unless all axes are periodic.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub boundary: BTreeMap<String, Conditions>,
     /// Exact solution of each unknown, a formula of x, y and t, if it is known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
@@ -87,19 +87,18 @@ pub struct FormulaPde<const D: usize = 2> {
 pub const MAX_UNKNOWNS: usize = 4;
 /// The same on a line.
 pub const MAX_UNKNOWNS_ON_A_LINE: usize = 8;
-/// The word in `boundary` that stands for a side without a flux.
-const NO_FLUX: &str = "no-flux";
 
 /// The formulas of a [`FormulaPde`], parsed.
-pub(super) struct Formulas {
+pub(super) struct Formulas<const D: usize> {
     pub names: Vec<String>,
     /// Formulas of x, y, the unknowns and t: F along x of all unknowns, then F along y, D and S; then the derivatives
     /// of all of these by the first unknown, by the second, and so on.
     pub nodal: Vec<Formula>,
     /// Formulas of x, y and t, as all that follow.
     pub initial: Vec<Formula>,
-    pub boundary: Vec<Option<Formula>>,
     pub exact: Vec<Option<Formula>>,
+    /// For each unknown and the lower and the upper end of each axis.
+    pub sides: Vec<[[Open; 2]; D]>,
 }
 
 impl<const D: usize> FormulaPde<D> {
@@ -127,7 +126,8 @@ impl<const D: usize> FormulaPde<D> {
                 };
                 Err(Error::invalid("boundary", format!("given for `{name}`"), rule))
             }
-            (false, _, None) | (_, None, _) => Ok(()),
+            (false, _, None) => Ok(()),
+            (_, None, _) => self.boundary.iter().try_for_each(|(name, conditions)| conditions.check(name, periodic)),
             (_, Some(name), _) => {
                 let rule = format!(
                     "a bounded axis has sides; add {name} = \"no-flux\" or a formula, or set domain.periodic to {:?}",
@@ -150,27 +150,29 @@ impl<const D: usize> FormulaPde<D> {
 
     /// The formulas of x, y and t alone, with their keys.
     pub fn formulas(&self) -> Vec<(String, &str)> {
-        let tables = [("initial", &self.initial), ("boundary", &self.boundary), ("exact", &self.exact)];
+        let tables = [("initial", &self.initial), ("exact", &self.exact)];
         let all = tables
             .into_iter()
             .flat_map(|(key, table)| table.iter().map(move |(name, text)| (format!("{key}.{name}"), text.as_str())));
-        all.filter(|(_, text)| *text != NO_FLUX).collect()
+        let sides = self.boundary.iter();
+        all.chain(sides.filter_map(|(name, conditions)| Some((format!("boundary.{name}"), conditions.value()?))))
+            .collect()
     }
 
     /// The initial value and the side value of each unknown, with their keys.
     pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
         let both = self.unknowns.iter().filter_map(|name| {
-            let (initial, boundary) = (self.initial.get(name)?, self.boundary.get(name)?);
-            Some([(format!("initial.{name}"), initial.as_str()), (format!("boundary.{name}"), boundary.as_str())])
+            let (initial, boundary) = (self.initial.get(name)?, self.boundary.get(name)?.value()?);
+            Some([(format!("initial.{name}"), initial.as_str()), (format!("boundary.{name}"), boundary)])
         });
-        both.filter(|[_, (_, side)]| *side != NO_FLUX).collect()
+        both.collect()
     }
 
     /// Reads all formulas.
     ///
     /// # Errors
     /// As [`FormulaPde::check`].
-    pub(super) fn read(&self) -> Result<Formulas> {
+    pub(super) fn read(&self) -> Result<Formulas<D>> {
         self.check_names()?;
         let names = &self.unknowns;
         let variables: Vec<&str> =
@@ -207,7 +209,6 @@ impl<const D: usize> FormulaPde<D> {
         let read = |table: &str, texts: &BTreeMap<String, String>| -> Result<Vec<Option<Formula>>> {
             let read = |name| match texts.get(name).map(String::as_str) {
                 None => Ok(None),
-                Some(NO_FLUX) if table == "boundary" => Ok(None),
                 Some(text) => formula::<D>(&format!("{table}.{name}"), text).map(Some),
             };
             names.iter().map(read).collect()
@@ -216,7 +217,9 @@ impl<const D: usize> FormulaPde<D> {
             names: names.clone(),
             nodal: all,
             initial: read("initial", &self.initial)?.into_iter().flatten().collect(),
-            boundary: read("boundary", &self.boundary).map_err(meant_no_flux)?,
+            sides: (names.iter())
+                .map(|name| self.boundary.get(name).unwrap_or(&Conditions::All(Condition::NoFlux)).read(name, names))
+                .collect::<Result<_>>()?,
             exact: read("exact", &self.exact)?,
         })
     }
@@ -321,19 +324,4 @@ impl FormulaPde<1> {
 
 fn no_flux<const D: usize>(fluxes: &Fluxes<D>) -> bool {
     fluxes.is_empty()
-}
-
-/// Adds a remedy where a formula for the sides looks like `"no-flux"` in another spelling.
-fn meant_no_flux(error: Error) -> Error {
-    match error {
-        Error::Formula { key, text, at, message, .. } if letters(&text) == letters(NO_FLUX) => {
-            let help = Some(format!("write \"{NO_FLUX}\""));
-            Error::Formula { key, text, at, message, help }
-        }
-        other => other,
-    }
-}
-
-fn letters(text: &str) -> String {
-    text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
 }

@@ -188,7 +188,7 @@ impl Law<1, 1> for LineBurgers {
         [false]
     }
 
-    fn side(&self, t: f64, x: [f64; 1]) -> [Option<f64>; 1] {
+    fn side(&self, t: f64, x: [f64; 1], _beyond: [[bool; 2]; 1]) -> [Option<f64>; 1] {
         [self.end(t, x)]
     }
 }
@@ -205,7 +205,7 @@ impl Physics<1> for LineBurgers {
         }
     }
 
-    fn side_values(&self, t: f64, x: [f64; 1]) -> Vec<Option<f64>> {
+    fn side_values(&self, t: f64, x: [f64; 1], _beyond: [[bool; 2]; 1]) -> Vec<Option<f64>> {
         vec![self.end(t, x)]
     }
 

@@ -8,6 +8,7 @@ mod formula_pde;
 mod line;
 mod prescribed;
 mod shallow_water;
+mod sides;
 mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
@@ -16,6 +17,7 @@ pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE};
 pub use line::{Coordinates, LineBurgers, LineFormulaPde, LinePdeKind};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
+pub use sides::{Condition, Conditions};
 pub use uniform::UniformBurgers;
 
 use crate::error::{Error, Failure, Result};
@@ -46,9 +48,11 @@ pub trait Physics<const D: usize = 2>: Send {
     /// The initial solution, at time t on a mesh.
     fn initial(&self, t: f64, mesh: &Mesh<D>) -> Field;
 
-    /// The value of each unknown at a point of a bounded side, if it is given there; empty if no unknown is given
-    /// anywhere.
-    fn side_values(&self, _t: f64, _x: [f64; D]) -> Vec<Option<f64>> {
+    /// The value of each unknown at a point at the lower or the upper ends of some axes ([`Lattice::beyond`]), if it is
+    /// given there; empty if no unknown is given anywhere.
+    ///
+    /// [`Lattice::beyond`]: crate::geometry::Lattice::beyond
+    fn side_values(&self, _t: f64, _x: [f64; D], _beyond: [[bool; 2]; D]) -> Vec<Option<f64>> {
         Vec::new()
     }
 

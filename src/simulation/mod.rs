@@ -143,7 +143,7 @@ where
         let (lattice, count) = (*state.mesh.lattice(), state.u.components());
         let mut differs = false;
         for k in lattice.sides() {
-            let values = self.physics.side_values(state.t, state.mesh.image(state.mesh.x()[k]));
+            let values = self.physics.side_values(state.t, state.mesh.image(state.mesh.x()[k]), lattice.beyond(k));
             for (c, value) in values.into_iter().enumerate() {
                 let u = &mut state.u.values_mut()[k * count + c];
                 let value = value.unwrap_or(*u);

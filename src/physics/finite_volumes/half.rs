@@ -150,6 +150,34 @@ impl<const D: usize> Half<'_, D> {
         face
     }
 
+    /// Opens the faces on the sides through which something flows.
+    pub(super) fn open<const B: usize, L: Law<B, D>>(
+        &self,
+        law: &L,
+        nodes: &[L::Node],
+        u: &[[f64; B]],
+        faces: &mut [[Face<B>; D]],
+    ) {
+        let (lattice, patch) = (self.mesh.lattice(), self.cells.patch());
+        let strides = patch.padded_strides();
+        for &(axis, end) in law.open_sides() {
+            for i in lattice.side(axis, end) {
+                let k: usize = lattice.node(i).iter().zip(strides).map(|(i, s)| (i + 1) * s).sum();
+                // a face is stored with the node below it, which beyond a lower side is one of the ring
+                let face = if end == 0 { k - strides[axis] } else { k };
+                let sign = if end == 0 { -1.0 } else { 1.0 };
+                let normal = self.cells.normals()[face][axis].map(|n| sign * n);
+                let place = (self.t, self.mesh.x()[i]);
+                let (leaving, by) = law.leaving((axis, end), place, (&nodes[k], &u[k]), normal);
+                let along = 0.5 * self.dt * sign;
+                let crossing = &mut faces[face][axis].crossing;
+                crossing.value = leaving.map(|flux| along * flux);
+                let by = by.map(|row| row.map(|slope| along * slope));
+                *(if end == 0 { &mut crossing.by_above } else { &mut crossing.by_below }) = by;
+            }
+        }
+    }
+
     /// From one place to another.
     #[inline(always)]
     pub(super) fn way(&self, i: usize, k: usize) -> [f64; D] {

@@ -12,6 +12,7 @@ impl Around<1, 3> for Half<'_, 1> {
             *face = [self.face(law, nodes, u, [k, k + 1], 0, 0.0, |_| 0.0)];
         }
         patch.wrap(&mut faces);
+        self.open(law, nodes, u, &mut faces);
         faces
     }
 

@@ -25,6 +25,7 @@ impl Around<2, 9> for Half<'_, 2> {
             }
         });
         patch.wrap(&mut faces);
+        self.open(law, nodes, u, &mut faces);
         faces
     }
 

@@ -28,8 +28,8 @@ impl Law<1> for Tight {
         Law::diffusivity(&self.0, a, b)
     }
 
-    fn side(&self, t: f64, x: [f64; 2]) -> [Option<f64>; 1] {
-        self.0.side(t, x)
+    fn side(&self, t: f64, x: [f64; 2], beyond: [[bool; 2]; 2]) -> [Option<f64>; 1] {
+        self.0.side(t, x, beyond)
     }
 }
 

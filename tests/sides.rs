@@ -1,0 +1,182 @@
+//! Conditions by side for equations given by formulas.
+
+use driftmesh::error::Error;
+use driftmesh::study::{Kind, MovingLine, MovingMesh, Source};
+
+const HEAD: &str = "[study]\nname = \"sides\"\nkind = \"moving-mesh\"\n";
+
+fn line(text: &str) -> driftmesh::study::MovingRun<1> {
+    let study = MovingLine::from_source(&Source::new("line.toml", format!("{HEAD}{text}"))).unwrap();
+    let (run, failure) = study.compute().unwrap();
+    assert!(failure.is_none(), "{failure:?}");
+    run
+}
+
+fn plane(text: &str) -> driftmesh::study::MovingRun {
+    let study = MovingMesh::from_source(&Source::new("plane.toml", format!("{HEAD}{text}"))).unwrap();
+    let (run, failure) = study.compute().unwrap();
+    assert!(failure.is_none(), "{failure:?}");
+    run
+}
+
+/// A reactor with Danckwerts' inlet and a closed outlet, u_t + 5 u_x = u_xx − 2u with 5u − u_x = 5 at x = 0 and 0 at x =
+/// 1: at rest u = A e^{px} + B e^{qx}, p and q = (5 ± √33)/2. The error is of order 2.
+#[test]
+fn an_inlet_is_second_order() {
+    let [p, q] = [1.0, -1.0].map(|sign| 0.5 * (5.0 + sign * 33.0_f64.sqrt()));
+    // rows of the two conditions on A and B
+    let [[a, b], [c, d]] = [[5.0 - p, 5.0 - q], [(5.0 - p) * p.exp(), (5.0 - q) * q.exp()]];
+    let determinant = a * d - b * c;
+    let (first, second) = (5.0 * d / determinant, -5.0 * c / determinant);
+    let error = |cells: usize| {
+        let run = line(&format!(
+            r#"
+            [grid]
+            cells = [{cells}]
+            [time]
+            start = 0.0
+            end = 12.0
+            [pde]
+            kind = "formula"
+            unknowns = ["u"]
+            flux = {{ u = ["5*u"] }}
+            diffusivity = {{ u = "1" }}
+            source = {{ u = "-2*u" }}
+            initial = {{ u = "0" }}
+            boundary = {{ u = {{ left = {{ flux = "5" }}, right = "no-flux" }} }}
+            "#
+        ));
+        let state = run.state.unwrap();
+        let pairs = state.mesh.x().iter().zip(state.u.component(0));
+        pairs.map(|([x], u)| (u - first * (p * x).exp() - second * (q * x).exp()).abs()).fold(0.0, f64::max)
+    };
+    let errors = [40, 80].map(error);
+    let order = (errors[0] / errors[1]).log2();
+    assert!(errors[0] < 5e-3 && (order - 2.0).abs() < 0.2, "{errors:?}, order {order:.2}");
+}
+
+/// u = 2 + sin(x − t) cos πy with values on the left, what flows in on the right, nothing through the bottom and free
+/// outflow at the top, on a mesh that is moved about: order 2 in cells and steps.
+#[test]
+fn every_condition_is_second_order_on_a_moving_mesh() {
+    let error = |cells: usize, step: f64| {
+        let run = plane(&format!(
+            r#"
+            [grid]
+            cells = [{cells}, {cells}]
+            [time]
+            start = 0.0
+            end = 0.4
+            step = {step}
+            [pde]
+            kind = "formula"
+            unknowns = ["u"]
+            flux = {{ u = ["u^2/4", "0.3*u*y"] }}
+            diffusivity = {{ u = "0.2" }}
+            initial = {{ u = "2 + sin(x)*cos(pi*y)" }}
+            exact = {{ u = "2 + sin(x - t)*cos(pi*y)" }}
+            [pde.source]
+            u = """(0.2*(1 + pi^2)*sin(x - t) - cos(x - t))*cos(pi*y)
+                + 0.5*(2 + sin(x - t)*cos(pi*y))*cos(x - t)*cos(pi*y)
+                + 0.3*(2 + sin(x - t)*cos(pi*y)) - 0.3*y*sin(x - t)*pi*sin(pi*y)"""
+            [pde.boundary.u]
+            left = "2 + sin(x - t)*cos(pi*y)"
+            right = {{ flux = "0.2*cos(x - t)*cos(pi*y) - u^2/4" }}
+            bottom = "no-flux"
+            top = "outflow"
+            [monitor]
+            kind = "given"
+            of = "1 + 0.7*sin(5*x + 3*y - 6*t)"
+            "#
+        ));
+        assert!(run.record.travelled > 0.01);
+        run.record.reports.last().unwrap().error.unwrap().linf
+    };
+    let errors = [error(12, 0.04), error(24, 0.02)];
+    let order = (errors[0] / errors[1]).log2();
+    assert!((1.7..2.6).contains(&order), "{errors:?}, order {order:.2}");
+}
+
+/// What flows in is what the content grows by, to round-off, with both steppers.
+#[test]
+fn the_content_grows_by_what_flows_in() {
+    for stepper in ["trapezoid", "tr-bdf2"] {
+        let run = plane(&format!(
+            r#"
+            [domain]
+            upper = [2.0, 0.5]
+            [grid]
+            cells = [20, 6]
+            [time]
+            start = 0.0
+            end = 0.5
+            stepper = "{stepper}"
+            [pde]
+            kind = "formula"
+            unknowns = ["u"]
+            diffusivity = {{ u = "0.02*(1 + u)" }}
+            initial = {{ u = "1 + tanh(20*(x - 1))" }}
+            [pde.boundary.u]
+            left = {{ flux = "3" }}
+            right = {{ flux = "-1" }}
+            bottom = "no-flux"
+            top = {{ flux = "0.25" }}
+            "#
+        ));
+        let report = run.record.reports.last().unwrap();
+        let start = report.conserved.mass / (1.0 + report.conserved.drift);
+        let flown = 0.5 * (3.0 * 0.5 - 0.5 + 0.25 * 2.0);
+        assert!((report.conserved.mass - start - flown).abs() < 1e-12, "{stepper}: {:?}, {start}", report.conserved);
+    }
+}
+
+/// A ball that radiates, −u_r = u⁴ − 1 at its surface, cools to 1, and what it loses has left through its surface.
+#[test]
+fn a_ball_radiates_until_it_is_as_warm_as_its_surroundings() {
+    let run = line(
+        r#"
+        [domain]
+        coordinates = "spherical"
+        [grid]
+        cells = [30]
+        [time]
+        start = 0.0
+        end = 6.0
+        [pde]
+        kind = "formula"
+        unknowns = ["u"]
+        diffusivity = { u = "1" }
+        initial = { u = "2" }
+        boundary = { u = { left = "no-flux", right = { flux = "1 - u^4" } } }
+        "#,
+    );
+    let state = run.state.unwrap();
+    assert!(state.u.component(0).all(|u| (u - 1.0).abs() < 1e-6), "{:?}", state.u);
+}
+
+/// Sides that are not there, left out, or misspelt are named with those that there are.
+#[test]
+fn sides_are_refused_by_name() {
+    let refused = |periodic: &str, boundary: &str| -> String {
+        let text = format!(
+            "{HEAD}[domain]\nperiodic = {periodic}\n[grid]\ncells = [8, 8]\n[time]\nstart = 0.0\nend = 1.0\n[pde]\n\
+             kind = \"formula\"\nunknowns = [\"u\"]\ninitial = {{ u = \"0\" }}\nboundary = {{ u = {boundary} }}\n"
+        );
+        match MovingMesh::from_source(&Source::new("plane.toml", text)) {
+            Err(Error::Study(diagnostic)) => diagnostic.to_string(),
+            other => panic!("{boundary}: {other:?}"),
+        }
+    };
+    for (periodic, boundary, said) in [
+        ("[false, true]", r#"{ left = "0", right = "1", top = "2" }"#, "the sides here are left, right"),
+        ("[false, false]", r#"{ left = "0", right = "1", top = "2" }"#, "add bottom = \"no-flux\""),
+        ("[false, false]", r#"{ lefft = "0" }"#, "did you mean `left`?"),
+        ("[false, false]", r#"{ flux = "2*w" }"#, "unknown name `w`"),
+        ("[false, false]", r#"{ flux = "2", left = "0" }"#, "unknown key `left`"),
+        ("[false, false]", r#""Out flow""#, "write \"outflow\""),
+        ("[false, false]", "[1, 2]", "\"no-flux\""),
+    ] {
+        let error = refused(periodic, boundary);
+        assert!(error.contains(said), "{boundary}: {error}");
+    }
+}
