@@ -131,7 +131,7 @@ fn two_unknowns_are_second_order_in_space() {
     assert_second_order("space", coarse, fine, 3.0);
 }
 
-/// 1e-9 takes four iterations at most in a step in which waves cross two cells, as it does where Newton's method
+/// 1e-9 takes eight iterations at most in the two stages of a step in which waves cross two cells, as it does where Newton's method
 /// converges quadratically, which is measured beside the Jacobian itself. With a transposed one it stalls.
 #[test]
 fn newton_takes_few_iterations() {
@@ -140,7 +140,7 @@ fn newton_takes_few_iterations() {
     let start = physics.initial(0.0, &old);
     let (_, work) = physics.step(Motion { t: 0.0, dt: 0.1, old: &old, new: &new }, &start).unwrap();
     println!("{} iterations", work.newton_iterations);
-    assert!((2..=4).contains(&work.newton_iterations), "{work:?}");
+    assert!((2..=8).contains(&work.newton_iterations), "{work:?}");
 }
 
 /// Σ A u and Σ A v hold to round-off in a box whose sides let nothing pass, on random meshes.
@@ -357,6 +357,7 @@ fn errors_are_those_of_the_unknowns_known() {
         "pde.initial.v=1",
         "pde.boundary.u=no-flux",
         "mesh.generator.kind=fixed",
+        "time.stepper=trapezoid",
     ];
     let with = |more: &[&str]| computed(&[&decay, more].concat()).unwrap().reports[0].error;
     assert!(with(&[]).is_none());

@@ -308,12 +308,12 @@ fn uniform_meshes() {
 }
 
 /// A bump carried across the box, against its exact solution: a fifteenth of what a mesh that stays leaves. As the bump
-/// spreads equal cells resolve it, and the mesh lets go of it: a fifth at the end.
+/// spreads equal cells resolve it, and the mesh lets go of it: a quarter at the end.
 #[test]
 fn advected_bump() {
     let [moving, still] = [vec![], vec!["mesh.generator={kind=\"fixed\"}"]]
         .map(|settings| rerun_set("advected-bump", &settings, &mut Node::default()));
-    for ((ours, theirs), share) in moving.figures.reports.iter().zip(&still.figures.reports).zip([0.08, 0.24]) {
+    for ((ours, theirs), share) in moving.figures.reports.iter().zip(&still.figures.reports).zip([0.06, 0.25]) {
         let [ours, theirs] = [ours, theirs].map(|report| report.error.unwrap());
         println!("{:.3e} {:.3e}, {:.3e} {:.3e}", ours.linf, theirs.linf, ours.l2, theirs.l2);
         assert!(ours.linf < share * theirs.linf && ours.l2 < share * theirs.l2, "{ours:?} {theirs:?}");
@@ -356,8 +356,8 @@ fn gray_scott() {
     let mut found = Substances { lowest: [f64::INFINITY; 2], highest: [f64::NEG_INFINITY; 2] };
     let summary = rerun_with("gray-scott", &mut found);
     println!("{:?} {:?}", found.lowest, found.highest);
-    assert!(found.lowest[0] > 0.1 && found.lowest[1] > -1e-5, "{:?}", found.lowest);
-    assert!(found.highest[0] < 1.0 + 1e-6 && (0.25..0.65).contains(&found.highest[1]), "{:?}", found.highest);
+    assert!(found.lowest[0] > 0.1 && found.lowest[1] > -1e-4, "{:?}", found.lowest);
+    assert!(found.highest[0] < 1.0 + 2e-4 && (0.25..0.65).contains(&found.highest[1]), "{:?}", found.highest);
     assert_eq!(summary.figures.work.steps, 100);
 
     let mut totals = Pair::default();

@@ -25,7 +25,8 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     /// The exact solution, for the unknowns that have one.
     exact: Vec<(usize, Program<D, 1>)>,
     has_source: bool,
-    diffuses: [bool; B],
+    /// The unknowns that diffuse, in Cartesian coordinates: cells along a radius have another mass.
+    shares: [bool; B],
     stepper: Stepper,
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
@@ -42,7 +43,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
     const QUANTITIES: usize = D + 2;
 
     /// The equation of some formulas, integrated over dual cells.
-    pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper) -> Self {
+    pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
         let Formulas { names, nodal, initial, sides, exact } = formulas;
         let flows = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
@@ -51,7 +52,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
-            diffuses: std::array::from_fn(|c| nodal[Self::DIFFUSIVITY * B + c].text() != "0"),
+            shares: std::array::from_fn(|c| cartesian && nodal[Self::DIFFUSIVITY * B + c].text() != "0"),
             has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
             initial: Program::new(std::array::from_fn(|c| &initial[c])),
@@ -258,7 +259,7 @@ where
     }
 
     fn shares_mass(&self) -> [bool; B] {
-        self.diffuses
+        self.shares
     }
 
     fn stepper(&self) -> Stepper {

@@ -1,9 +1,9 @@
 use super::formula_law::FormulaLaw;
 use super::sides::{Condition, Conditions, Open};
-use super::{AXES, Physics, Stepper, formula, mistaken};
+use super::{AXES, Coordinates, Physics, Stepper, formula, mistaken};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::geometry::{DualCells, Mesh};
+use crate::geometry::DualCells;
 use crate::numerics::linear::{RobustLine, RobustTransport};
 use crate::setting::{Fluxes, Text, texts};
 use schemars::JsonSchema;
@@ -289,35 +289,32 @@ impl FormulaPde {
         let formulas = self.read()?;
         type Plane<const B: usize, const P: usize, const K: usize> = FormulaLaw<2, B, P, K, RobustTransport<B>>;
         Ok(match formulas.names.len() {
-            1 => Box::new(Plane::<1, 3, 8>::new(formulas, DualCells::new, stepper)),
-            2 => Box::new(Plane::<2, 4, 24>::new(formulas, DualCells::new, stepper)),
-            3 => Box::new(Plane::<3, 5, 48>::new(formulas, DualCells::new, stepper)),
-            _ => Box::new(Plane::<4, 6, 80>::new(formulas, DualCells::new, stepper)),
+            1 => Box::new(Plane::<1, 3, 8>::new(formulas, DualCells::new, stepper, true)),
+            2 => Box::new(Plane::<2, 4, 24>::new(formulas, DualCells::new, stepper, true)),
+            3 => Box::new(Plane::<3, 5, 48>::new(formulas, DualCells::new, stepper, true)),
+            _ => Box::new(Plane::<4, 6, 80>::new(formulas, DualCells::new, stepper, true)),
         })
     }
 }
 
 impl FormulaPde<1> {
-    /// The equation on a line, integrated over dual cells that `cells` gives, ready to step.
+    /// The equation on a line in these coordinates, ready to step.
     ///
     /// # Errors
     /// As [`FormulaPde::check`].
-    pub fn into_physics_on_a_line(
-        self,
-        cells: fn(&Mesh<1>) -> DualCells<1>,
-        stepper: Stepper,
-    ) -> Result<Box<dyn Physics<1>>> {
+    pub fn into_physics_on_a_line(self, coordinates: Coordinates, stepper: Stepper) -> Result<Box<dyn Physics<1>>> {
         let formulas = self.read()?;
+        let cells = coordinates.dual_cells();
         type Line<const B: usize, const P: usize, const K: usize> = FormulaLaw<1, B, P, K, RobustLine>;
         Ok(match formulas.names.len() {
-            1 => Box::new(Line::<1, 2, 6>::new(formulas, cells, stepper)),
-            2 => Box::new(Line::<2, 3, 18>::new(formulas, cells, stepper)),
-            3 => Box::new(Line::<3, 4, 36>::new(formulas, cells, stepper)),
-            4 => Box::new(Line::<4, 5, 60>::new(formulas, cells, stepper)),
-            5 => Box::new(Line::<5, 6, 90>::new(formulas, cells, stepper)),
-            6 => Box::new(Line::<6, 7, 126>::new(formulas, cells, stepper)),
-            7 => Box::new(Line::<7, 8, 168>::new(formulas, cells, stepper)),
-            _ => Box::new(Line::<8, 9, 216>::new(formulas, cells, stepper)),
+            1 => Box::new(Line::<1, 2, 6>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
+            2 => Box::new(Line::<2, 3, 18>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
+            3 => Box::new(Line::<3, 4, 36>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
+            4 => Box::new(Line::<4, 5, 60>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
+            5 => Box::new(Line::<5, 6, 90>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
+            6 => Box::new(Line::<6, 7, 126>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
+            7 => Box::new(Line::<7, 8, 168>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
+            _ => Box::new(Line::<8, 9, 216>::new(formulas, cells, stepper, coordinates == Coordinates::Cartesian)),
         })
     }
 }

@@ -72,7 +72,7 @@ impl LinePdeKind {
             Self::LineBurgers(burgers) => Box::new(burgers.compiled()?),
             Self::LineFormulaPde(pde) => {
                 let stepper = stepper.unwrap_or(pde.stepper());
-                pde.into_physics_on_a_line(coordinates.dual_cells(), stepper)?
+                pde.into_physics_on_a_line(coordinates, stepper)?
             }
             Self::Prescribed(prescribed) => Box::new(prescribed.field::<1>()?),
         })

@@ -49,7 +49,7 @@ fn newton_converges_quadratically() {
     )
     .unwrap();
     let law: FormulaLaw<2, 2, 4, 24, RobustTransport<2>> =
-        FormulaLaw::new(pde.read().unwrap(), DualCells::new, Stepper::Trapezoid);
+        FormulaLaw::new(pde.read().unwrap(), DualCells::new, Stepper::Trapezoid, true);
     let square = Mesh::uniform(Lattice::bounded([9, 8]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
     let mesh = |t: f64| {
         let bent = |x: f64, y: f64| x + 0.07 * (std::f64::consts::TAU * x).sin() * (5.0 * y + 3.0 * t).cos();
