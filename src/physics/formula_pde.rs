@@ -31,14 +31,14 @@ use std::collections::BTreeMap;
 ///
 /// # Example
 /// ```
-/// use driftmesh::{geometry::{Lattice, Mesh}, physics::{FormulaPde, Motion}};
+/// use driftmesh::{geometry::{Lattice, Mesh}, physics::{FormulaPde, Motion, Stepper}};
 /// // u decays and v gains what u loses
 /// let pde: FormulaPde = toml::from_str(r#"
 ///     unknowns = ["u", "v"]
 ///     source = { u = "-u", v = "u" }
 ///     initial = { u = "1", v = "0" }
 /// "#)?;
-/// let mut physics = pde.into_physics()?;
+/// let mut physics = pde.stepped(Stepper::Trapezoid)?;
 /// let mesh = Mesh::uniform(Lattice::new([4, 4], [true; 2])?, [0.0; 2], [1.0; 2])?;
 /// let start = physics.initial(0.0, &mesh);
 /// let (end, _) = physics.step(Motion { t: 0.0, dt: 0.2, old: &mesh, new: &mesh }, &start)?;
