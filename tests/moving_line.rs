@@ -77,6 +77,15 @@ fn layers_form_and_merge() {
     }
 }
 
+/// On 120 cells the mesh does not get to the layers in time; what central fluxes make of that is said.
+#[test]
+fn what_overshoots_is_said() {
+    let run = run(&LAYERS.replace("[80]", "[120]").replace("end = 1.0", "end = 0.2").replace("[0.2, 0.6, 1.0]", "[]"));
+    let most = solution(&run).iter().fold(0.0_f64, |m, [_, u]| m.max(*u));
+    let said = run.record.warnings.iter().filter(|warning| warning.contains("`u` leaves the range of its data"));
+    assert_eq!((most > 1.5, said.count()), (true, 1), "{most}: {:?}", run.record.warnings);
+}
+
 /// The front of Burgers' equation, a hundredth as wide as a uniform cell, is followed to a few thousandths.
 #[test]
 fn the_front_is_followed() {

@@ -245,6 +245,10 @@ impl Physics for Burgers {
         vec![self.side_value(t, x)]
     }
 
+    fn keeps_range(&self) -> Vec<bool> {
+        vec![true]
+    }
+
     fn exact(&self, t: f64, mesh: &Mesh<2>) -> Option<Field> {
         self.given[0].is_none().then(|| self.on_mesh(t, mesh))
     }

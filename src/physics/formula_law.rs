@@ -28,6 +28,8 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     /// The unknowns that diffuse, in Cartesian coordinates: cells along a radius have another mass.
     shares: [bool; B],
     stepper: Stepper,
+    /// The unknowns that are only carried and diffused.
+    keeps_range: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
 }
@@ -48,6 +50,19 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         let flows = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
         };
+        let keeps_range = std::array::from_fn(|c| {
+            let fluxes = || (0..D).map(|d| &nodal[d * B + c]);
+            let flows = fluxes().any(|flux| flux.text() != "0");
+            // of the unknown alone, so that no place draws it together; else where the flux ends it would pile up
+            let own = fluxes().all(|flux| (0..P).all(|v| v == D + c || !flux.depends_on(v)));
+            let ends = |end: &Open| match end {
+                Open::Value(_) | Open::Outflow => true,
+                Open::Closed => !flows,
+                Open::Flux(_) => false,
+            };
+            let source = nodal[Self::SOURCE * B + c].text() != "0";
+            !source && own && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
+        });
         let open = (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(flows).collect();
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
@@ -61,6 +76,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
             exact: exact.collect(),
             cells,
             stepper,
+            keeps_range,
             volumes: FiniteVolumes::default(),
         }
     }
@@ -329,6 +345,10 @@ where
         let unknown = |exact| evaluate(exact, t, mesh).into_flattened();
         let known: Vec<Vec<f64>> = self.exact.iter().map(|(_, exact)| unknown(exact)).collect();
         (!known.is_empty()).then(|| Field::joined(&known).expect("each has one value a node"))
+    }
+
+    fn keeps_range(&self) -> Vec<bool> {
+        self.keeps_range.to_vec()
     }
 
     fn known(&self) -> Vec<usize> {

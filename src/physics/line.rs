@@ -209,6 +209,10 @@ impl Physics<1> for LineBurgers {
         vec![self.end(t, x)]
     }
 
+    fn keeps_range(&self) -> Vec<bool> {
+        vec![true]
+    }
+
     fn exact(&self, t: f64, mesh: &Mesh<1>) -> Option<Field> {
         self.given[0].is_none().then(|| Field::scalar(mesh.x().iter().map(|x| self.front(t, *x)).collect()))
     }

@@ -62,6 +62,12 @@ pub trait Physics<const D: usize = 2>: Send {
     /// A [`Failure`] where the step cannot be solved; [`Failure::NonFinite`] where its result is not finite.
     fn step(&mut self, motion: Motion<'_, D>, u: &Field) -> Result<(Field, Work), Failure>;
 
+    /// For each unknown, whether it never leaves the range of its initial and side values, since it is only carried and
+    /// diffused; empty if nothing is known.
+    fn keeps_range(&self) -> Vec<bool> {
+        Vec::new()
+    }
+
     /// Whether the solution is given for every time and place, so that nothing is carried from mesh to mesh.
     fn is_given(&self) -> bool {
         false

@@ -167,7 +167,7 @@ fn around<const D: usize>(lattice: &Lattice<D>, nodal: &[f64], cell: [usize; D])
 }
 
 /// A place in words: "x = 1.000000, y = 2.000000".
-fn named<const D: usize>(x: [f64; D]) -> String {
+pub(super) fn named<const D: usize>(x: [f64; D]) -> String {
     let words = ["x", "y", "z"].iter().zip(x).map(|(axis, x)| format!("{axis} = {x:.6}"));
     words.collect::<Vec<_>>().join(", ")
 }
@@ -182,7 +182,7 @@ fn remedy<const D: usize>(simulation: &Simulation<D>, state: &State<D>, nodal: &
 }
 
 /// The least and the largest.
-fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(super) fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(u), high.max(u)])
 }
 

@@ -31,6 +31,7 @@ use crate::meshing::{Interface, Movable};
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use crate::stopwatch::Stopwatch;
+use doubts::ends;
 use pace::Pace;
 use std::any::Any;
 use std::time::Instant;
@@ -214,6 +215,9 @@ where
             let report = self.report(state, mass_at_start, record.interface);
             record.reports.push(report);
         }
+        if record.data.is_empty() {
+            record.data = (0..state.u.components()).map(|c| ends(state.u.component(c))).collect();
+        }
         let mut pace = match course {
             Some(course) => course.pace,
             None => timed(&mut record.seconds.pde, || Pace::new(self, state))?,
@@ -238,6 +242,7 @@ where
             record.interface = next.interface;
             self.warn_of_noise(state, record);
             self.warn_of_unrest(state, dt, record);
+            self.warn_of_range(state, record);
             if self.schedule.reports_at(t) {
                 let report = self.report(state, mass_at_start, record.interface);
                 record.reports.push(report);

@@ -24,6 +24,8 @@ pub struct Record {
     pub interface: Option<Interface>,
     /// What the user should know although nothing failed.
     pub warnings: Vec<String>,
+    /// The least and the largest initial or side value of each unknown so far.
+    pub(crate) data: Vec<[f64; 2]>,
 }
 
 impl Record {

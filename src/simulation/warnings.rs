@@ -1,5 +1,6 @@
 //! What a run says once while it goes on: meshes that cannot rest, interface values that are noisy.
 
+use super::doubts::{ends, named};
 use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State};
 use crate::geometry::Mesh;
 use crate::meshing::{Movable, Relaxation};
@@ -10,6 +11,9 @@ const HARDLY_FOLLOWS: f64 = 2e3;
 const HASTY: &str = "`mesh.relaxation` is short";
 const RESTLESS: &str = "the mesh hardly follows its density any more";
 const NOISY: &str = "interface values are noisy";
+/// How far beyond its data an unknown may be, as a share of their range, before that is said.
+const BEYOND: f64 = 0.05;
+const LEAVES: &str = "leaves the range of its data";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
 impl<const D: usize> Simulation<D>
@@ -48,6 +52,38 @@ where
         record.warnings.push(format!(
             "{HASTY}: at t = {t} it is {steps:.1} time steps, and the mesh turns back from step to step; {limit}"
         ));
+    }
+
+    /// Says once of each unknown that it leaves the range of its data where the equation keeps it: where cells are too
+    /// wide for central fluxes.
+    pub(super) fn warn_of_range(&self, state: &State<D>, record: &mut Record) {
+        let keeps = self.physics.keeps_range();
+        if !keeps.contains(&true) {
+            return;
+        }
+        let (mesh, lattice) = (&state.mesh, state.mesh.lattice());
+        for k in lattice.sides() {
+            let values = self.physics.side_values(state.t, mesh.image(mesh.x()[k]), lattice.beyond(k));
+            for (data, value) in record.data.iter_mut().zip(values) {
+                *data = ends(data.iter().copied().chain(value));
+            }
+        }
+        for (c, name) in self.physics.unknowns().iter().enumerate().filter(|(c, _)| keeps[*c]) {
+            let [low, high] = record.data[c];
+            let off = |u: f64| (low - u).max(u - high);
+            let worst = state.u.component(c).enumerate().max_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+            let Some((k, u)) = worst.filter(|(_, u)| off(*u) > BEYOND * (high - low)) else { continue };
+            let said = format!("`{name}` {LEAVES}");
+            if !record.warnings.iter().any(|warning| warning.starts_with(&said)) {
+                record.warnings.push(format!(
+                    "{said}, {low:.4} to {high:.4}, which the equation keeps: it is {u:.4} at t = {}, {}; a layer there is \
+                     thinner than the cells, and central fluxes overshoot; refine `grid.cells`, or give shorter steps as \
+                     `time.step`, so that the mesh gets there in time",
+                    state.t,
+                    named(mesh.image(mesh.x()[k]))
+                ));
+            }
+        }
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.
