@@ -57,7 +57,8 @@ const LAYERS: &str = r#"
     boundary = { u = "0" }
 "#;
 
-/// Two layers of width 1e-4 that form out of smooth data and merge, on 80 cells: the mean error is below 2e-3, and the range that of the exact solution to half a per cent, in at most 4000 Newton iterations.
+/// Two layers of width 1e-4 that form out of smooth data and merge, on 80 cells: the mean error is below 2e-3, and the
+/// range that of the exact solution to half a per cent, in at most 4000 Newton iterations.
 #[test]
 fn layers_form_and_merge() {
     for (end, largest) in [(0.2, 1.367), (1.0, 0.7557)] {

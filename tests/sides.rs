@@ -19,8 +19,8 @@ fn plane(text: &str) -> driftmesh::study::MovingRun {
     run
 }
 
-/// A reactor with Danckwerts' inlet and a closed outlet, u_t + 5 u_x = u_xx − 2u with 5u − u_x = 5 at x = 0 and 0 at x =
-/// 1: at rest u = A e^{px} + B e^{qx}, p and q = (5 ± √33)/2. The error is of order 2.
+/// A reactor with Danckwerts' inlet and a closed outlet, u_t + 5 u_x = u_xx − 2u with 5u − u_x = 5 at x = 0 and 0 at
+/// x = 1: at rest u = A e^{px} + B e^{qx}, p and q = (5 ± √33)/2. The error is of order 2.
 #[test]
 fn an_inlet_is_second_order() {
     let [p, q] = [1.0, -1.0].map(|sign| 0.5 * (5.0 + sign * 33.0_f64.sqrt()));

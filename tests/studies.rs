@@ -349,8 +349,8 @@ impl Observer for Substances {
     }
 }
 
-/// Substances are never negative and u never exceeds its feed but for the wiggles of a central scheme, a ten-thousandth of
-/// the feed, and the spot lives on. Without feed and decay, what u loses v gains to round-off.
+/// Substances are never negative and u never exceeds its feed but for the wiggles of a central scheme, a ten-thousandth
+/// of the feed, and the spot lives on. Without feed and decay, what u loses v gains to round-off.
 #[test]
 fn gray_scott() {
     let mut found = Substances { lowest: [f64::INFINITY; 2], highest: [f64::NEG_INFINITY; 2] };

@@ -75,7 +75,8 @@ fn twice_area(([px, py], [qx, qy]): ([f64; 2], [f64; 2])) -> f64 {
     px * qy - py * qx
 }
 
-/// [`Cells::at_nodes`], in place from the last row on: row i of the nodes begins where row i of the cells does, or later.
+/// [`Cells::at_nodes`], in place from the last row on: row i of the nodes begins where row i of the cells does, or
+/// later.
 fn at_nodes(lattice: &Lattice<2>, mut rho: Vec<f64>) -> Vec<f64> {
     let ([n, m], [rows, columns], periodic) = (lattice.cells(), lattice.nodes(), lattice.periodic());
     // the cells on both sides of node i along an axis of n cells

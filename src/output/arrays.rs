@@ -3,8 +3,8 @@ use ndarray::{ArrayD, arr0};
 use ndarray_npy::{NpzWriter, WriteNpzError};
 use std::io::Cursor;
 
-/// A scene as the bytes of an `.npz` file: `x`, `y` and the numbers at the nodes of shape cells + 1, and `t`. Arrays of a
-/// line have one axis, and there is no `y`.
+/// A scene as the bytes of an `.npz` file: `x`, `y` and the numbers at the nodes of shape cells + 1, and `t`. Arrays of
+/// a line have one axis, and there is no `y`.
 pub fn final_arrays(scene: &Scene) -> Vec<u8> {
     let [n, m] = scene.cells.map(|n| n + 1);
     let shape = if m == 1 { vec![n] } else { vec![n, m] };

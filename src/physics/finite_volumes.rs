@@ -40,8 +40,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn source(&self, _node: &Self::Node) -> Option<([f64; B], Block<B>)> {
         None
     }
-    /// The unknowns that are given at a place on bounded sides, those at the lower or the upper ends of some axes; for the
-    /// others there is a flux through the sides.
+    /// The unknowns that are given at a place on bounded sides, those at the lower or the upper ends of some axes; for
+    /// the others there is a flux through the sides.
     fn side(&self, t: f64, x: [f64; D], beyond: [[bool; 2]; D]) -> [Option<f64>; B];
     /// The sides through which something flows that is not given there, as (axis, end).
     fn open_sides(&self) -> &[(usize, usize)] {
@@ -58,8 +58,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     ) -> ([f64; B], Block<B>) {
         ([0.0; B], [[0.0; B]; B])
     }
-    /// The unknowns for which neighbours have a share in the mass of a node where cells grow ([`Excess`]); for the others
-    /// it is A u alone. Diffusion must damp what overshoots by that.
+    /// The unknowns for which neighbours have a share in the mass of a node where cells grow ([`Excess`]); for the
+    /// others it is A u alone. Diffusion must damp what overshoots by that.
     fn shares_mass(&self) -> [bool; B] {
         [true; B]
     }
@@ -79,8 +79,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
 /// How a law is stepped in time, implicitly and with the second order.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Stepper {
-    /// Half of the change at the start and half of that at the end of a step: Crank and Nicolson's. What decays within a
-    /// step swings about zero from step to step.
+    /// Half of the change at the start and half of that at the end of a step: Crank and Nicolson's. What decays within
+    /// a step swings about zero from step to step.
     #[default]
     Trapezoid,
     /// The trapezoid, then the second backward difference formula: what decays within a step is gone after it. Twice
@@ -108,10 +108,10 @@ pub(super) struct Crossing<const B: usize> {
 ///
 /// where the sum is over the faces of a dual cell, N is the normal of a face and t the vector along it from a to b, d =
 /// x_k − x_i, J = d·N, s is the area that the face sweeps between the meshes, and u_a and u_b are the means of the four
-/// nodes around its ends. On a line there is no t. What leaves a cell enters its neighbour, and a constant stays constant on any moving mesh.
-/// That is the trapezoid in time ([`Stepper`]), solved by Newton's method with the exact Jacobian. Where neighbours have a share
-/// in the mass ([`Law::shares_mass`]), A u and A S are M u and M S, and s (u_i + u_k)/2 is the mean of the product along
-/// the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition.
+/// nodes around its ends. On a line there is no t. What leaves a cell enters its neighbour, and a constant stays
+/// constant on any moving mesh. That is the trapezoid in time ([`Stepper`]), solved by Newton's method with the exact
+/// Jacobian. Where neighbours have a share in the mass ([`Law::shares_mass`]), A u and A S are M u and M S, and s (u_i
+/// + u_k)/2 is the mean of the product along the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition.
 #[derive(Debug, Clone)]
 pub(super) struct FiniteVolumes<const B: usize, const D: usize = 2, Solver = RobustTransport<B>> {
     solver: Solver,

@@ -13,8 +13,8 @@ use crate::numerics::sum;
 use crate::parallel;
 use crate::work::Work;
 
-/// B unknowns in D dimensions. P = D + B is the number of values that the formulas take at a node, K = (D + 2) B (B + 1)
-/// that of the values they give.
+/// B unknowns in D dimensions. P = D + B is the number of values that the formulas take at a node, K = (D + 2) B (B +
+/// 1) that of the values they give.
 pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, const K: usize, Solver> {
     names: [String; B],
     nodal: Program<P, K>,

@@ -18,10 +18,12 @@ use std::collections::BTreeMap;
 ///
 /// for every unknown u. F (`flux`, along x and along y), D ≥ 0 (`diffusivity`) and S (`source`) may contain all
 /// unknowns, and are 0 by default. `initial`, a formula of x and y (and t, the start time), is required for each
-/// unknown. On bounded sides `boundary` gives a [`Condition`](super::Condition), for all of them or by side. `exact`, the solution if it is known, is used for the errors in a report: the largest and the root mean
-/// square error over the unknowns that have one.
+/// unknown. On bounded sides `boundary` gives a [`Condition`](super::Condition), for all of them or by side. `exact`,
+/// the solution if it is known, is used for the errors in a report: the largest and the root mean square error over the
+/// unknowns that have one.
 ///
-/// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and a [`Stepper`] in time, solved by Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
+/// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and a [`Stepper`] in time, solved by
+/// Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
 /// of their values at the two nodes. Such central fluxes oscillate where the mesh does not resolve a front. Σ A u
 /// changes only by the flux through the sides and by S, on any moving mesh. A solution has one value for each node and
 /// unknown, in the order of `unknowns`.
@@ -72,9 +74,9 @@ pub struct FormulaPde<const D: usize = 2> {
     #[serde(deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub initial: BTreeMap<String, String>,
-    /// What holds for each unknown on bounded sides: a value, a formula of x, y and t; `"no-flux"`; `"outflow"`, no normal
-    /// derivative; `{ flux = "…" }`, what flows into the domain, a formula of the unknowns, x, y and t. One for all sides,
-    /// or a table of them by side: `left`, `right`, `bottom`, `top`. Required unless all axes are periodic.
+    /// What holds for each unknown on bounded sides: a value, a formula of x, y and t; `"no-flux"`; `"outflow"`, no
+    /// normal derivative; `{ flux = "…" }`, what flows into the domain, a formula of the unknowns, x, y and t. One for
+    /// all sides, or a table of them by side: `left`, `right`, `bottom`, `top`. Required unless all axes are periodic.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub boundary: BTreeMap<String, Conditions>,
     /// Exact solution of each unknown, a formula of x, y and t, if it is known.
@@ -138,8 +140,8 @@ impl<const D: usize> FormulaPde<D> {
         }
     }
 
-    /// How it is stepped where nothing is said: with [`Stepper::TrBdf2`] where something diffuses or has a source, which
-    /// may decay faster than any step is short.
+    /// How it is stepped where nothing is said: with [`Stepper::TrBdf2`] where something diffuses or has a source,
+    /// which may decay faster than any step is short.
     pub fn stepper(&self) -> Stepper {
         let given = |texts: &BTreeMap<String, String>| texts.values().any(|text| text != "0");
         match given(&self.diffusivity) || given(&self.source) {

@@ -17,8 +17,7 @@ kinds! {
     /// `[pde]` of a study in one dimension.
     LinePdeKind {
         "burgers" = LineBurgers: "u_t + u u_x = nu u_xx, a front with exact solution",
-        "formula" = LineFormulaPde: "(r^m u)_t + (r^m F)_r = (r^m D u_r)_r + r^m S, up to eight unknowns with F, D and S \
-                                     as formulas",
+        "formula" = LineFormulaPde: "u_t + F_x = (D u_x)_x + S, up to eight unknowns with F, D and S as formulas",
         "prescribed" = Prescribed: "no equation: the solution or the mesh density is a formula of x and t",
     }
 }
@@ -106,8 +105,8 @@ impl LinePdeKind {
 /// u_t + u u_x = ν u_xx,   exact   u = 1 / (1 + exp((x − t/2) / 2ν))
 /// ```
 ///
-/// ν > 0 (`viscosity`) sets the width of the front, about 9ν between u = .1 and .9. Initial values and those at the ends
-/// come from the exact solution, or from the formulas `initial` and `boundary`. The scheme is that of
+/// ν > 0 (`viscosity`) sets the width of the front, about 9ν between u = .1 and .9. Initial values and those at the
+/// ends come from the exact solution, or from the formulas `initial` and `boundary`. The scheme is that of
 /// [`Convection::Flux`](super::Convection::Flux) in the plane, with the flux ½ a b between the values a and b at two
 /// nodes.
 ///

@@ -2,6 +2,7 @@
 
 mod benefit;
 mod checkpoint;
+mod clock;
 mod control;
 mod coupling;
 mod doubts;
@@ -30,7 +31,7 @@ use crate::kept::Kept;
 use crate::meshing::{Interface, Movable};
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
-use crate::stopwatch::Stopwatch;
+use clock::Clock;
 use doubts::ends;
 use pace::Pace;
 use std::any::Any;
@@ -372,31 +373,6 @@ fn end_where_asked<const D: usize>(observers: &[&mut dyn Observer], state: &Stat
     match observers.iter().any(|observer| observer.interrupts()) {
         true => Err(Error::Interrupted(Moment { t: state.t, step: state.step })),
         false => Ok(()),
-    }
-}
-
-/// The time that a run takes, over all its parts.
-struct Clock {
-    all: Stopwatch,
-    /// Of the steps alone.
-    steps: Stopwatch,
-}
-
-impl Clock {
-    fn start(course: Option<&Course>, record: &Record) -> Self {
-        let before = course.map_or(0.0, |course| course.seconds);
-        let Seconds { wall, cpu, .. } = record.seconds;
-        Self { all: Stopwatch::start().after([wall, cpu]), steps: Stopwatch::start().after([before, 0.0]) }
-    }
-
-    fn seconds(&self) -> f64 {
-        self.steps.wall()
-    }
-
-    /// The record with the time up to now.
-    fn counted(&self, record: &Record) -> Record {
-        let [wall, cpu] = self.all.elapsed();
-        Record { seconds: Seconds { wall, cpu, ..record.seconds }, ..record.clone() }
     }
 }
 

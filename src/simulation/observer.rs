@@ -75,8 +75,8 @@ pub trait Observer {
     /// Whatever stops the observer from doing its work, such as a full disk.
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()>;
 
-    /// Called before the run, for every mesh on the way to the one that is adapted to the initial solution at time t. An
-    /// error ends the run.
+    /// Called before the run, for every mesh on the way to the one that is adapted to the initial solution at time t.
+    /// An error ends the run.
     ///
     /// # Errors
     /// Whatever stops the observer from doing its work.

@@ -272,8 +272,8 @@ impl Free {
 
     /// The time that τ is measured in after a step of length `dt`
     ///
-    /// A mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep faster:
-    /// it keeps to the time in which the solution changes as much at a fixed place.
+    /// A mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep
+    /// faster: it keeps to the time in which the solution changes as much at a fixed place.
     fn scale_after<const D: usize>(
         &self,
         simulation: &mut Simulation<D>,

@@ -201,8 +201,8 @@ where
         let place: Vec<String> = ["x", "y"].iter().zip(x).map(|(axis, x)| format!("{axis} = {x}")).collect();
         (gap > NOT_ROUNDING * size).then(|| {
             format!(
-                "`pde.{on_sides}` is not `pde.{at_start}` at the start: on the sides they differ by up to {gap:.1e}, at \
-                 {}",
+                "`pde.{on_sides}` is not `pde.{at_start}` at the start: on the sides they differ by up to {gap:.1e}, \
+                 at {}",
                 place.join(", ")
             )
         })

@@ -83,8 +83,8 @@ pub struct Domain<const D: usize = 2> {
     /// Axes that wrap around.
     #[serde(default = "bounded::<D>")]
     pub periodic: Axes<bool, D>,
-    /// The coordinate along a line: with `cylindrical` and `spherical` it is the distance r from an axis or a point, 0 or
-    /// more, and volumes have the weight r or r². In one dimension only; `cartesian` where nothing is said.
+    /// The coordinate along a line: with `cylindrical` and `spherical` it is the distance r from an axis or a point, 0
+    /// or more, and volumes have the weight r or r². In one dimension only; `cartesian` where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coordinates: Option<Coordinates>,
 }
@@ -134,8 +134,8 @@ pub struct Time {
     /// Times at which `summary.json` reports; the end where none are given.
     #[serde(default)]
     pub report: Vec<f64>,
-    /// How the equation is stepped. Where nothing is said, formulas with diffusion or a source by `tr-bdf2`, all else by
-    /// the trapezoid.
+    /// How the equation is stepped. Where nothing is said, formulas with diffusion or a source by `tr-bdf2`, all else
+    /// by the trapezoid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stepper: Option<Stepper>,
     /// Order in space of the stepper `rk4`, 2 or 4; 2 where nothing is said.
@@ -147,8 +147,8 @@ pub struct Time {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stepper {
-    /// Implicit, half of the change at the start and half of that at the end of a step. What decays within a step swings
-    /// about zero from step to step.
+    /// Implicit, half of the change at the start and half of that at the end of a step. What decays within a step
+    /// swings about zero from step to step.
     Trapezoid,
     /// Implicit, the trapezoid and then the second backward difference formula: what decays within a step is gone after
     /// it. For formulas.

@@ -16,8 +16,8 @@ use crate::numerics::linear::LatticeMatrix;
 /// with the lengths h of the cells on both sides of i. Without C a function that is linear around a node is integrated
 /// as if the node was in the middle of its dual cell, which is wrong by the first order of h₊ − h₋. With h_min = 0 this
 /// would be the mass matrix of linear elements, which overshoots at jumps; but only the differences of w h count, so
-/// that nothing need be added where cells are smallest or equal: in the layers that the mesh resolves. In the plane C is
-/// the product over both axes in each mesh cell. Its columns add up to 0, so that Σ A u stays what is conserved.
+/// that nothing need be added where cells are smallest or equal: in the layers that the mesh resolves. In the plane C
+/// is the product over both axes in each mesh cell. Its columns add up to 0, so that Σ A u stays what is conserved.
 ///
 /// # Source
 /// Strang and Fix, *An Analysis of the Finite Element Method* (1973), for the mass matrix.
@@ -156,7 +156,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Lattice, node_areas, padded};
 
-    /// On a line whose cells grow, M integrates x against the hat functions but for the same number at all nodes within:
+    /// On a line whose cells grow, M integrates x against the hat functions but for the same number at all nodes
+    /// within:
     /// ∫ x φ_i = A x_i + (h₊² − h₋²)/6. Columns of C add up to 0.
     #[test]
     fn linear_functions_have_their_mass() {

@@ -124,7 +124,8 @@ impl<const B: usize> Scale<B> {
         self.overall(largest) > DIVERGED * self.at_first || !largest.iter().all(|r| r.is_finite())
     }
 
-    /// What a linear solve may leave: Newton's method squares the residual, so that a much more accurate solve is wasted.
+    /// What a linear solve may leave: Newton's method squares the residual, so that a much more accurate solve is
+    /// wasted.
     fn enough(&self, largest: [f64; B], tolerance: f64) -> [f64; B] {
         let share = self.overall(largest).min(1.0);
         std::array::from_fn(|c| {

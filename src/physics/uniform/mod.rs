@@ -1,12 +1,12 @@
 //! An explicit solver on a uniform mesh, made as fast as is sensible, with which moving meshes are compared.
 
+mod band;
 mod stencil;
 
 use super::{Burgers, Convection, Motion, Physics, check_finite, nodal};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Field, Mesh};
 use crate::numerics::larger;
-use crate::parallel;
 use crate::work::Work;
 use stencil::Stencil;
 
@@ -274,144 +274,5 @@ impl<'a, const G: usize> Grid<'a, G> {
     /// Fills a whole row beyond an end with side values.
     fn fill_row(&self, t: f64, i: isize, row: &mut [f64]) {
         row.iter_mut().enumerate().for_each(|(k, u)| *u = self.given(t, [i, k as isize - G as isize]));
-    }
-
-    /// One substep of classical RK4 from `u` at t to `next`.
-    fn substep(&self, t: f64, dt: f64, u: &[f64], next: &mut [f64], scratch: &mut [f64]) {
-        let (w, m) = (self.width, self.size[0] as isize);
-        // rows beyond the ends at time t: indices 0 … G − 1 before the first row, G … 2G − 1 after the last one
-        let mut outside = vec![0.0; if self.periodic[0] { 0 } else { 2 * G * w }];
-        for (k, row) in outside.chunks_exact_mut(w).enumerate() {
-            self.fill_row(t, if k < G { k as isize - G as isize } else { m + (k - G) as isize }, row);
-        }
-        let by = [0.5 * dt, 0.5 * dt, dt, dt / 6.0].map(|s| self.stencil.scaled(s));
-        let stages = Stages { grid: self, t, dt, u, outside: &outside, by };
-        parallel::for_each_row_pair(next, self.band * w, scratch, 3 * Self::KEPT * w, |band, next, scratch| {
-            let first = band * self.band;
-            pulp::Arch::new().dispatch(Band { stages: &stages, first, next, scratch });
-        });
-    }
-
-    /// Takes a band of rows through all stages
-    ///
-    /// ```text
-    /// u₁ = u + Δt/2 R(u)   u₂ = u + Δt/2 R(u₁)   u₃ = u + Δt R(u₂)   next = (−u + u₁ + 2u₂ + u₃)/3 + Δt/6 R(u₃)
-    /// ```
-    ///
-    /// Each stage follows G rows behind the one before it, so that the rows that it reads are still in the cache.
-    #[inline(always)]
-    fn advance_band(&self, stages: &Stages<'_, G>, first: usize, next: &mut [f64], scratch: &mut [f64]) {
-        let (w, n, g) = (self.width, self.size[1], G as isize);
-        let (low, high) = (first as isize, (first + self.band).min(self.size[0]) as isize);
-        let (u1, rest) = scratch.split_at_mut(Self::KEPT * w);
-        let (u2, u3) = rest.split_at_mut(Self::KEPT * w);
-        let slot = |i: isize| i.rem_euclid(4 * g) as usize * w;
-        let &Stages { t, dt, .. } = stages;
-        let base = |i: isize| self.base(stages, i);
-        let outside = |i: isize| !self.periodic[0] && !(0..self.size[0] as isize).contains(&i);
-        let reached = |i: isize| self.periodic[0] || (-g..self.size[0] as isize + g).contains(&i);
-        for newest in low - 3 * g..high + 3 * g {
-            let i = newest;
-            if reached(i) {
-                let to = slot(i);
-                if outside(i) {
-                    self.fill_row(t + 0.5 * dt, i, &mut u1[to..][..w]);
-                } else {
-                    let u = &base(i)[G..][..n];
-                    stages.by[0].apply(|k| base(i + k), &mut u1[to + G..][..n], |j, r| u[j] + r);
-                    self.fill_ends(t + 0.5 * dt, i, &mut u1[to..][..w]);
-                }
-            }
-            let i = newest - g;
-            if i >= low - 2 * g && reached(i) {
-                let to = slot(i);
-                let from = &u1[to..][..w];
-                if outside(i) {
-                    u2[to..][..w].copy_from_slice(from);
-                } else {
-                    let u = &base(i)[G..][..n];
-                    stages.by[1].apply(|k| &u1[slot(i + k)..][..w], &mut u2[to + G..][..n], |j, r| u[j] + r);
-                    if self.periodic[1] {
-                        self.fill_ends(t, i, &mut u2[to..][..w]);
-                    } else {
-                        // its time is that of the stage before
-                        u2[to..][..G].copy_from_slice(&from[..G]);
-                        u2[to + G + n..][..G].copy_from_slice(&from[G + n..]);
-                    }
-                }
-            }
-            let i = newest - 2 * g;
-            if i >= low - g && reached(i) {
-                let to = slot(i);
-                if outside(i) {
-                    self.fill_row(t + dt, i, &mut u3[to..][..w]);
-                } else {
-                    let u = &base(i)[G..][..n];
-                    stages.by[2].apply(|k| &u2[slot(i + k)..][..w], &mut u3[to + G..][..n], |j, r| u[j] + r);
-                    self.fill_ends(t + dt, i, &mut u3[to..][..w]);
-                }
-            }
-            let i = newest - 3 * g;
-            if i >= low {
-                let to = &mut next[(i - low) as usize * w..][..w];
-                let u = &base(i)[G..][..n];
-                let [u1, u2, u3_ends] = [&*u1, &*u2, &*u3].map(|stage| &stage[slot(i)..][..w]);
-                let [u1, u2] = [u1, u2].map(|row| &row[G..][..n]);
-                stages.by[3].apply(
-                    |k| &u3[slot(i + k)..][..w],
-                    &mut to[G..][..n],
-                    |j, r| u2[j] + ((u1[j] - u[j]) + (u3_ends[G + j] - u2[j])) * (1.0 / 3.0) + r,
-                );
-                if self.periodic[1] {
-                    self.fill_ends(t, i, to);
-                } else {
-                    to[..G].copy_from_slice(&u3_ends[..G]);
-                    to[G + n..].copy_from_slice(&u3_ends[G + n..]);
-                }
-            }
-        }
-    }
-
-    /// Row i at the start of the substep.
-    #[inline(always)]
-    fn base<'s>(&self, stages: &Stages<'s, G>, i: isize) -> &'s [f64] {
-        let (w, m) = (self.width, self.size[0]);
-        if self.periodic[0] {
-            return &stages.u[i.rem_euclid(m as isize) as usize * w..][..w];
-        }
-        match usize::try_from(i) {
-            Ok(i) if i < m => &stages.u[i * w..][..w],
-            Ok(i) => &stages.outside[(G + i - m) * w..][..w],
-            Err(_) => &stages.outside[(i + G as isize) as usize * w..][..w],
-        }
-    }
-}
-
-/// What all bands of a substep have in common.
-struct Stages<'s, const G: usize> {
-    grid: &'s Grid<'s, G>,
-    t: f64,
-    dt: f64,
-    u: &'s [f64],
-    outside: &'s [f64],
-    /// R, multiplied by the length of each stage.
-    by: [Stencil<G>; 4],
-}
-
-/// A band as a task for [`pulp`], which compiles it once more for wider vectors and runs what the machine supports.
-/// Products and sums are not fused, so that the bits are the same on every machine.
-struct Band<'s, const G: usize> {
-    stages: &'s Stages<'s, G>,
-    first: usize,
-    next: &'s mut [f64],
-    scratch: &'s mut [f64],
-}
-
-impl<const G: usize> pulp::WithSimd for Band<'_, G> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        self.stages.grid.advance_band(self.stages, self.first, self.next, self.scratch);
     }
 }

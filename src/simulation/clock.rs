@@ -1,0 +1,28 @@
+use super::checkpoint::Course;
+use super::{Record, Seconds};
+use crate::stopwatch::Stopwatch;
+
+/// The time that a run takes, over all its parts.
+pub(super) struct Clock {
+    all: Stopwatch,
+    /// Of the steps alone.
+    steps: Stopwatch,
+}
+
+impl Clock {
+    pub fn start(course: Option<&Course>, record: &Record) -> Self {
+        let before = course.map_or(0.0, |course| course.seconds);
+        let Seconds { wall, cpu, .. } = record.seconds;
+        Self { all: Stopwatch::start().after([wall, cpu]), steps: Stopwatch::start().after([before, 0.0]) }
+    }
+
+    pub fn seconds(&self) -> f64 {
+        self.steps.wall()
+    }
+
+    /// The record with the time up to now.
+    pub fn counted(&self, record: &Record) -> Record {
+        let [wall, cpu] = self.all.elapsed();
+        Record { seconds: Seconds { wall, cpu, ..record.seconds }, ..record.clone() }
+    }
+}
