@@ -132,7 +132,8 @@ fn two_unknowns_are_second_order_in_space() {
 }
 
 /// 1e-9 takes eight iterations at most in the two stages of a step in which waves cross two cells, as it does where
-/// Newton's method converges quadratically, which is measured beside the Jacobian itself. With a transposed one it stalls.
+/// Newton's method converges quadratically, which is measured beside the Jacobian itself. With a transposed one it
+/// stalls.
 #[test]
 fn newton_takes_few_iterations() {
     let [old, new] = [0.0, 0.1].map(|t| distorted(16, t));
