@@ -57,31 +57,36 @@ const LAYERS: &str = r#"
     boundary = { u = "0" }
 "#;
 
-/// Two layers of width 1e-4 that form out of smooth data and merge, on 80 cells: the mean error is below 2e-3, and the
-/// range that of the exact solution to half a per cent, in at most 4000 Newton iterations.
+/// Two layers of width 1e-4 that form out of smooth data and merge, on 80 and 120 cells: the mean error is below 2e-3 at
+/// first and 1e-3 at the end, and the range that of the exact solution to half a per cent, in at most 5000 Newton
+/// iterations.
 #[test]
 fn layers_form_and_merge() {
-    for (end, largest) in [(0.2, 1.367), (1.0, 0.7557)] {
-        let run = run(&LAYERS.replace("end = 1.0", &format!("end = {end}")).replace("[0.2, 0.6, 1.0]", "[]"));
-        let found = solution(&run);
-        let most = found.iter().fold(0.0_f64, |m, [_, u]| m.max(*u));
-        let exact = found.iter().map(|[x, _]| cole_hopf(1e-4, end, *x)).fold(0.0_f64, f64::max);
-        assert!((exact / largest - 1.0).abs() < 2e-3, "the exact solution has {exact}");
-        assert!((most / exact - 1.0).abs() < 5e-3, "t = {end}: {most} where it is {exact}");
-        let error = |w: &[[f64; 2]]| {
-            let [a, b] = [0, 1].map(|k| (w[k][1] - cole_hopf(1e-4, end, w[k][0])).abs());
-            0.5 * (a + b) * (w[1][0] - w[0][0])
-        };
-        let l1: f64 = found.windows(2).map(error).sum();
-        assert!(l1 < 2e-3, "t = {end}: {l1:e}");
-        assert!(run.record.work.work.newton_iterations <= 4000, "{:?}", run.record.work);
+    for cells in [80, 120] {
+        for (end, largest, allowed) in [(0.2, 1.367, 2e-3), (1.0, 0.7557, 1e-3)] {
+            let text = LAYERS.replace("[80]", &format!("[{cells}]")).replace("end = 1.0", &format!("end = {end:?}"));
+            let run = run(&text.replace("[0.2, 0.6, 1.0]", "[]"));
+            let found = solution(&run);
+            let most = found.iter().fold(0.0_f64, |m, [_, u]| m.max(*u));
+            let exact = found.iter().map(|[x, _]| cole_hopf(1e-4, end, *x)).fold(0.0_f64, f64::max);
+            assert!((exact / largest - 1.0).abs() < 2e-3, "the exact solution has {exact}");
+            assert!((most / exact - 1.0).abs() < 5e-3, "{cells} cells, t = {end}: {most} where it is {exact}");
+            let error = |w: &[[f64; 2]]| {
+                let [a, b] = [0, 1].map(|k| (w[k][1] - cole_hopf(1e-4, end, w[k][0])).abs());
+                0.5 * (a + b) * (w[1][0] - w[0][0])
+            };
+            let l1: f64 = found.windows(2).map(error).sum();
+            assert!(l1 < allowed, "{cells} cells, t = {end}: {l1:e}");
+            assert!(run.record.work.work.newton_iterations <= 5000, "{:?}", run.record.work);
+        }
     }
 }
 
-/// On 120 cells the mesh does not get to the layers in time; what central fluxes make of that is said.
+/// On a mesh that stays central fluxes overshoot where layers form, which is said.
 #[test]
 fn what_overshoots_is_said() {
-    let run = run(&LAYERS.replace("[80]", "[120]").replace("end = 1.0", "end = 0.2").replace("[0.2, 0.6, 1.0]", "[]"));
+    let text = LAYERS.replace("end = 1.0", "end = 0.2").replace("[0.2, 0.6, 1.0]", "[]");
+    let run = run(&format!("{text}[mesh]\ngenerator = {{ kind = \"fixed\" }}\n"));
     let most = solution(&run).iter().fold(0.0_f64, |m, [_, u]| m.max(*u));
     let said = run.record.warnings.iter().filter(|warning| warning.contains("`u` leaves the range of its data"));
     assert_eq!((most > 1.5, said.count()), (true, 1), "{most}: {:?}", run.record.warnings);
@@ -126,7 +131,7 @@ fn spheres_are_second_order_and_conserve() {
             boundary = {{ u = "no-flux" }}
             [monitor]
             kind = "given"
-            of = "1 + 0.8*sin(2*x - 3*t)"
+            of = "1 + 0.4*sin(2*x - 3*t)"
             "#
         ));
         let report = run.record.reports.last().unwrap();

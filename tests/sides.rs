@@ -50,9 +50,9 @@ fn an_inlet_is_second_order() {
         let pairs = state.mesh.x().iter().zip(state.u.component(0));
         pairs.map(|([x], u)| (u - first * (p * x).exp() - second * (q * x).exp()).abs()).fold(0.0, f64::max)
     };
-    let errors = [40, 80].map(error);
+    let errors = [80, 160].map(error);
     let order = (errors[0] / errors[1]).log2();
-    assert!(errors[0] < 5e-3 && (order - 2.0).abs() < 0.2, "{errors:?}, order {order:.2}");
+    assert!(errors[0] < 2e-3 && (order - 2.0).abs() < 0.2, "{errors:?}, order {order:.2}");
 }
 
 /// u = 2 + sin(x − t) cos πy with values on the left, what flows in on the right, nothing through the bottom and free
@@ -84,12 +84,14 @@ fn every_condition_is_second_order_on_a_moving_mesh() {
             right = {{ flux = "0.2*cos(x - t)*cos(pi*y) - u^2/4" }}
             bottom = "no-flux"
             top = "outflow"
+            [mesh]
+            relaxation = 0.05
             [monitor]
             kind = "given"
             of = "1 + 0.7*sin(5*x + 3*y - 6*t)"
             "#
         ));
-        assert!(run.record.travelled > 0.01);
+        assert!(run.record.travelled > 0.01, "{}", run.record.travelled);
         run.record.reports.last().unwrap().error.unwrap().linf
     };
     let errors = [error(12, 0.04), error(24, 0.02)];
@@ -117,15 +119,15 @@ fn the_content_grows_by_what_flows_in() {
             diffusivity = {{ u = "0.02*(1 + u)" }}
             initial = {{ u = "1 + tanh(20*(x - 1))" }}
             [pde.boundary.u]
-            left = {{ flux = "3" }}
-            right = {{ flux = "-1" }}
+            left = {{ flux = "0.3" }}
+            right = {{ flux = "-0.05" }}
             bottom = "no-flux"
-            top = {{ flux = "0.25" }}
+            top = {{ flux = "0" }}
             "#
         ));
         let report = run.record.reports.last().unwrap();
         let start = report.conserved.mass / (1.0 + report.conserved.drift);
-        let flown = 0.5 * (3.0 * 0.5 - 0.5 + 0.25 * 2.0);
+        let flown = 0.5 * (0.3 * 0.5 - 0.05 * 0.5);
         assert!((report.conserved.mass - start - flown).abs() < 1e-12, "{stepper}: {:?}, {start}", report.conserved);
     }
 }
@@ -163,7 +165,7 @@ fn sides_are_refused_by_name() {
              kind = \"formula\"\nunknowns = [\"u\"]\ninitial = {{ u = \"0\" }}\nboundary = {{ u = {boundary} }}\n"
         );
         match MovingMesh::from_source(&Source::new("plane.toml", text)) {
-            Err(Error::Study(diagnostic)) => diagnostic.to_string(),
+            Err(Error::Study(diagnostic)) => format!("{diagnostic}\n{}", diagnostic.help.clone().unwrap_or_default()),
             other => panic!("{boundary}: {other:?}"),
         }
     };

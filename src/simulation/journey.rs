@@ -13,6 +13,8 @@ const MOST: f64 = 3e-3;
 const OF_UNIFORM: f64 = 0.25;
 /// Likewise in each step, as a share of what the solution changes by itself.
 const OF_CHANGE: f64 = 0.2;
+/// The same where the mesh itself does not resolve the solution, as while a layer forms.
+const WHERE_UNRESOLVED: f64 = 1.0;
 /// Linear interpolation of a layer that changes by the share g of its range over a cell is off by this times g².
 const INTERPOLATION: f64 = 0.2;
 
@@ -67,8 +69,12 @@ where
             .zip(end.areas())
             .map(|(k, area)| (0..D).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
+        // what the mesh itself does not resolve does more harm than the way to where it does
+        let jumps = patch.places().flat_map(|k| strides.map(|s| u[k + s] - u[k]));
+        let unresolved = need(jumps.fold(0.0, larger) / range);
+        let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
-        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + OF_CHANGE * hurry * state.own_change * dt;
+        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + of_change * hurry * state.own_change * dt;
         if harm > budget {
             share = share.min(budget / harm);
         }

@@ -1,31 +1,148 @@
 //! What the settings of a moving mesh are made of in one dimension and in two.
 
-use super::moving_mesh::{Domain, Stepper, Time};
-use crate::error::{Error, Result};
+use super::kind::SpentBy;
+use super::moving_mesh::{Domain, MovingStudy, Stepper, Time};
+use super::moving_run::{MovingCheckpoint, MovingRun};
+use super::runner::Stage;
+use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Lattice, Mesh};
+use crate::kept::Kept;
 use crate::meshing::{GeneratorKind, LineGeneratorKind, MeshGenerator, Movable};
+use crate::output::RunDirectory;
 use crate::physics::{self, Coordinates, LinePdeKind, PdeKind, Physics, UniformBurgers};
+use crate::simulation::Scene;
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
+use std::path::Path;
 
-/// Meshes of which a study can be made.
+/// Meshes of which a study can be made
+///
+/// Its functions are those of [`Kind`](super::Kind) and [`Running`](super::Running). They are here because a generic
+/// function is compiled again in every crate that calls it: these are the doors behind which all is compiled once, with
+/// the library, for each number of dimensions.
 pub trait Studied<const D: usize>: Movable<D> + Clone + Debug {
     /// `[pde]`.
     type Pde: PdeTable<D>;
     /// `mesh.generator`.
     type Generator: GeneratorTable<D>;
+
+    /// [`Kind::resolve`](super::Kind::resolve).
+    ///
+    /// # Errors
+    /// As there.
+    fn resolve(study: &mut MovingStudy<D>) -> Result<()>
+    where
+        Mesh<D>: Studied<D>;
+
+    /// [`Kind::warnings`](super::Kind::warnings).
+    ///
+    /// # Errors
+    /// As there.
+    fn contradictions(study: &MovingStudy<D>) -> Result<Vec<String>>
+    where
+        Mesh<D>: Studied<D>;
+
+    /// [`Kind::try_start`](super::Kind::try_start).
+    ///
+    /// # Errors
+    /// As there.
+    fn try_start(study: &MovingStudy<D>) -> Result<()>
+    where
+        Mesh<D>: Studied<D>;
+
+    /// [`Kind::begin`](super::Kind::begin).
+    ///
+    /// # Errors
+    /// As there.
+    fn begin(study: &MovingStudy<D>) -> Result<MovingRun<D>>
+    where
+        Mesh<D>: Studied<D>;
+
+    /// [`Running::go`](super::Running::go).
+    ///
+    /// # Errors
+    /// As there.
+    fn go(run: &mut MovingRun<D>, stage: &mut Stage<'_>) -> Result<()>
+    where
+        Mesh<D>: Studied<D>;
+
+    /// [`Running::resume`](super::Running::resume).
+    ///
+    /// # Errors
+    /// As there.
+    fn take_up(
+        run: &mut MovingRun<D>,
+        found: MovingCheckpoint<D>,
+        directory: Option<&Path>,
+    ) -> Result<(SpentBy<MovingRun<D>>, Kept), Unfit>
+    where
+        Mesh<D>: Studied<D>;
+
+    /// [`Running::scenes`](super::Running::scenes).
+    ///
+    /// # Errors
+    /// As there.
+    fn scenes(run: &MovingRun<D>) -> Result<Vec<Scene>>
+    where
+        Mesh<D>: Studied<D>;
+
+    /// [`Running::leave`](super::Running::leave).
+    ///
+    /// # Errors
+    /// As there.
+    fn leave(run: &mut MovingRun<D>, directory: &RunDirectory) -> Result<()>
+    where
+        Mesh<D>: Studied<D>;
 }
 
-impl Studied<1> for Mesh<1> {
-    type Pde = LinePdeKind;
-    type Generator = LineGeneratorKind;
+macro_rules! studied {
+    ($D:literal, $Pde:ty, $Generator:ty) => {
+        impl Studied<$D> for Mesh<$D> {
+            type Pde = $Pde;
+            type Generator = $Generator;
+
+            fn resolve(study: &mut MovingStudy<$D>) -> Result<()> {
+                study.resolved()
+            }
+
+            fn contradictions(study: &MovingStudy<$D>) -> Result<Vec<String>> {
+                study.contradictions()
+            }
+
+            fn try_start(study: &MovingStudy<$D>) -> Result<()> {
+                study.tried()
+            }
+
+            fn begin(study: &MovingStudy<$D>) -> Result<MovingRun<$D>> {
+                MovingRun::of(study)
+            }
+
+            fn go(run: &mut MovingRun<$D>, stage: &mut Stage<'_>) -> Result<()> {
+                run.gone(stage)
+            }
+
+            fn take_up(
+                run: &mut MovingRun<$D>,
+                found: MovingCheckpoint<$D>,
+                directory: Option<&Path>,
+            ) -> Result<(SpentBy<MovingRun<$D>>, Kept), Unfit> {
+                run.taken_up(found, directory)
+            }
+
+            fn scenes(run: &MovingRun<$D>) -> Result<Vec<Scene>> {
+                run.last_scene()
+            }
+
+            fn leave(run: &mut MovingRun<$D>, directory: &RunDirectory) -> Result<()> {
+                run.left(directory)
+            }
+        }
+    };
 }
 
-impl Studied<2> for Mesh<2> {
-    type Pde = PdeKind;
-    type Generator = GeneratorKind;
-}
+studied!(1, LinePdeKind, LineGeneratorKind);
+studied!(2, PdeKind, GeneratorKind);
 
 /// Settings of a table of a study.
 pub trait Settings: Clone + Debug + Serialize + DeserializeOwned + JsonSchema {}

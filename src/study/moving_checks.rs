@@ -33,6 +33,32 @@ where
     }
 
     fn resolve(&mut self) -> Result<()> {
+        Mesh::resolve(self)
+    }
+
+    fn memory(&self) -> u128 {
+        self.grid.cells.iter().map(|&n| n as u128 + 1).product::<u128>() * BYTES_PER_NODE
+    }
+
+    fn warnings(&self) -> Result<Vec<String>> {
+        Mesh::contradictions(self)
+    }
+
+    fn try_start(&self) -> Result<()> {
+        Mesh::try_start(self)
+    }
+
+    fn begin(&self) -> Result<MovingRun<D>> {
+        Mesh::begin(self)
+    }
+}
+
+impl<const D: usize> MovingStudy<D>
+where
+    Mesh<D>: Studied<D>,
+{
+    /// Checks all settings and fills in what is left out.
+    pub(super) fn resolved(&mut self) -> Result<()> {
         self.study.check_name()?;
         self.pde.check().map_err(|error| error.within("pde"))?;
         self.pde.check_axes(&self.domain)?;
@@ -73,12 +99,8 @@ where
         self.output.check()
     }
 
-    fn memory(&self) -> u128 {
-        self.grid.cells.iter().map(|&n| n as u128 + 1).product::<u128>() * BYTES_PER_NODE
-    }
-
     /// Formulas that are not periodic on periodic axes, and those that contradict each other on a side.
-    fn warnings(&self) -> Result<Vec<String>> {
+    pub(super) fn contradictions(&self) -> Result<Vec<String>> {
         let mut warnings = Vec::new();
         for (key, text) in self.pde.formulas() {
             let f = formula::<D>(&key, text).map_err(|error| error.within("pde"))?;
@@ -92,19 +114,10 @@ where
     }
 
     /// On equal cells: adapting the mesh is part of the run.
-    fn try_start(&self) -> Result<()> {
+    pub(super) fn tried(&self) -> Result<()> {
         self.simulation()?.start(self.uniform_mesh()?).map(|_| ())
     }
 
-    fn begin(&self) -> Result<MovingRun<D>> {
-        MovingRun::of(self)
-    }
-}
-
-impl<const D: usize> MovingStudy<D>
-where
-    Mesh<D>: Studied<D>,
-{
     /// Refuses a stepper that the rest of the study does not go with, and fills in its order.
     fn check_stepper(&mut self) -> Result<()> {
         let rk4 = self.time.stepper == Some(Stepper::Rk4);

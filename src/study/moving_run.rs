@@ -109,20 +109,8 @@ where
         Ok(())
     }
 
-    fn spent(&self) -> SpentBy<Self> {
-        let Seconds { wall, cpu, monitor, interface, mesh, pde, output } = self.record.seconds;
-        Spent { wall, cpu, parts: MovingParts { monitor, interface, mesh, pde }, output }
-    }
-}
-
-impl<const D: usize> Running for MovingRun<D>
-where
-    Mesh<D>: Studied<D>,
-{
-    type Figures = MovingFigures;
-    type Checkpoint = MovingCheckpoint<D>;
-
-    fn go(&mut self, stage: &mut Stage<'_>) -> Result<()> {
+    /// Goes on to the end.
+    pub(super) fn gone(&mut self, stage: &mut Stage<'_>) -> Result<()> {
         let mut state = match self.state.take() {
             Some(state) => state,
             None => {
@@ -143,7 +131,8 @@ where
         })
     }
 
-    fn resume(
+    /// Takes up a checkpoint.
+    pub(super) fn taken_up(
         &mut self,
         MovingCheckpoint(found): MovingCheckpoint<D>,
         directory: Option<&Path>,
@@ -159,21 +148,51 @@ where
         Ok((self.spent(), kept))
     }
 
+    pub(super) fn last_scene(&self) -> Result<Vec<Scene>> {
+        let unknowns = self.simulation.physics.unknowns();
+        Ok(self.state.iter().map(|state| state.scene(&unknowns)).collect())
+    }
+
+    /// Leaves the history, and of a line arrays and a plot.
+    pub(super) fn left(&mut self, directory: &RunDirectory) -> Result<()> {
+        self.history.iter_mut().try_for_each(History::flush)?;
+        match self.last_scene()?.last().filter(|_| D == 1) {
+            Some(scene) => leave_line(&self.study.study.name, scene, directory),
+            None => Ok(()),
+        }
+    }
+
+    fn spent(&self) -> SpentBy<Self> {
+        let Seconds { wall, cpu, monitor, interface, mesh, pde, output } = self.record.seconds;
+        Spent { wall, cpu, parts: MovingParts { monitor, interface, mesh, pde }, output }
+    }
+}
+
+impl<const D: usize> Running for MovingRun<D>
+where
+    Mesh<D>: Studied<D>,
+{
+    type Figures = MovingFigures;
+    type Checkpoint = MovingCheckpoint<D>;
+
+    fn go(&mut self, stage: &mut Stage<'_>) -> Result<()> {
+        Mesh::go(self, stage)
+    }
+
+    fn resume(&mut self, found: MovingCheckpoint<D>, directory: Option<&Path>) -> Result<(SpentBy<Self>, Kept), Unfit> {
+        Mesh::take_up(self, found, directory)
+    }
+
     fn frames(&self) -> (FramesAt, [usize; 2]) {
         (self.study.frames(), self.study.mesh.generator.subdomains())
     }
 
     fn scenes(&self) -> Result<Vec<Scene>> {
-        let unknowns = self.simulation.physics.unknowns();
-        Ok(self.state.iter().map(|state| state.scene(&unknowns)).collect())
+        Mesh::scenes(self)
     }
 
     fn leave(&mut self, directory: &RunDirectory) -> Result<()> {
-        self.history.iter_mut().try_for_each(History::flush)?;
-        match self.scenes()?.last().filter(|_| D == 1) {
-            Some(scene) => leave_line(&self.study.study.name, scene, directory),
-            None => Ok(()),
-        }
+        Mesh::leave(self, directory)
     }
 
     fn tell(&self, summary: &mut Summary<MovingFigures>) {
