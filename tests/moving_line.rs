@@ -57,8 +57,8 @@ const LAYERS: &str = r#"
     boundary = { u = "0" }
 "#;
 
-/// Two layers of width 1e-4 that form out of smooth data and merge, on 80 and 120 cells: the mean error is below 2e-3 at
-/// first and 1e-3 at the end, and the range that of the exact solution to half a per cent, in at most 5000 Newton
+/// Two layers of width 1e-4 that form out of smooth data and merge, on 80 and 120 cells: the mean error is below 2e-3
+/// at first and 1e-3 at the end, and the range that of the exact solution to half a per cent, in at most 5000 Newton
 /// iterations.
 #[test]
 fn layers_form_and_merge() {
