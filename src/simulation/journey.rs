@@ -13,8 +13,11 @@ const MOST: f64 = 3e-3;
 const OF_UNIFORM: f64 = 0.25;
 /// Likewise in each step, as a share of what the solution changes by itself.
 const OF_CHANGE: f64 = 0.2;
-/// The same where the mesh itself does not resolve the solution, as while a layer forms.
-const WHERE_UNRESOLVED: f64 = 1.0;
+/// The same where the mesh itself does not resolve the solution, as while a layer forms: where an edge of the mesh holds
+/// more than the first of these shares of the range, and all of it from the second on. Layers that the mesh is at rest
+/// around have a third of the range on an edge where cells are few.
+const WHERE_UNRESOLVED: f64 = 0.5;
+const UNRESOLVED: [f64; 2] = [0.5, 0.7];
 /// Linear interpolation of a layer that changes by the share g of its range over a cell is off by this times g².
 const INTERPOLATION: f64 = 0.2;
 
@@ -71,7 +74,8 @@ where
         let harm = harms.fold(0.0, larger) / range;
         // what the mesh itself does not resolve does more harm than the way to where it does
         let jumps = patch.places().flat_map(|k| strides.map(|s| u[k + s] - u[k]));
-        let unresolved = need(jumps.fold(0.0, larger) / range);
+        let jump = jumps.fold(0.0, larger) / range;
+        let unresolved = ((jump - UNRESOLVED[0]) / (UNRESOLVED[1] - UNRESOLVED[0])).clamp(0.0, 1.0);
         let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
         let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + of_change * hurry * state.own_change * dt;
