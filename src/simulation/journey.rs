@@ -13,9 +13,9 @@ const MOST: f64 = 3e-3;
 const OF_UNIFORM: f64 = 0.25;
 /// Likewise in each step, as a share of what the solution changes by itself.
 const OF_CHANGE: f64 = 0.2;
-/// The same where the mesh itself does not resolve the solution, as while a layer forms: where an edge of the mesh holds
-/// more than the first of these shares of the range, and all of it from the second on. Layers that the mesh is at rest
-/// around have a third of the range on an edge where cells are few.
+/// The same where the mesh itself does not resolve the solution, as while a layer forms: where an edge of the mesh
+/// holds more than the first of these shares of the range, and all of it from the second on. Layers that the mesh is
+/// at rest around have a third of the range on an edge where cells are few.
 const WHERE_UNRESOLVED: f64 = 0.5;
 const UNRESOLVED: [f64; 2] = [0.5, 0.7];
 /// Linear interpolation of a layer that changes by the share g of its range over a cell is off by this times g².
