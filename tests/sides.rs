@@ -88,7 +88,7 @@ fn every_condition_is_second_order_on_a_moving_mesh() {
             relaxation = 0.05
             [monitor]
             kind = "given"
-            of = "1 + 0.7*sin(5*x + 3*y - 6*t)"
+            of = "1 + 0.3*sin(5*x + 3*y - 6*t)"
             "#
         ));
         assert!(run.record.travelled > 0.01, "{}", run.record.travelled);

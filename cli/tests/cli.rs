@@ -143,7 +143,9 @@ fn a_run_leaves_its_directory() {
     }
     // the resolved study is itself a study, and gives the same run
     let again = sandbox.call(&["run", "out/study.toml", "--out", "again", "--quiet"]);
-    assert!(again.status.success() && again.stdout.is_empty() && again.stderr.is_empty());
+    assert!(again.status.success() && again.stdout.is_empty(), "{}", words(&again));
+    // on so few cells central differences overshoot, which is said
+    assert!(words(&again).lines().all(|line| line.contains("leaves the range of its data")), "{}", words(&again));
     let bytes = |name: &str| std::fs::read(sandbox.path(name)).unwrap();
     assert_eq!(bytes("out/final.npz"), bytes("again/final.npz"));
 }
