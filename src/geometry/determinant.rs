@@ -40,11 +40,9 @@ mod tests {
     fn cofactors_invert_their_rows() {
         fn check<const D: usize>(m: [[f64; D]; D]) {
             let (found, determinant) = (cofactors(m), determinant(m));
-            for a in 0..D {
-                for b in 0..D {
-                    let product: f64 = (0..D).map(|d| found[d][a] * m[d][b]).sum();
-                    assert!((product - if a == b { determinant } else { 0.0 }).abs() < 1e-14, "{D} rows: {product}");
-                }
+            for (a, b) in (0..D).flat_map(|a| (0..D).map(move |b| (a, b))) {
+                let product: f64 = found.iter().zip(m).map(|(found, m)| found[a] * m[b]).sum();
+                assert!((product - if a == b { determinant } else { 0.0 }).abs() < 1e-14, "{D} rows: {product}");
             }
         }
         check([[3.0]]);

@@ -100,9 +100,7 @@ impl Conditions {
                 sides[d][end] = match condition {
                     None | Some(Condition::NoFlux) => Open::Closed,
                     Some(Condition::Outflow) => Open::Outflow,
-                    Some(Condition::Value(text)) => {
-                        Open::Value(formula::<D>(&key, text).map_err(|error| meant_a_word(error))?)
-                    }
+                    Some(Condition::Value(text)) => Open::Value(formula::<D>(&key, text).map_err(meant_a_word)?),
                     Some(Condition::Flux(text)) => Open::Flux(Flux::read::<D>(&format!("{key}.flux"), text, unknowns)?),
                 };
             }

@@ -244,7 +244,7 @@ where
     /// come to rest. Observers see the states in between.
     ///
     /// # Errors
-    /// [`Error::Failed`] where there is none, or what an observer returned.
+    /// [`Error::Failed`](crate::Error::Failed) where there is none, or what an observer returned.
     pub fn start(
         &self,
         simulation: &Simulation<D>,
@@ -278,7 +278,7 @@ where
     /// Equal cells.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the grid or the domain makes no mesh.
+    /// [`Error::Invalid`](crate::Error::Invalid) where the grid or the domain makes no mesh.
     pub fn uniform_mesh(&self) -> Result<Mesh<D>> {
         let lattice = Lattice::new(*self.grid.cells, *self.domain.periodic).map_err(|error| error.within("grid"))?;
         Mesh::uniform(lattice, *self.domain.lower, *self.domain.upper).map_err(|error| error.within("domain"))
@@ -287,7 +287,7 @@ where
     /// The simulation that this study describes.
     ///
     /// # Errors
-    /// [`Error::Invalid`] with the dotted key of a setting out of range.
+    /// [`Error::Invalid`](crate::Error::Invalid) with the dotted key of a setting out of range.
     pub fn simulation(&self) -> Result<Simulation<D>> {
         let physics = self.physics()?;
         let monitor = self.monitor().into_monitor(&physics.unknowns()).map_err(|error| error.within("monitor"))?;

@@ -181,12 +181,13 @@ mod tests {
         let square = Mesh::uniform(Lattice::new([6, 7], [false, true]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         let none = Excess::<1, 2, 9>::of(&square, [true]);
         assert!(none.matrix.rows.as_flattened().iter().all(|entry| entry.abs() < 1e-15));
-        let bent = square.x().iter().map(|&[x, y]| [x * x, y + 0.1 * (6.283 * y).sin() * x * (1.0 - x)]);
+        let bent =
+            square.x().iter().map(|&[x, y]| [x * x, y + 0.1 * (std::f64::consts::TAU * y).sin() * x * (1.0 - x)]);
         let mesh = square.moved(bent.collect()).unwrap();
         let excess = Excess::<1, 2, 9>::of(&mesh, [true]);
         let areas = node_areas(&mesh);
         for p in 0..mesh.x().len() {
-            let checkered = |k: usize| if (k / 7 + k % 7 + k * p) % 3 == 0 { 1.0 } else { -1.0 };
+            let checkered = |k: usize| if (k / 7 + k % 7 + k * p).is_multiple_of(3) { 1.0 } else { -1.0 };
             let u: Vec<[f64; 1]> = (0..mesh.x().len()).map(|k| [checkered(k)]).collect();
             let padded = padded(mesh.lattice(), &u, [[0.0]; 2]);
             let places: Vec<usize> = Patch { origin: [0; 2], size: [7, 7], wraps: [false, true] }.places().collect();
