@@ -101,11 +101,8 @@ impl<const D: usize> Simulation<D>
 where
     Mesh<D>: Movable<D>,
 {
-    /// The state at the start, on a given mesh.
-    ///
-    /// # Errors
-    /// [`Error::Failed`] where the mesh is folded or the initial solution has no finite density.
-    pub fn start(&self, mesh: Mesh<D>) -> Result<State<D>> {
+    /// See [`Simulation::start`].
+    pub(crate) fn started(&self, mesh: Mesh<D>) -> Result<State<D>> {
         let t = self.schedule.start();
         let at_start = |failure| self.at_start(failure);
         check_unfolded(&mesh).map_err(at_start)?;
@@ -121,17 +118,10 @@ where
         Ok(State { t, step: 0, mesh, u, rho, gait, own_change: 0.0 })
     }
 
-    /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
-    ///
-    /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more than a
-    /// small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
-    ///
-    /// # Errors
-    /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer
-    /// returned.
-    pub fn adapted(&self, mesh: Mesh<D>, observers: &mut [&mut dyn Observer]) -> Result<Start<D>> {
+    /// See [`Simulation::adapted`].
+    pub(crate) fn adapted_from(&self, mesh: Mesh<D>, observers: &mut [&mut dyn Observer]) -> Result<Start<D>> {
         mover::adapted(mesh, self.mover.equation.form, |mesh| {
-            let state = self.with_sides(self.start(mesh.clone())?)?;
+            let state = self.with_sides(self.started(mesh.clone())?)?;
             observers.iter_mut().try_for_each(|observer| observer.adapting(state.t))?;
             end_where_asked(observers, &state)?;
             let u = self.monitor.followed(state.t, &state.mesh, &state.u).map_err(|failure| self.at_start(failure))?;
@@ -171,13 +161,8 @@ where
         Error::Failed { failure, moment: Some(Moment { t: self.schedule.start(), step: 0 }) }
     }
 
-    /// Runs to the end of the schedule
-    ///
-    /// `state` advances step by step; after an error it is the last good one. `record` adds up what was done.
-    ///
-    /// # Errors
-    /// [`Error::Failed`] with the time and step of a numerical failure, or what an observer returned.
-    pub fn run(
+    /// See [`Simulation::run`].
+    pub(crate) fn ran(
         &mut self,
         state: &mut State<D>,
         record: &mut Record,
@@ -362,6 +347,51 @@ where
         }
     }
 }
+
+/// A generic function is compiled again in every crate that calls it: behind these, all is compiled once with the library.
+macro_rules! doors {
+    ($D:literal) => {
+        impl Simulation<$D> {
+            /// The state at the start, on a given mesh.
+            ///
+            /// # Errors
+            /// [`Error::Failed`] where the mesh is folded or the initial solution has no finite density.
+            pub fn start(&self, mesh: Mesh<$D>) -> Result<State<$D>> {
+                self.started(mesh)
+            }
+
+            /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
+            ///
+            /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more than a
+            /// small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
+            ///
+            /// # Errors
+            /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer
+            /// returned.
+            pub fn adapted(&self, mesh: Mesh<$D>, observers: &mut [&mut dyn Observer]) -> Result<Start<$D>> {
+                self.adapted_from(mesh, observers)
+            }
+
+            /// Runs to the end of the schedule
+            ///
+            /// `state` advances step by step; after an error it is the last good one. `record` adds up what was done.
+            ///
+            /// # Errors
+            /// [`Error::Failed`] with the time and step of a numerical failure, or what an observer returned.
+            pub fn run(
+                &mut self,
+                state: &mut State<$D>,
+                record: &mut Record,
+                observers: &mut [&mut dyn Observer],
+            ) -> Result<()> {
+                self.ran(state, record, observers)
+            }
+        }
+    };
+}
+
+doors!(1);
+doors!(2);
 
 /// A mesh of two dimensions as one; none of another.
 fn in_plane<const D: usize>(mesh: &Mesh<D>) -> Option<&Mesh<2>> {

@@ -115,7 +115,7 @@ where
 
     /// On equal cells: adapting the mesh is part of the run.
     pub(super) fn tried(&self) -> Result<()> {
-        self.simulation()?.start(self.uniform_mesh()?).map(|_| ())
+        self.simulation()?.started(self.uniform_mesh()?).map(|_| ())
     }
 
     /// Refuses a stepper that the rest of the study does not go with, and fills in its order.

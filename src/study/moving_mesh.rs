@@ -254,7 +254,7 @@ where
         record.timed(|record| {
             let mut mesh = self.uniform_mesh()?;
             if self.mesh.start == Some(StartMesh::Adapted) {
-                let start = timed(&mut record.seconds.mesh, || simulation.adapted(mesh, observers))?;
+                let start = timed(&mut record.seconds.mesh, || simulation.adapted_from(mesh, observers))?;
                 mesh = start.mesh;
                 let why = match start.end {
                     Ending::AtRest => None,
@@ -269,7 +269,7 @@ where
                 };
                 record.warnings.extend(why.map(|why| format!("`mesh.start`: {why}")));
             }
-            let state = simulation.start(mesh)?;
+            let state = simulation.started(mesh)?;
             record.warnings.extend(simulation.doubts(&state));
             Ok(state)
         })

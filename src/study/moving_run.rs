@@ -100,7 +100,7 @@ where
         frames.iter_mut().for_each(|frames| observers.push(frames));
         let mut simulation = reference.simulation()?;
         let mut state = reference.start(&simulation, &mut Record::default(), &mut observers)?;
-        simulation.run(&mut state, &mut Record::default(), &mut observers)?;
+        simulation.ran(&mut state, &mut Record::default(), &mut observers)?;
         for report in &mut self.record.reports {
             let at =
                 |meshes: &Meshes<D>| meshes.found.iter().find(|(t, _)| *t == report.t).map(|(_, mesh)| mesh.clone());
