@@ -348,7 +348,8 @@ where
     }
 }
 
-/// A generic function is compiled again in every crate that calls it: behind these, all is compiled once with the library.
+/// A generic function is compiled again in every crate that calls it: behind these, all is compiled once with the
+/// library.
 macro_rules! doors {
     ($D:literal) => {
         impl Simulation<$D> {
@@ -360,14 +361,15 @@ macro_rules! doors {
                 self.started(mesh)
             }
 
-            /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to rest
+            /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to
+            /// rest
             ///
-            /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more than a
-            /// small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
+            /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more
+            /// than a small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
             ///
             /// # Errors
-            /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an observer
-            /// returned.
+            /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an
+            /// observer returned.
             pub fn adapted(&self, mesh: Mesh<$D>, observers: &mut [&mut dyn Observer]) -> Result<Start<$D>> {
                 self.adapted_from(mesh, observers)
             }
