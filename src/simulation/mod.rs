@@ -5,6 +5,7 @@ mod checkpoint;
 mod clock;
 mod control;
 mod coupling;
+mod doors;
 mod doubts;
 mod journey;
 mod observer;
@@ -347,53 +348,6 @@ where
         }
     }
 }
-
-/// A generic function is compiled again in every crate that calls it: behind these, all is compiled once with the
-/// library.
-macro_rules! doors {
-    ($D:literal) => {
-        impl Simulation<$D> {
-            /// The state at the start, on a given mesh.
-            ///
-            /// # Errors
-            /// [`Error::Failed`] where the mesh is folded or the initial solution has no finite density.
-            pub fn start(&self, mesh: Mesh<$D>) -> Result<State<$D>> {
-                self.started(mesh)
-            }
-
-            /// The mesh that rests on the density of the initial solution, from a given mesh, and whether it came to
-            /// rest
-            ///
-            /// Steps of the mesh equation, each with the initial solution at the new nodes, until no node moves by more
-            /// than a small share of the shortest edge. Observers see each of them ([`Observer::adapting`]).
-            ///
-            /// # Errors
-            /// [`Error::Failed`] where the initial solution has no finite density or the mesh folds, or what an
-            /// observer returned.
-            pub fn adapted(&self, mesh: Mesh<$D>, observers: &mut [&mut dyn Observer]) -> Result<Start<$D>> {
-                self.adapted_from(mesh, observers)
-            }
-
-            /// Runs to the end of the schedule
-            ///
-            /// `state` advances step by step; after an error it is the last good one. `record` adds up what was done.
-            ///
-            /// # Errors
-            /// [`Error::Failed`] with the time and step of a numerical failure, or what an observer returned.
-            pub fn run(
-                &mut self,
-                state: &mut State<$D>,
-                record: &mut Record,
-                observers: &mut [&mut dyn Observer],
-            ) -> Result<()> {
-                self.ran(state, record, observers)
-            }
-        }
-    };
-}
-
-doors!(1);
-doors!(2);
 
 /// A mesh of two dimensions as one; none of another.
 fn in_plane<const D: usize>(mesh: &Mesh<D>) -> Option<&Mesh<2>> {

@@ -9,7 +9,7 @@ use crate::geometry::{Lattice, Mesh};
 use crate::kept::Kept;
 use crate::meshing::{GeneratorKind, LineGeneratorKind, MeshGenerator, Movable};
 use crate::output::RunDirectory;
-use crate::physics::{self, Coordinates, LinePdeKind, PdeKind, Physics, UniformBurgers};
+use crate::physics::{self, LinePdeKind, PdeKind, Physics, UniformBurgers};
 use crate::simulation::Scene;
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
@@ -210,7 +210,7 @@ impl From<physics::Stepper> for Stepper {
 }
 
 /// Refuses a stepper that is not the one that an equation has.
-fn check_stepper(stepper: Option<Stepper>, own: Option<Stepper>) -> Result<()> {
+pub(super) fn check_stepper(stepper: Option<Stepper>, own: Option<Stepper>) -> Result<()> {
     let (name, rule) = match stepper {
         None => return Ok(()),
         Some(given) if own == Some(given) => return Ok(()),
@@ -226,7 +226,7 @@ fn check_stepper(stepper: Option<Stepper>, own: Option<Stepper>) -> Result<()> {
 }
 
 /// The key of an error of an equation; that of its stepper has one already.
-fn within_pde(error: Error) -> Error {
+pub(super) fn within_pde(error: Error) -> Error {
     match &error {
         Error::Invalid { key, .. } if key.starts_with("time.") => error,
         _ => error.within("pde"),
@@ -321,103 +321,6 @@ impl GeneratorTable<2> for GeneratorKind {
     }
 
     fn into_generator(self) -> Box<dyn MeshGenerator<2>> {
-        self.into_generator()
-    }
-}
-
-impl PdeTable<1> for LinePdeKind {
-    fn check(&self) -> Result<()> {
-        self.check()
-    }
-
-    fn check_axes(&self, domain: &Domain<1>) -> Result<()> {
-        let ([periodic], [lower]) = (*domain.periodic, *domain.lower);
-        let coordinates = domain.coordinates.unwrap_or_default();
-        if coordinates != Coordinates::Cartesian {
-            let named = format!("\"{}\"", format!("{coordinates:?}").to_lowercase());
-            if lower < 0.0 {
-                let rule =
-                    format!("is a distance from the centre with domain.coordinates = {named}; set it to 0 or more");
-                return Err(Error::invalid("domain.lower", format!("[{lower}]"), rule));
-            }
-            if periodic {
-                let rule = "a radius is not periodic; set domain.periodic to [false], or leave it out";
-                return Err(Error::invalid("domain.coordinates", named, rule));
-            }
-            if matches!(self, Self::LineBurgers(_)) {
-                let rule =
-                    "pde.kind = \"burgers\" is along x; leave it out, or write the equation with kind = \"formula\"";
-                return Err(Error::invalid("domain.coordinates", named, rule));
-            }
-        }
-        let (wrong, rule) = match self {
-            Self::LineBurgers(burgers) if burgers.initial.is_none() => (
-                periodic,
-                "the front of pde.kind = \"burgers\" needs a bounded line; set it to [false], or give pde.initial",
-            ),
-            Self::LineBurgers(burgers) => (
-                periodic == burgers.boundary.is_some(),
-                match burgers.boundary {
-                    None => "pde.initial needs pde.boundary beside it on a bounded line; add it, or set this to [true]",
-                    Some(_) => "pde.boundary has no end to stand on; leave it out, or set this to [false]",
-                },
-            ),
-            Self::LineFormulaPde(pde) => return pde.check_sides([periodic]).map_err(|error| error.within("pde")),
-            Self::Prescribed(_) => (false, ""),
-        };
-        match wrong {
-            true => Err(Error::invalid("domain.periodic", format!("[{periodic}]"), rule)),
-            false => Ok(()),
-        }
-    }
-
-    fn physics(&self, domain: &Domain<1>, time: &Time, _stays: bool) -> Result<Box<dyn Physics<1>>> {
-        let stepper = match (self, time.stepper) {
-            (Self::LineFormulaPde(_), Some(Stepper::Trapezoid)) => Some(physics::Stepper::Trapezoid),
-            (Self::LineFormulaPde(_), Some(Stepper::TrBdf2)) => Some(physics::Stepper::TrBdf2),
-            (_, stepper) => check_stepper(stepper, self.stepper()).map(|()| None)?,
-        };
-        self.clone().into_physics(domain.coordinates.unwrap_or_default(), stepper).map_err(within_pde)
-    }
-
-    fn stepper(&self) -> Option<Stepper> {
-        match self {
-            Self::LineFormulaPde(pde) => Some(pde.stepper().into()),
-            Self::Prescribed(_) => None,
-            Self::LineBurgers(_) => Some(Stepper::Trapezoid),
-        }
-    }
-
-    fn formulas(&self) -> Vec<(String, &str)> {
-        self.formulas()
-    }
-
-    fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
-        self.starts_and_sides()
-    }
-
-    fn prescribes(&self) -> [bool; 2] {
-        match self {
-            Self::Prescribed(prescribed) => [true, prescribed.rho.is_some()],
-            _ => [false; 2],
-        }
-    }
-}
-
-impl GeneratorTable<1> for LineGeneratorKind {
-    fn check(&self, _lattice: &Lattice<1>) -> Result<()> {
-        Ok(())
-    }
-
-    fn subdomains(&self) -> [usize; 2] {
-        [1, 1]
-    }
-
-    fn stays(&self) -> bool {
-        matches!(self, Self::Fixed(_))
-    }
-
-    fn into_generator(self) -> Box<dyn MeshGenerator<1>> {
         self.into_generator()
     }
 }

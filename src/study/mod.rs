@@ -12,6 +12,7 @@ mod line_checks;
 mod line_figures;
 mod line_files;
 mod line_run;
+mod line_tables;
 mod mapped;
 mod memory;
 mod moving_checks;
