@@ -291,7 +291,7 @@ impl Free {
         if in_place < DOUBTED * self.scale {
             // the change at fixed places contains the errors of interpolation that the moving mesh makes; a τ
             // shortened by these would move the mesh faster and make more of them
-            in_place = in_place.max(self.dt * CHANGE / self.share_at_rest(simulation, after));
+            in_place = in_place.max(self.dt * CHANGE / self.share_of(at_rest(simulation, after, self.dt)));
         }
         self.dt.max(in_place.min(self.scale))
     }
@@ -309,9 +309,12 @@ impl Free {
     {
         let change = change_at_nodes(after.mesh.lattice(), &before.u, &after.u);
         let (start, end) = (simulation.schedule.start(), simulation.schedule.end());
-        if range(&after.u, 0) - range(&before.u, 0) > GROWS * change {
+        let at_rest = at_rest(simulation, before, self.dt);
+        let grows = |change: f64, u: &Field| range(u, 0) - range(&before.u, 0) > GROWS * change;
+        // what sweeps over a peak that grows lowers it at its nodes now and then
+        if grows(change, &after.u) || at_rest.as_ref().is_some_and(|(change, u)| grows(*change, u)) {
             Cause::BlowUp
-        } else if self.share_at_rest(simulation, before) / self.dt < DOUBTED * share(change, self.ranges[0]) / dt {
+        } else if self.share_of(at_rest) / self.dt < DOUBTED * share(change, self.ranges[0]) / dt {
             Cause::Restless
         } else if after.t - start < AT_START * (end - start) {
             Cause::Start
@@ -320,15 +323,24 @@ impl Free {
         }
     }
 
-    /// The change in the next step if the mesh rested; infinite where that fails.
-    fn share_at_rest<const D: usize>(&self, simulation: &mut Simulation<D>, State { t, mesh, u, .. }: &State<D>) -> f64
-    where
-        Mesh<D>: Movable<D>,
-    {
-        let motion = Motion { t: *t, dt: self.dt, old: mesh, new: mesh };
-        let after = simulation.physics.step(motion, u);
-        after.map_or(f64::INFINITY, |(after, _)| share(change_at_nodes(mesh.lattice(), u, &after), self.ranges[0]))
+    /// A change as a share of the range; infinite where there is none.
+    fn share_of(&self, changed: Option<(f64, Field)>) -> f64 {
+        changed.map_or(f64::INFINITY, |(change, _)| share(change, self.ranges[0]))
     }
+}
+
+/// The change in a step of length `dt` if the mesh rested, and what it would lead to; none where that fails.
+fn at_rest<const D: usize>(
+    simulation: &mut Simulation<D>,
+    State { t, mesh, u, .. }: &State<D>,
+    dt: f64,
+) -> Option<(f64, Field)>
+where
+    Mesh<D>: Movable<D>,
+{
+    let motion = Motion { t: *t, dt, old: mesh, new: mesh };
+    let (after, _) = simulation.physics.step(motion, u).ok()?;
+    Some((change_at_nodes(mesh.lattice(), u, &after), after))
 }
 
 /// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic
