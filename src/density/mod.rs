@@ -37,6 +37,20 @@ pub trait Monitor<const D: usize = 2>: Send {
     /// [`Failure::NonFinite`] names the first node where ρ is not a finite number.
     fn density(&self, mesh: &Mesh<D>, u: &[f64], gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure>;
 
+    /// ρ at every node from all unknowns: that of what is [`followed`](Self::followed) where nothing else is said.
+    ///
+    /// # Errors
+    /// As [`density`](Self::density) and [`followed`](Self::followed).
+    fn density_of(
+        &self,
+        t: f64,
+        mesh: &Mesh<D>,
+        unknowns: &Field,
+        gradient: Option<&[[f64; D]]>,
+    ) -> Result<Vec<f64>, Failure> {
+        self.density(mesh, &self.followed(t, mesh, unknowns)?, gradient)
+    }
+
     /// The u of [`density`](Self::density), from all unknowns: the first one where nothing else is said.
     ///
     /// # Errors

@@ -1,8 +1,9 @@
-use super::need::{bends, need, need_by_bends};
+use super::need::{bends, need as need_of, need_by_bends};
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
-use crate::geometry::{Cells, Lattice, Mesh, check_length, strides};
+use crate::geometry::{Cells, Field, Lattice, Mesh, check_length, strides};
 use crate::numerics::{larger, sum};
+use std::borrow::Cow;
 
 /// The root of the slope, over its mean: no number to set
 ///
@@ -14,6 +15,9 @@ use crate::numerics::{larger, sum};
 /// shape is treated alike. A layer of any width gets the same share of the nodes, about half of them: the mean of the
 /// root falls with the width as fast as its largest value grows. The background b is 0 where u is flat outside its
 /// layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes otherwise.
+///
+/// Of several unknowns, each in units of its range, the largest |∇u| counts, and the largest need: what equal cells
+/// resolve of one unknown would not be resolved any more where all nodes go to a layer of another.
 ///
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
 /// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
@@ -37,26 +41,74 @@ const PASSES: f64 = 8.0;
 const FEW: f64 = 2.0;
 /// Differences of u below this share of its size are rounding.
 const ROUNDING: f64 = 1e-10;
+/// An unknown whose range is so small beside the largest of all is made of rounding.
+const OF_ROUNDING: f64 = 1e-9;
 
 impl<const D: usize> Monitor<D> for RootGradient
 where
     Mesh<D>: Cells<D>,
 {
     fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
+        check_length(mesh.lattice(), "what the mesh follows", u.len())?;
+        Self::of_all(mesh, &[Cow::Borrowed(u)])
+    }
+
+    fn density_of(
+        &self,
+        _t: f64,
+        mesh: &Mesh<D>,
+        unknowns: &Field,
+        _gradient: Option<&[[f64; D]]>,
+    ) -> Result<Vec<f64>, Failure> {
+        let all = (0..unknowns.components()).map(|c| unknowns.component(c).collect());
+        Self::of_all(mesh, &all.collect::<Vec<Cow<[f64]>>>())
+    }
+}
+
+impl RootGradient {
+    /// ρ of unknowns with one value a node each.
+    fn of_all<const D: usize>(mesh: &Mesh<D>, unknowns: &[Cow<[f64]>]) -> Result<Vec<f64>, Failure>
+    where
+        Mesh<D>: Cells<D>,
+    {
         let lattice = mesh.lattice();
-        check_length(lattice, "what the mesh follows", u.len())?;
         let even = || Ok(vec![1.0; lattice.len()]);
-        let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
-        let (range, size) = (high - low, high.max(-low));
-        let Roots { mut roots, background, mean, steepest } = Roots::of(mesh, u, range);
         let longest = lattice.cells().into_iter().max().unwrap_or(1) as f64;
-        if mean <= ROUNDING * background || steepest * range * longest <= ROUNDING * size {
+        let ends = unknowns
+            .iter()
+            .map(|u| u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]));
+        let ends: Vec<[f64; 2]> = ends.collect();
+        let sizes = ends.iter().map(|[low, high]| high.max(-low));
+        let largest = sizes.clone().fold(0.0, f64::max);
+        let (mut slopes, mut need) = (Vec::new(), 0.0);
+        for ((u, [low, high]), size) in unknowns.iter().zip(&ends).zip(sizes) {
+            let range = high - low;
+            if range <= OF_ROUNDING * largest {
+                continue;
+            }
+            // with room for one a node, too
+            let mut own = Vec::with_capacity(lattice.cells().map(|n| n + 1).iter().product());
+            own.extend(mesh.slopes(u, range).map(|(slope, _)| slope));
+            let steepest = own.iter().copied().fold(0.0, larger);
+            if steepest * range * longest <= ROUNDING * size {
+                continue;
+            }
+            need = f64::max(need, need_of(steepest));
+            if need < 1.0 {
+                need = need.max(need_by_bends(bends(mesh, u) / range));
+            }
+            match slopes.is_empty() {
+                true => slopes = own,
+                false => slopes.iter_mut().zip(own).for_each(|(slope, own)| *slope = larger(*slope, own)),
+            }
+        }
+        if slopes.is_empty() {
             return even();
         }
-        let need = match need(steepest) {
-            1.0 => 1.0,
-            by_slope => by_slope.max(need_by_bends(bends(mesh, u) / range)),
-        };
+        let Roots { mut roots, background, mean, steepest } = Roots::of(mesh, slopes);
+        if mean <= ROUNDING * background {
+            return even();
+        }
         let beta = BETA * need;
         if beta == 0.0 {
             return even();
@@ -83,7 +135,7 @@ where
     }
 }
 
-/// √|∇u| of the cells of a mesh, u in units of its range so that squares of no unit overflow.
+/// √|∇u| of the cells of a mesh.
 struct Roots {
     /// One a cell, last axis fastest.
     roots: Vec<f64>,
@@ -96,21 +148,16 @@ struct Roots {
 }
 
 impl Roots {
-    fn of<const D: usize>(mesh: &Mesh<D>, u: &[f64], range: f64) -> Self
+    /// From |∇u| of the cells.
+    fn of<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>) -> Self
     where
         Mesh<D>: Cells<D>,
     {
-        let (lattice, unit) = (mesh.lattice(), if range > 0.0 { range } else { 1.0 });
         let box_volume: f64 = mesh.extent().iter().product();
-        // room for one a node, too
-        let mut roots = Vec::with_capacity(lattice.cells().map(|n| n + 1).iter().product());
-        let mut steepest = 0.0;
-        let background = sum(mesh.slopes(u, unit).map(|(slope, volume)| {
-            steepest = larger(steepest, slope);
-            let root = slope.sqrt();
-            roots.push(root);
-            volume * root.sqrt().sqrt()
-        }));
+        let steepest = slopes.iter().copied().fold(0.0, larger);
+        let mut roots = slopes;
+        roots.iter_mut().for_each(|slope| *slope = slope.sqrt());
+        let background = sum(roots.iter().zip(mesh.volumes()).map(|(root, volume)| volume * root.sqrt().sqrt()));
         let background = (background / box_volume).powi(4);
         let above = sum(roots.iter().zip(mesh.volumes()).map(|(root, volume)| (root - background).max(0.0) * volume));
         Self { roots, background, mean: above / box_volume, steepest }

@@ -57,6 +57,17 @@ impl<const D: usize> DualCells<D> {
         &self.normals
     }
 
+    /// The middle of the face above a place along an axis; `x` are the positions of the nodes, padded.
+    pub fn middle(&self, x: &[[f64; D]], place: usize, axis: usize) -> [f64; D] {
+        let strides = self.patch.padded_strides();
+        let [a, b] = match D {
+            1 => [&x[place], &x[place + 1]],
+            // from the centre of one of the cells on both sides of the edge to that of the other
+            _ => [&self.centres[place], &self.centres[place - strides[1 - axis]]],
+        };
+        std::array::from_fn(|d| 0.5 * (a[d] + b[d]))
+    }
+
     /// The areas that the faces sweep in the direction of N on the way to `later`, the dual cells of another mesh over
     /// the same lattice. They are padded like [`normals`](Self::normals).
     ///

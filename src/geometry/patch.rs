@@ -45,6 +45,16 @@ impl<const D: usize> Patch<D> {
         strides(self.size.map(|n| n + 2))
     }
 
+    /// Whether a place of a padded vector is that of an unknown with another one, or an image, above it along an axis.
+    pub fn has_face(&self, place: usize, axis: usize) -> bool {
+        let strides = self.padded_strides();
+        (0..D).all(|d| {
+            let along = place / strides[d] % (self.size[d] + 2);
+            let last = if d == axis && !self.wraps[d] { self.size[d] - 1 } else { self.size[d] };
+            (1..=last).contains(&along)
+        })
+    }
+
     /// Unknowns along the last axis: the length of a [pencil](Self::pencils).
     pub fn pencil_len(&self) -> usize {
         self.size[D - 1]

@@ -6,6 +6,7 @@ mod start;
 
 pub use gait::Gait;
 pub use retries::{Care, Retries};
+pub(crate) use start::adapted_to_all;
 pub use start::{Ending, Start, adapted, steps_to_rest};
 
 use crate::error::{Failure, Result};

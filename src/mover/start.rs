@@ -52,11 +52,19 @@ pub fn adapted<const D: usize>(
 where
     Mesh<D>: Movable<D>,
 {
-    from_coarser(mesh, form, &mut followed)
+    from_coarser(mesh, form, &mut |mesh| followed(mesh).map(|(u, rho)| (vec![u], rho)))
 }
 
-/// u and ρ on a mesh.
-pub(crate) type FollowedOn<'a, const D: usize> = &'a mut dyn FnMut(&Mesh<D>) -> Result<(Vec<f64>, Vec<f64>)>;
+/// The same where ρ is made of several u, of which the mesh follows the first.
+pub(crate) fn adapted_to_all<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
+where
+    Mesh<D>: Movable<D>,
+{
+    from_coarser(mesh, form, followed)
+}
+
+/// Some u and ρ on a mesh.
+pub(crate) type FollowedOn<'a, const D: usize> = &'a mut dyn FnMut(&Mesh<D>) -> Result<(Vec<Vec<f64>>, Vec<f64>)>;
 
 fn from_coarser<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
 where
@@ -86,7 +94,7 @@ where
     let start = to_rest(uniform, form, &mut |on| {
         let u = interpolate(mesh, values, on);
         let rho = monitor.density(on, &u, None)?;
-        Ok((u, rho))
+        Ok((vec![u], rho))
     });
     start.ok().filter(|start| start.end == Ending::AtRest).map(|start| start.steps)
 }
@@ -102,11 +110,11 @@ where
     let mut mesh = mesh;
     for _ in 0..MOST_STEPS {
         let (u, rho) = followed(&mesh)?;
-        let Ok(step) = mover.step(&mesh, &gait, Followed { u: &u, rho: &rho }, 1.0) else { break };
+        let Ok(step) = mover.step(&mesh, &gait, Followed { u: &u[0], rho: &rho }, 1.0) else { break };
         let moved = step.moved.mesh;
         let farthest = moved.farthest(&mesh);
         let at_rest = farthest <= AT_REST * moved.shortest_edge();
-        let jumps = jumps(&mesh, &u);
+        let jumps = u.iter().any(|u| jumps(&mesh, u));
         if jumps {
             return Ok(Start { mesh, end: Ending::Jump, steps: gait.steps() });
         }

@@ -5,7 +5,9 @@ mod line;
 mod mass;
 mod newton;
 mod plane;
+mod reconstruction;
 mod steps;
+mod transport;
 
 use crate::error::Failure;
 use crate::geometry::{Cells, DualCells, Mesh, Patch, strides};
@@ -63,6 +65,15 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn shares_mass(&self) -> [bool; B] {
         [true; B]
     }
+    /// Between which values each unknown stays at each node at time t, in a step that starts with the padded `u`; empty
+    /// where no unknown has bounds.
+    fn bounds(&self, _t: f64, _mesh: &Mesh<D>, _u: &[[f64; B]]) -> Result<Vec<[[f64; 2]; B]>, Failure> {
+        Ok(Vec::new())
+    }
+    /// The unknowns that are carried by limited fluxes ([`Transport`](transport::Transport)).
+    fn limited(&self) -> Limited<B> {
+        Limited { unknowns: [false; B], implicit: true, coupled: false }
+    }
     /// How it is stepped in time.
     fn stepper(&self) -> Stepper {
         Stepper::Trapezoid
@@ -88,6 +99,16 @@ pub enum Stepper {
     TrBdf2,
 }
 
+/// Which unknowns are carried by limited fluxes, and what is left to the implicit step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limited<const B: usize> {
+    pub unknowns: [bool; B],
+    /// Whether anything else changes an unknown: there is one that is not limited, diffusion, or a source.
+    pub implicit: bool,
+    /// Whether that has an influence on what is carried in the same step.
+    pub coupled: bool,
+}
+
 /// Derivatives of B equations by B unknowns.
 pub(super) type Block<const B: usize> = [[f64; B]; B];
 
@@ -111,7 +132,9 @@ pub(super) struct Crossing<const B: usize> {
 /// nodes around its ends. On a line there is no t. What leaves a cell enters its neighbour, and a constant stays
 /// constant on any moving mesh. That is the trapezoid in time ([`Stepper`]), solved by Newton's method with the exact
 /// Jacobian. Where neighbours have a share in the mass ([`Law::shares_mass`]), A u and A S are M u and M S, and s (u_i
-/// + u_k)/2 is the mean of the product along the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition.
+/// + u_k)/2 is the mean of the product along the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition. For unknowns that
+/// are [`Limited`], F·N and s are in the explicit steps of [`Transport`](transport::Transport), and what these bring to
+/// a dual cell is known here.
 #[derive(Debug, Clone)]
 pub(super) struct FiniteVolumes<const B: usize, const D: usize = 2, Solver = RobustTransport<B>> {
     solver: Solver,

@@ -1,7 +1,8 @@
 //! A user's equation as a conservation law.
 
-use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Stepper};
-use super::formula_pde::Formulas;
+use super::bounds::Bounds;
+use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Limited, Stepper};
+use super::formula_pde::{Formulas, Scheme};
 use super::prescribed::evaluate;
 use super::sides::Open;
 use super::{Motion, Physics, nodal};
@@ -28,6 +29,8 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     /// The unknowns that diffuse, in Cartesian coordinates: cells along a radius have another mass.
     shares: [bool; B],
     stepper: Stepper,
+    limited: Limited<B>,
+    bounds: Bounds<D, B>,
     /// The unknowns that are only carried and diffused.
     keeps_range: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
@@ -46,7 +49,19 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Formulas { names, nodal, initial, sides, exact } = formulas;
+        let Formulas { names, nodal, initial, sides, exact, scheme, bounds } = formulas;
+        let is_zero = |quantity: usize, c: usize| nodal[quantity * B + c].text() == "0";
+        let limited = std::array::from_fn(|c| match scheme {
+            None => is_zero(Self::DIFFUSIVITY, c),
+            Some(scheme) => scheme == Scheme::Limited,
+        });
+        let changed = |c: usize| !is_zero(Self::DIFFUSIVITY, c) || !is_zero(Self::SOURCE, c);
+        let by_others = |c: usize| (0..D).any(|d| (0..B).any(|e| !limited[e] && nodal[d * B + c].depends_on(D + e)));
+        let limited = Limited {
+            unknowns: limited,
+            implicit: (0..B).any(|c| !limited[c] || changed(c)),
+            coupled: (0..B).any(|c| limited[c] && (changed(c) || by_others(c))),
+        };
         let flows = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
         };
@@ -67,7 +82,14 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
-            shares: std::array::from_fn(|c| cartesian && nodal[Self::DIFFUSIVITY * B + c].text() != "0"),
+            shares: std::array::from_fn(|c| cartesian && !is_zero(Self::DIFFUSIVITY, c) && !limited.unknowns[c]),
+            limited,
+            bounds: Bounds::new(
+                &names,
+                &bounds,
+                std::array::from_fn(|c| (0..D).map(|d| &nodal[d * B + c]).collect()),
+                std::array::from_fn(|c| &nodal[Self::SOURCE * B + c]),
+            ),
             has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
             initial: Program::new(std::array::from_fn(|c| &initial[c])),
@@ -276,6 +298,14 @@ where
 
     fn shares_mass(&self) -> [bool; B] {
         self.shares
+    }
+
+    fn bounds(&self, t: f64, mesh: &Mesh<D>, u: &[[f64; B]]) -> Result<Vec<[[f64; 2]; B]>, Failure> {
+        self.bounds.at(t, mesh, u)
+    }
+
+    fn limited(&self) -> Limited<B> {
+        self.limited
     }
 
     fn stepper(&self) -> Stepper {

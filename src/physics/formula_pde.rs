@@ -1,6 +1,6 @@
 use super::formula_law::FormulaLaw;
 use super::sides::{Condition, Conditions, Open};
-use super::{AXES, Coordinates, Physics, Stepper, formula, mistaken};
+use super::{AXES, Coordinates, Physics, Stepper, bounds, formula, mistaken};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
 use crate::geometry::DualCells;
@@ -24,9 +24,9 @@ use std::collections::BTreeMap;
 ///
 /// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and a [`Stepper`] in time, solved by
 /// Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
-/// of their values at the two nodes. Such central fluxes oscillate where the mesh does not resolve a front. Σ A u
-/// changes only by the flux through the sides and by S, on any moving mesh. A solution has one value for each node and
-/// unknown, in the order of `unknowns`.
+/// of their values at the two nodes. Such central fluxes oscillate where the mesh does not resolve a front; [limited
+/// ones](Scheme::Limited) do not. Σ A u changes only by the flux through the sides, by S, and where `bounds` are met,
+/// on any moving mesh. A solution has one value for each node and unknown, in the order of `unknowns`.
 ///
 /// # Errors
 /// A step ends with [`Failure::Formula`](crate::Failure::Formula) where a formula is not finite.
@@ -79,10 +79,30 @@ pub struct FormulaPde<const D: usize = 2> {
     /// all sides, or a table of them by side: `left`, `right`, `bottom`, `top`. Required unless all axes are periodic.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub boundary: BTreeMap<String, Conditions>,
+    /// The lower and the upper bound of an unknown, formulas of x, y and t, or ±∞ for none: an obstacle, or what is
+    /// known of a solution. Where an unknown lies on its bound, its equation holds but for what it takes not to leave
+    /// it. Without bounds, an unknown with a source keeps to −1, 0 and 1 where its equation does.
+    #[serde(default, skip_serializing_if = "no_flux")]
+    pub bounds: Fluxes<2>,
+    /// `"central"` fluxes, of the second order and without limits; or `"limited"` ones, of the second order where the
+    /// solution is smooth and without new extrema, which are carried in explicit substeps. By default limited fluxes
+    /// for the unknowns without diffusion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scheme: Option<Scheme>,
     /// Exact solution of each unknown, a formula of x, y and t, if it is known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
     pub exact: BTreeMap<String, String>,
+}
+
+/// How fluxes, and the motion of the mesh, carry an unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Scheme {
+    /// By the mean of both sides of a face, implicitly.
+    Central,
+    /// By values that lie between those of the nodes, in explicit substeps: no new extrema.
+    Limited,
 }
 
 /// Largest number of unknowns of a [`FormulaPde`] in the plane.
@@ -101,6 +121,9 @@ pub(super) struct Formulas<const D: usize> {
     pub exact: Vec<Option<Formula>>,
     /// For each unknown and the lower and the upper end of each axis.
     pub sides: Vec<[[Open; 2]; D]>,
+    pub scheme: Option<Scheme>,
+    /// The lower and the upper bound of each unknown.
+    pub bounds: Vec<[Option<Formula>; 2]>,
 }
 
 impl<const D: usize> FormulaPde<D> {
@@ -223,6 +246,8 @@ impl<const D: usize> FormulaPde<D> {
                 .map(|name| self.boundary.get(name).unwrap_or(&Conditions::All(Condition::NoFlux)).read(name, names))
                 .collect::<Result<_>>()?,
             exact: read("exact", &self.exact)?,
+            scheme: self.scheme,
+            bounds: names.iter().map(|name| bounds::read::<D>(name, &self.bounds)).collect::<Result<_>>()?,
         })
     }
 
@@ -256,6 +281,7 @@ impl<const D: usize> FormulaPde<D> {
             ("initial", self.initial.keys().collect()),
             ("boundary", self.boundary.keys().collect()),
             ("exact", self.exact.keys().collect()),
+            ("bounds", self.bounds.keys().collect()),
         ];
         for (table, keys) in tables {
             if let Some(key) = keys.into_iter().find(|key| !names.contains(key)) {

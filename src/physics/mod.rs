@@ -1,5 +1,6 @@
 //! The equations that are solved on the moving mesh.
 
+mod bounds;
 mod burgers;
 mod curvilinear;
 mod finite_volumes;
@@ -13,7 +14,7 @@ mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
 pub use finite_volumes::Stepper;
-pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE};
+pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE, Scheme};
 pub use line::{Coordinates, LineBurgers, LineFormulaPde, LinePdeKind};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};

@@ -244,9 +244,8 @@ pub(super) fn density<const D: usize>(
     mesh: &Mesh<D>,
     u: &Field,
 ) -> Result<Vec<f64>, Failure> {
-    let values = monitor.followed(t, mesh, u)?;
     let gradient = physics.gradient(t, mesh);
-    monitor.density(mesh, &values, gradient.as_deref())
+    monitor.density_of(t, mesh, u, gradient.as_deref())
 }
 
 #[cfg(test)]

@@ -121,12 +121,13 @@ where
 
     /// See [`Simulation::adapted`].
     pub(crate) fn adapted_from(&self, mesh: Mesh<D>, observers: &mut [&mut dyn Observer]) -> Result<Start<D>> {
-        mover::adapted(mesh, self.mover.equation.form, |mesh| {
+        mover::adapted_to_all(mesh, self.mover.equation.form, &mut |mesh| {
             let state = self.with_sides(self.started(mesh.clone())?)?;
             observers.iter_mut().try_for_each(|observer| observer.adapting(state.t))?;
             end_where_asked(observers, &state)?;
             let u = self.monitor.followed(state.t, &state.mesh, &state.u).map_err(|failure| self.at_start(failure))?;
-            Ok((u, state.rho))
+            let others = (1..state.u.components()).map(|c| state.u.component(c).collect());
+            Ok((std::iter::once(u).chain(others).collect(), state.rho))
         })
     }
 

@@ -77,8 +77,8 @@ where
             if !record.warnings.iter().any(|warning| warning.starts_with(&said)) {
                 record.warnings.push(format!(
                     "{said}, {low:.4} to {high:.4}, which the equation keeps: it is {u:.4} at t = {}, {}; a layer \
-                     there is thinner than the cells, and central fluxes overshoot; refine `grid.cells`, or raise \
-                     `pde.diffusivity`",
+                     there is thinner than the cells; refine `grid.cells`, raise `pde.diffusivity`, or give an \
+                     equation by formulas `pde.scheme` = \"limited\"",
                     state.t,
                     named(mesh.image(mesh.x()[k]))
                 ));

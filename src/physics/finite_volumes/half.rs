@@ -1,6 +1,6 @@
 //! What one of the two ends of a step contributes to the equations of a step.
 
-use super::{Around, Crossing, Excess, Face, Half, Law, Side, add, inside};
+use super::{Around, Block, Crossing, Excess, Face, Half, Law, Side, add, inside};
 use crate::error::Failure;
 use crate::geometry::dot;
 use crate::numerics::linear::BlockMatrix;
@@ -130,12 +130,14 @@ impl<const D: usize> Half<'_, D> {
         let (across, along) = (scale * dot(normal, normal), 0.25 * scale * turned);
         let passing = law.convection(&nodes[i], &nodes[k], normal);
         let spread = law.diffusivity(&nodes[i], &nodes[k]);
-        let shares = law.shares_mass();
+        let (shares, limited) = (law.shares_mass(), law.limited().unknowns);
         let bent = self.stretched.get(i).map_or(0.0, |stretched| stretched[axis] / 24.0);
         let mut face = Face { crossing: passing, tangent: [0.0; B] };
         let Crossing { value, by_below, by_above } = &mut face.crossing;
         for c in 0..B {
             let slope = across * (u[k][c] - u[i][c]) + along * change(c);
+            // what carries a limited unknown is done elsewhere
+            let (half, swept) = if limited[c] { (0.0, 0.0) } else { (half, swept) };
             value[c] = half * value[c] - spread.value[c] * slope - 0.25 * swept * (u[i][c] + u[k][c]);
             let bent = if shares[c] { bent } else { 0.0 };
             value[c] -= bent * (u[k][c] - u[i][c]);
@@ -159,7 +161,7 @@ impl<const D: usize> Half<'_, D> {
         faces: &mut [[Face<B>; D]],
     ) {
         let (lattice, patch) = (self.mesh.lattice(), self.cells.patch());
-        let strides = patch.padded_strides();
+        let (strides, limited) = (patch.padded_strides(), law.limited().unknowns);
         for &(axis, end) in law.open_sides() {
             for i in lattice.side(axis, end) {
                 let k: usize = lattice.node(i).iter().zip(strides).map(|(i, s)| (i + 1) * s).sum();
@@ -169,10 +171,10 @@ impl<const D: usize> Half<'_, D> {
                 let normal = self.cells.normals()[face][axis].map(|n| sign * n);
                 let place = (self.t, self.mesh.x()[i]);
                 let (leaving, by) = law.leaving((axis, end), place, (&nodes[k], &u[k]), normal);
-                let along = 0.5 * self.dt * sign;
+                let share = |c: usize| if limited[c] { 0.0 } else { 0.5 * self.dt * sign };
                 let crossing = &mut faces[face][axis].crossing;
-                crossing.value = leaving.map(|flux| along * flux);
-                let by = by.map(|row| row.map(|slope| along * slope));
+                crossing.value = std::array::from_fn(|c| share(c) * leaving[c]);
+                let by: Block<B> = std::array::from_fn(|c| by[c].map(|slope| share(c) * slope));
                 *(if end == 0 { &mut crossing.by_above } else { &mut crossing.by_below }) = by;
             }
         }

@@ -2,6 +2,7 @@
 
 use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Side, inside};
 use crate::error::Failure;
+use crate::geometry::Patch;
 use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver};
 use crate::work::Work;
@@ -22,14 +23,21 @@ pub(super) struct Solved<const B: usize> {
 }
 
 impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
-    /// Newton's method for the padded values `u` at the end of a time step, from what is `known` of its beginning.
+    /// Newton's method for the padded values `u` at the end of a time step, from what is `known` of its beginning
+    ///
+    /// Where a value has bounds, the equation holds between them, and at a bound what it would take to leave it:
+    /// min(−R, u − lower) = 0 with the residual R, and likewise above. Its derivative is that of the smaller term, so
+    /// that Newton's method finds in a few steps which values lie on their bounds.
+    ///
+    /// # Source
+    /// Hintermüller, Ito and Kunisch, *The primal-dual active set strategy as a semismooth Newton method* (2002).
     pub(super) fn newton<const S: usize, L: Law<B, D>>(
         &mut self,
         law: &L,
         half: &Half<'_, D>,
         excess: Option<&Excess<B, D, S>>,
         known: &[[f64; B]],
-        sides: &[Side<B>],
+        (sides, bounds): (&[Side<B>], &[[[f64; 2]; B]]),
         u: &mut [[f64; B]],
     ) -> Result<Solved<B>, Failure>
     where
@@ -52,6 +60,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                     *residual = if given.is_some() { 0.0 } else { *residual };
                 }
             }
+            let bound = hold(bounds, u, patch, &mut residual);
             let (largest, iterations) = (largest_of(&residual), work.newton_iterations);
             if iterations == 0 {
                 scale.begin(largest);
@@ -67,6 +76,10 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                 break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
             }
             half.matrix(law, excess, (&nodes, &faces), sides, &mut matrix);
+            for (i, c) in bound {
+                matrix.rows[i].iter_mut().for_each(|block| block[c] = [0.0; B]);
+                matrix.rows[i][0][c][c] = 1.0;
+            }
             scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
             let mut correction = vec![[0.0; B]; patch.padded_len()];
             let enough = scale.enough(largest, L::TOLERANCE);
@@ -79,6 +92,27 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         };
         Ok(Solved { residual, work, stalled })
     }
+}
+
+/// Replaces the residuals of values that lie on their bounds by the way to these, and returns which these are, as (node,
+/// unknown).
+fn hold<const B: usize, const D: usize>(
+    bounds: &[[[f64; 2]; B]],
+    u: &[[f64; B]],
+    patch: Patch<D>,
+    residual: &mut [[f64; B]],
+) -> Vec<(usize, usize)> {
+    let mut held = Vec::new();
+    for ((i, k), bounds) in patch.places().enumerate().zip(bounds) {
+        for c in 0..B {
+            let ([lower, upper], to) = (bounds[c], u[k][c] + residual[i][c]);
+            if to < lower || to > upper {
+                residual[i][c] = to.clamp(lower, upper) - u[k][c];
+                held.push((i, c));
+            }
+        }
+    }
+    held
 }
 
 /// How large unknowns and residuals are.

@@ -1,7 +1,8 @@
 //! Steps in time.
 
 use super::newton::Solved;
-use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Stepper, settle, sides, stretched};
+use super::transport::Transport;
+use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, settle, sides, stretched};
 use crate::error::Failure;
 use crate::geometry::{Cells, DualCells, Mesh, diagonal, padded};
 use crate::numerics::linear::LinearSolver;
@@ -79,18 +80,20 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let known = self.newest.take().filter(|(mesh, _)| mesh == old).map(|(_, cells)| cells);
         let (old, new) = (Level::new(law, t, old, known), Level::new(law, t + dt, new, None));
         let u = padded(old.mesh.lattice(), start, [[0.0; B]; D]);
-        let (values, work) = match law.stepper() {
-            Stepper::Trapezoid => self.trapezoid(law, [&old, &new], u.clone()),
-            Stepper::TrBdf2 => self.tr_bdf2(law, [&old, &new], u),
+        let (values, work) = match law.limited().unknowns.contains(&true) {
+            true => self.carried(law, motion, [&old, &new], u),
+            false => self.solved(law, [&old, &new], u, &[]),
         }?;
         self.newest = Some((new.mesh.clone(), new.cells));
         Ok((values, work))
     }
 
-    /// ½ of the fluxes at both ends of a step.
-    fn trapezoid<const S: usize, L: Law<B, D>>(
+    /// A step in which some unknowns are carried by limited fluxes: these, then what is implicit; and both again where
+    /// the second has an influence on the first, which is then of the second order, too.
+    fn carried<const S: usize, L: Law<B, D>>(
         &mut self,
         law: &L,
+        motion: Motion<'_, D>,
         [old, new]: [&Level<'_, B, D, S>; 2],
         u: Vec<[f64; B]>,
     ) -> Result<(Vec<[f64; B]>, Work), Failure>
@@ -99,9 +102,85 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         Solver: LinearSolver<D, S, B, Block<B>>,
         for<'a> Half<'a, D>: Around<D, S>,
     {
+        let Limited { unknowns, implicit, coupled } = law.limited();
+        let shares: &[f64] = match law.stepper() {
+            Stepper::Trapezoid => &[1.0],
+            Stepper::TrBdf2 => &[FIRST_STAGE, 1.0],
+        };
+        let (carried, substeps) = Transport::new(law, motion, [&u, &u], &[]).carried::<S>(shares)?;
+        let mut work = Work { substeps, ..Work::default() };
+        if !implicit {
+            let carried = &carried[shares.len() - 1];
+            let values = old.mass(&u).into_iter().zip(carried).zip(new.cells.areas());
+            let mut values: Vec<[f64; B]> =
+                values.map(|((mass, carried), area)| std::array::from_fn(|c| (mass[c] + carried[c]) / area)).collect();
+            for side in sides(law, new.t, new.mesh) {
+                let value = &mut values[side.i];
+                (0..B).for_each(|c| value[c] = side.given[c].unwrap_or(value[c]));
+            }
+            within(&bounds(law, new, &sides(law, new.t, new.mesh), &u)?, &mut values);
+            check_finite(law.names(), new.mesh, &values)?;
+            return Ok((values, work));
+        }
+        let (values, cost) = self.solved(law, [old, new], u.clone(), &carried)?;
+        work += cost;
+        if !coupled {
+            return Ok((values, work));
+        }
+        let end = padded(new.mesh.lattice(), &values, [[0.0; B]; D]);
+        let all = &carried[shares.len() - 1];
+        let brought: Vec<[f64; B]> = (old.mass(&u).into_iter().zip(new.mass(&end)).zip(all))
+            .map(|((before, after), carried)| {
+                let brought = |c: usize| if unknowns[c] { after[c] - before[c] - carried[c] } else { 0.0 };
+                std::array::from_fn(brought)
+            })
+            .collect();
+        let (carried, substeps) = Transport::new(law, motion, [&u, &end], &brought).carried::<S>(shares)?;
+        work.substeps += substeps;
+        let (values, cost) = self.solved(law, [old, new], u, &carried)?;
+        work += cost;
+        Ok((values, work))
+    }
+
+    /// What is implicit in a step; `carried` is what limited fluxes bring to the dual cells up to each stage of the
+    /// stepper, if anything.
+    fn solved<const S: usize, L: Law<B, D>>(
+        &mut self,
+        law: &L,
+        levels: [&Level<'_, B, D, S>; 2],
+        u: Vec<[f64; B]>,
+        carried: &[Vec<[f64; B]>],
+    ) -> Result<(Vec<[f64; B]>, Work), Failure>
+    where
+        Mesh<D>: Cells<D>,
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
+        match law.stepper() {
+            Stepper::Trapezoid => self.trapezoid(law, levels, u, carried.first()),
+            Stepper::TrBdf2 => self.tr_bdf2(law, levels, u, carried),
+        }
+    }
+
+    /// ½ of the fluxes at both ends of a step.
+    fn trapezoid<const S: usize, L: Law<B, D>>(
+        &mut self,
+        law: &L,
+        [old, new]: [&Level<'_, B, D, S>; 2],
+        u: Vec<[f64; B]>,
+        carried: Option<&Vec<[f64; B]>>,
+    ) -> Result<(Vec<[f64; B]>, Work), Failure>
+    where
+        Mesh<D>: Cells<D>,
+        Solver: LinearSolver<D, S, B, Block<B>>,
+        for<'a> Half<'a, D>: Around<D, S>,
+    {
         let (dt, ways) = (new.t - old.t, old.ways(new));
-        let known = old.half(dt, &ways).known(law, old.excess.as_ref(), &u)?;
-        self.implicit(law, new, &new.half(dt, &ways), &known, u)
+        let mut known = old.half(dt, &ways).known(law, old.excess.as_ref(), &u)?;
+        for (known, carried) in known.iter_mut().zip(carried.into_iter().flatten()) {
+            (0..B).for_each(|c| known[c] += carried[c]);
+        }
+        self.implicit(law, new, &new.half(dt, &ways), &known, &u.clone(), u)
     }
 
     /// The trapezoid over the share γ of a step, then the second backward difference formula over the rest
@@ -121,6 +200,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         law: &L,
         [old, new]: [&Level<'_, B, D, S>; 2],
         u: Vec<[f64; B]>,
+        carried: &[Vec<[f64; B]>],
     ) -> Result<(Vec<[f64; B]>, Work), Failure>
     where
         Mesh<D>: Cells<D>,
@@ -133,7 +213,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let between = between.map(|(a, b)| std::array::from_fn(|d| a[d] + gamma * (b[d] - a[d])));
         let mesh = old.mesh.moved(between.collect())?;
         let middle = Level::new(law, old.t + gamma * dt, &mesh, None);
-        let (there, mut work) = self.trapezoid(law, [old, &middle], u.clone())?;
+        let (there, mut work) = self.trapezoid(law, [old, &middle], u.clone(), carried.first())?;
         let there = padded(lattice, &there, [[0.0; B]; D]);
 
         let scale = 1.0 / (gamma * (2.0 - gamma));
@@ -142,6 +222,11 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         for (known, start) in known.iter_mut().zip(old.mass(&u)) {
             *known = std::array::from_fn(|c| later * known[c] - earlier * start[c]);
         }
+        if let [first, whole] = carried {
+            for (known, (first, whole)) in known.iter_mut().zip(first.iter().zip(whole)) {
+                (0..B).for_each(|c| known[c] += whole[c] - later * first[c]);
+            }
+        }
         // half of these counts, as half of Δt does
         let [whole, first] = [old.ways(new), old.ways(&middle)];
         let mut ways = whole;
@@ -149,18 +234,20 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             (0..D).for_each(|d| way[d] = 2.0 * (way[d] - later * first[d]));
         }
         let half = new.half(2.0 * (1.0 - gamma) / (2.0 - gamma) * dt, &ways);
-        let (values, cost) = self.implicit(law, new, &half, &known, there)?;
+        let (values, cost) = self.implicit(law, new, &half, &known, &u, there)?;
         work += cost;
         Ok((values, work))
     }
 
-    /// The solution at the end of a stage from what is `known` of its beginning and a guess.
+    /// The solution at the end of a stage from what is `known` of its beginning, the values at the start of the step,
+    /// and a guess.
     fn implicit<const S: usize, L: Law<B, D>>(
         &mut self,
         law: &L,
         level: &Level<'_, B, D, S>,
         half: &Half<'_, D>,
         known: &[[f64; B]],
+        start: &[[f64; B]],
         mut u: Vec<[f64; B]>,
     ) -> Result<(Vec<[f64; B]>, Work), Failure>
     where
@@ -177,13 +264,42 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         }
         let patch = level.cells.patch();
         <Half<'_, D> as Around<D, S>>::repeat_sides(patch, &mut u);
+        let bounds = bounds(law, level, &sides, start)?;
         let Solved { residual, work, stalled } =
-            self.newton(law, half, level.excess.as_ref(), known, &sides, &mut u)?;
+            self.newton(law, half, level.excess.as_ref(), known, (&sides, &bounds), &mut u)?;
         let mut values: Vec<[f64; B]> = patch.places().map(|k| u[k]).collect();
         // an unknown that is given nowhere has no flux through the sides
         settle(&level.cells, &residual, &mut values, |c| sides.iter().all(|side| side.given[c].is_none()));
+        within(&bounds, &mut values);
         // of values that are not finite, that is what is wrong
         check_finite(law.names(), level.mesh, &values)?;
         stalled.map_or(Ok((values, work)), Err)
+    }
+}
+
+/// The bounds of all values at a level; those that are given on sides have none.
+fn bounds<const B: usize, const D: usize, const S: usize, L: Law<B, D>>(
+    law: &L,
+    level: &Level<'_, B, D, S>,
+    sides: &[Side<B>],
+    start: &[[f64; B]],
+) -> Result<Vec<[[f64; 2]; B]>, Failure> {
+    let mut bounds = law.bounds(level.t, level.mesh, start)?;
+    if !bounds.is_empty() {
+        for side in sides {
+            for c in (0..B).filter(|&c| side.given[c].is_some()) {
+                bounds[side.i][c] = [f64::NEG_INFINITY, f64::INFINITY];
+            }
+        }
+    }
+    Ok(bounds)
+}
+
+/// Moves values that are beyond their bounds by rounding onto these.
+fn within<const B: usize>(bounds: &[[[f64; 2]; B]], values: &mut [[f64; B]]) {
+    for (value, bounds) in values.iter_mut().zip(bounds) {
+        for (value, [lower, upper]) in value.iter_mut().zip(bounds) {
+            *value = value.clamp(*lower, *upper);
+        }
     }
 }
