@@ -87,7 +87,7 @@ fn what_only_sits_there_is_left_as_it_is() {
 fn a_shock_tube_gains() {
     let exact = |x: f64| {
         let (s, gamma) = ((x - 0.5) / 0.2, 1.4_f64);
-        let (sound, pressure, speed) = (gamma.sqrt(), 0.303_130_178_050_646, 0.927_452_620_048_950);
+        let (sound, pressure, speed) = (gamma.sqrt(), 0.303_130_178_050_646_f64, 0.927_452_620_048_950);
         let behind = pressure.powf(1.0 / gamma);
         let (tail, shock) = (speed - sound * pressure.powf(0.5 * (gamma - 1.0) / gamma), 1.752_155_731_932_5);
         match s {

@@ -55,6 +55,12 @@ impl<const D: usize> Patch<D> {
         })
     }
 
+    /// Whether a place of a padded vector is that of an unknown, not one of the ring.
+    pub fn is_unknown(&self, place: usize) -> bool {
+        let strides = self.padded_strides();
+        (0..D).all(|d| (1..=self.size[d]).contains(&(place / strides[d] % (self.size[d] + 2))))
+    }
+
     /// Unknowns along the last axis: the length of a [pencil](Self::pencils).
     pub fn pencil_len(&self) -> usize {
         self.size[D - 1]

@@ -70,6 +70,30 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn bounds(&self, _t: f64, _mesh: &Mesh<D>, _u: &[[f64; B]]) -> Result<Vec<[[f64; 2]; B]>, Failure> {
         Ok(Vec::new())
     }
+    /// Whether there are fluxes by gradients of unknowns.
+    fn has_steep(&self) -> bool {
+        false
+    }
+    /// These at faces; `node` is the node of a place in padded vectors, of which there is one point each.
+    fn steep(&self, _at: (f64, &[Point<B, D>]), _mesh: &Mesh<D>) -> Result<Vec<Steep<B, D>>, Failure> {
+        Ok(Vec::new())
+    }
+    /// Whether there are sources by gradients of unknowns.
+    fn has_sloped(&self) -> bool {
+        false
+    }
+    /// These at nodes, at all places of padded vectors.
+    fn sloped(&self, _at: (f64, &[Point<B, D>]), _mesh: &Mesh<D>) -> Result<Vec<Sloped<B, D>>, Failure> {
+        Ok(Vec::new())
+    }
+    /// What is stored in place of u at all places of padded vectors; empty for u itself.
+    fn stored(&self, _at: (f64, &[[f64; D]], &[[f64; B]]), _mesh: &Mesh<D>) -> Result<Vec<Stored<B>>, Failure> {
+        Ok(Vec::new())
+    }
+    /// The unknowns whose equations have no time derivative: only the end of a step counts for these.
+    fn algebraic(&self) -> [bool; B] {
+        [false; B]
+    }
     /// The unknowns that are carried by limited fluxes ([`Transport`](transport::Transport)).
     fn limited(&self) -> Limited<B> {
         Limited { unknowns: [false; B], implicit: true, coupled: false }
@@ -107,6 +131,52 @@ pub(super) struct Limited<const B: usize> {
     pub implicit: bool,
     /// Whether that has an influence on what is carried in the same step.
     pub coupled: bool,
+}
+
+/// A place with the values of the unknowns there, and their gradients.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point<const B: usize, const D: usize> {
+    pub x: [f64; D],
+    pub u: [f64; B],
+    pub slopes: [[f64; D]; B],
+}
+
+/// A flux by gradients, and its derivatives by the unknowns and by their gradients.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Steep<const B: usize, const D: usize> {
+    /// Of each equation along each axis.
+    pub flux: [[f64; D]; B],
+    pub by_value: [[[f64; D]; B]; B],
+    /// By the unknown and the axis of its derivative.
+    pub by_slope: [[[[f64; D]; D]; B]; B],
+}
+
+impl<const B: usize, const D: usize> Steep<B, D> {
+    pub const NONE: Self =
+        Self { flux: [[0.0; D]; B], by_value: [[[0.0; D]; B]; B], by_slope: [[[[0.0; D]; D]; B]; B] };
+}
+
+/// A source by gradients, and its derivatives by the unknowns and by their gradients.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sloped<const B: usize, const D: usize> {
+    pub value: [f64; B],
+    pub by_value: Block<B>,
+    pub by_slope: [[[f64; D]; B]; B],
+}
+
+impl<const B: usize, const D: usize> Sloped<B, D> {
+    pub const NONE: Self = Self { value: [0.0; B], by_value: [[0.0; B]; B], by_slope: [[[0.0; D]; B]; B] };
+}
+
+/// What is stored, the quantity whose integral an equation changes, and its derivatives by the unknowns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stored<const B: usize> {
+    pub value: [f64; B],
+    pub by_value: Block<B>,
+}
+
+impl<const B: usize> Stored<B> {
+    pub const NONE: Self = Self { value: [0.0; B], by_value: [[0.0; B]; B] };
 }
 
 /// Derivatives of B equations by B unknowns.
@@ -148,18 +218,19 @@ impl<const B: usize, const D: usize, Solver: Default> Default for FiniteVolumes<
     }
 }
 
-/// One face in one half of a time step: g/2, its derivatives, and the weight of u_b − u_a in it.
+/// One face in one half of a time step: g/2, its derivatives, and the weights of u_b − u_a in it, of each unknown in
+/// each equation.
 #[derive(Debug, Clone, Copy)]
 struct Face<const B: usize> {
     crossing: Crossing<B>,
-    tangent: [f64; B],
+    tangent: Block<B>,
 }
 
 impl<const B: usize> Face<B> {
     /// Nothing passes.
     const CLOSED: Self = Self {
         crossing: Crossing { value: [0.0; B], by_below: [[0.0; B]; B], by_above: [[0.0; B]; B] },
-        tangent: [0.0; B],
+        tangent: [[0.0; B]; B],
     };
 }
 
@@ -183,10 +254,43 @@ struct Half<'a, const D: usize> {
     stretched: &'a [[f64; D]],
 }
 
+/// What a law makes of values at all places of padded vectors.
+struct View<N, const B: usize, const D: usize> {
+    nodes: Vec<N>,
+    faces: Vec<[Face<B>; D]>,
+    /// Sources by gradients; empty where there are none.
+    sloped: Vec<Sloped<B, D>>,
+    /// Empty where u itself is stored.
+    stored: Vec<Stored<B>>,
+}
+
+impl<N, const B: usize, const D: usize> View<N, B, D> {
+    /// What is stored at a place where the unknowns are u.
+    #[inline(always)]
+    fn stored(&self, k: usize, u: &[f64; B]) -> [f64; B] {
+        self.stored.get(k).map_or(*u, |stored| stored.value)
+    }
+}
+
+/// What the faces are made of: nodes, fluxes by gradients for each axis, and what is stored. The last two may be empty.
+struct Made<'a, N, const B: usize, const D: usize> {
+    nodes: &'a [N],
+    steep: &'a [Vec<Steep<B, D>>; D],
+    stored: &'a [Stored<B>],
+}
+
 /// What lies around a face and around a dual cell, with S points in a stencil.
 trait Around<const D: usize, const S: usize> {
     /// All faces, each stored with the node below it. Those on bounded sides have no flux.
-    fn faces<const B: usize, L: Law<B, D>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; D]>;
+    fn faces<const B: usize, L: Law<B, D>>(
+        &self,
+        law: &L,
+        made: &Made<'_, L::Node, B, D>,
+        u: &[[f64; B]],
+    ) -> Vec<[Face<B>; D]>;
+
+    /// Four times u_b − u_a at the face above a place along an axis.
+    fn change<const B: usize>(&self, u: &[[f64; B]], k: usize, axis: usize) -> [f64; B];
 
     /// The sum of the fluxes out of the dual cell of a place, in this half of the step.
     fn leaving<const B: usize>(&self, faces: &[[Face<B>; D]], k: usize) -> [f64; B];

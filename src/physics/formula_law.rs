@@ -1,10 +1,11 @@
 //! A user's equation as a conservation law.
 
 use super::bounds::Bounds;
-use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Limited, Stepper};
+use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Limited, Point, Sloped, Steep, Stepper, Stored};
 use super::formula_pde::{Formulas, Scheme};
 use super::prescribed::evaluate;
 use super::sides::Open;
+use super::terms::Terms;
 use super::{Motion, Physics, nodal};
 use crate::error::{Failure, Result};
 use crate::formula::Program;
@@ -31,6 +32,7 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     stepper: Stepper,
     limited: Limited<B>,
     bounds: Bounds<D, B>,
+    terms: Terms<D, B>,
     /// The unknowns that are only carried and diffused.
     keeps_range: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
@@ -49,13 +51,16 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Formulas { names, nodal, initial, sides, exact, scheme, bounds } = formulas;
+        let Formulas { names, nodal, initial, sides, exact, scheme, terms, bounds } = formulas;
         let is_zero = |quantity: usize, c: usize| nodal[quantity * B + c].text() == "0";
         let limited = std::array::from_fn(|c| match scheme {
-            None => is_zero(Self::DIFFUSIVITY, c),
+            None => is_zero(Self::DIFFUSIVITY, c) && !terms.has_flux(c) && !terms.has_storage(c),
             Some(scheme) => scheme == Scheme::Limited,
         });
-        let changed = |c: usize| !is_zero(Self::DIFFUSIVITY, c) || !is_zero(Self::SOURCE, c);
+        let changed = |c: usize| {
+            let plain = is_zero(Self::DIFFUSIVITY, c) && is_zero(Self::SOURCE, c);
+            !plain || terms.has_flux(c) || terms.has_source(c)
+        };
         let by_others = |c: usize| (0..D).any(|d| (0..B).any(|e| !limited[e] && nodal[d * B + c].depends_on(D + e)));
         let limited = Limited {
             unknowns: limited,
@@ -65,6 +70,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         let flows = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
         };
+        let changed_by_terms = |c: usize| terms.has_flux(c) || terms.has_source(c) || terms.has_storage(c);
         let keeps_range = std::array::from_fn(|c| {
             let fluxes = || (0..D).map(|d| &nodal[d * B + c]);
             let flows = fluxes().any(|flux| flux.text() != "0");
@@ -76,13 +82,16 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
                 Open::Flux(_) => false,
             };
             let source = nodal[Self::SOURCE * B + c].text() != "0";
-            !source && own && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
+            !source && own && !changed_by_terms(c) && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
         });
         let open = (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(flows).collect();
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
-            shares: std::array::from_fn(|c| cartesian && !is_zero(Self::DIFFUSIVITY, c) && !limited.unknowns[c]),
+            shares: std::array::from_fn(|c| {
+                cartesian && !is_zero(Self::DIFFUSIVITY, c) && !limited.unknowns[c] && !terms.has_storage(c)
+            }),
+            terms: Terms::new(&terms, &names),
             limited,
             bounds: Bounds::new(
                 &names,
@@ -306,6 +315,33 @@ where
 
     fn limited(&self) -> Limited<B> {
         self.limited
+    }
+
+    fn has_steep(&self) -> bool {
+        self.terms.have_fluxes()
+    }
+
+    fn steep(&self, at: (f64, &[Point<B, D>]), mesh: &Mesh<D>) -> Result<Vec<Steep<B, D>>, Failure> {
+        self.terms.fluxes(at, mesh, |place| Self::node(mesh, place))
+    }
+
+    fn has_sloped(&self) -> bool {
+        self.terms.have_sources()
+    }
+
+    fn sloped(&self, at: (f64, &[Point<B, D>]), mesh: &Mesh<D>) -> Result<Vec<Sloped<B, D>>, Failure> {
+        self.terms.sources(at, mesh, |place| Self::node(mesh, place))
+    }
+
+    fn stored(&self, at: (f64, &[[f64; D]], &[[f64; B]]), mesh: &Mesh<D>) -> Result<Vec<Stored<B>>, Failure> {
+        match self.terms.have_storage() {
+            true => self.terms.storage(at, mesh, |place| Self::node(mesh, place)),
+            false => Ok(Vec::new()),
+        }
+    }
+
+    fn algebraic(&self) -> [bool; B] {
+        self.terms.algebraic()
     }
 
     fn stepper(&self) -> Stepper {

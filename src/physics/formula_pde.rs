@@ -1,8 +1,11 @@
+mod read;
+
+pub(super) use read::Formulas;
+
 use super::formula_law::FormulaLaw;
-use super::sides::{Condition, Conditions, Open};
-use super::{AXES, Coordinates, Physics, Stepper, bounds, formula, mistaken};
+use super::sides::Conditions;
+use super::{Coordinates, Diffusivity, Physics, Stepper};
 use crate::error::{Error, Result};
-use crate::formula::Formula;
 use crate::geometry::DualCells;
 use crate::numerics::linear::{RobustLine, RobustTransport};
 use crate::setting::{Fluxes, Text, texts};
@@ -62,10 +65,14 @@ pub struct FormulaPde<const D: usize = 2> {
     /// Flux F of each unknown, as formulas along x and along y; 0 by default.
     #[serde(default, skip_serializing_if = "no_flux")]
     pub flux: Fluxes<D>,
-    /// Diffusivity D ≥ 0 of each unknown; 0 by default.
+    /// Diffusivity D ≥ 0 of each unknown, a [`Diffusivity`]; 0 by default.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub diffusivity: BTreeMap<String, Diffusivity>,
+    /// What takes the place of u in u_t, a formula of the unknowns, x, y and t; 0 for an equation without time
+    /// derivative. u itself by default.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
-    pub diffusivity: BTreeMap<String, String>,
+    pub storage: BTreeMap<String, String>,
     /// Source S of each unknown; 0 by default.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "texts")]
     #[schemars(with = "BTreeMap<String, Text>")]
@@ -110,22 +117,6 @@ pub const MAX_UNKNOWNS: usize = 4;
 /// The same on a line.
 pub const MAX_UNKNOWNS_ON_A_LINE: usize = 8;
 
-/// The formulas of a [`FormulaPde`], parsed.
-pub(super) struct Formulas<const D: usize> {
-    pub names: Vec<String>,
-    /// Formulas of x, y, the unknowns and t: F along x of all unknowns, then F along y, D and S; then the derivatives
-    /// of all of these by the first unknown, by the second, and so on.
-    pub nodal: Vec<Formula>,
-    /// Formulas of x, y and t, as all that follow.
-    pub initial: Vec<Formula>,
-    pub exact: Vec<Option<Formula>>,
-    /// For each unknown and the lower and the upper end of each axis.
-    pub sides: Vec<[[Open; 2]; D]>,
-    pub scheme: Option<Scheme>,
-    /// The lower and the upper bound of each unknown.
-    pub bounds: Vec<[Option<Formula>; 2]>,
-}
-
 impl<const D: usize> FormulaPde<D> {
     /// Refuses settings that define no equation.
     ///
@@ -166,8 +157,11 @@ impl<const D: usize> FormulaPde<D> {
     /// How it is stepped where nothing is said: with [`Stepper::TrBdf2`] where something diffuses or has a source,
     /// which may decay faster than any step is short.
     pub fn stepper(&self) -> Stepper {
-        let given = |texts: &BTreeMap<String, String>| texts.values().any(|text| text != "0");
-        match given(&self.diffusivity) || given(&self.source) {
+        let diffuses = self.diffusivity.values().any(|of| !of.is_zero());
+        let has_source = self.source.values().any(|text| text != "0");
+        // what a flux makes of gradients diffuses, too
+        let by_gradients = self.storage.is_empty() && self.flux.values().flatten().all(|text| !text.contains('_'));
+        match diffuses || has_source || !by_gradients {
             true => Stepper::TrBdf2,
             false => Stepper::Trapezoid,
         }
@@ -191,111 +185,6 @@ impl<const D: usize> FormulaPde<D> {
             Some([(format!("initial.{name}"), initial.as_str()), (format!("boundary.{name}"), boundary)])
         });
         both.collect()
-    }
-
-    /// Reads all formulas.
-    ///
-    /// # Errors
-    /// As [`FormulaPde::check`].
-    pub(super) fn read(&self) -> Result<Formulas<D>> {
-        self.check_names()?;
-        let names = &self.unknowns;
-        let variables: Vec<&str> =
-            AXES[..D].iter().copied().chain(names.iter().map(String::as_str)).chain(["t"]).collect();
-        let nodal = |key: String, text: &str| {
-            Formula::parse(text, &variables).map(|f| (key.clone(), f)).map_err(|mistake| mistaken(&key, text, mistake))
-        };
-        let mut values = Vec::new();
-        for axis in 0..D {
-            for name in names {
-                let text = self.flux.get(name).map_or("0", |along| &along[axis]);
-                values.push(nodal(format!("flux.{name}[{axis}]"), text)?);
-            }
-        }
-        for (table, texts) in [("diffusivity", &self.diffusivity), ("source", &self.source)] {
-            for name in names {
-                values.push(nodal(format!("{table}.{name}"), texts.get(name).map_or("0", String::as_str))?);
-            }
-        }
-        for (key, f) in values.iter().filter(|(key, _)| key.starts_with("diffusivity")) {
-            let value = f.eval(&[]);
-            if value < 0.0 {
-                let message = format!("the diffusivity is {value}, and no solution lasts where it is negative");
-                let (text, at) = (f.text().to_string(), 0..f.text().len());
-                return Err(Error::Formula { key: key.clone(), text, at, message, help: None });
-            }
-        }
-        let mut all: Vec<Formula> = values.iter().map(|(_, f)| f.clone()).collect();
-        for unknown in 0..names.len() {
-            for (key, f) in &values {
-                all.push(f.derivative(D + unknown).map_err(|mistake| mistaken(key, f.text(), mistake))?);
-            }
-        }
-        let read = |table: &str, texts: &BTreeMap<String, String>| -> Result<Vec<Option<Formula>>> {
-            let read = |name| match texts.get(name).map(String::as_str) {
-                None => Ok(None),
-                Some(text) => formula::<D>(&format!("{table}.{name}"), text).map(Some),
-            };
-            names.iter().map(read).collect()
-        };
-        Ok(Formulas {
-            names: names.clone(),
-            nodal: all,
-            initial: read("initial", &self.initial)?.into_iter().flatten().collect(),
-            sides: (names.iter())
-                .map(|name| self.boundary.get(name).unwrap_or(&Conditions::All(Condition::NoFlux)).read(name, names))
-                .collect::<Result<_>>()?,
-            exact: read("exact", &self.exact)?,
-            scheme: self.scheme,
-            bounds: names.iter().map(|name| bounds::read::<D>(name, &self.bounds)).collect::<Result<_>>()?,
-        })
-    }
-
-    /// Refuses unknowns that cannot be named in formulas, tables with keys that are no unknowns, and missing initial
-    /// values.
-    fn check_names(&self) -> Result<()> {
-        let names = &self.unknowns;
-        let most = if D == 1 { MAX_UNKNOWNS_ON_A_LINE } else { MAX_UNKNOWNS };
-        if !(1..=most).contains(&names.len()) {
-            let rule = format!("must be 1 to {most} names");
-            return Err(Error::invalid("unknowns", format!("{names:?}"), rule));
-        }
-        for (k, name) in names.iter().enumerate() {
-            let refused = |why: String| Err(Error::invalid(format!("unknowns[{k}]"), format!("{name:?}"), why));
-            if name == "t" || AXES[..D].contains(&name.as_str()) {
-                let axes = AXES[..D].join(", ");
-                return refused(format!("{axes} and t are place and time in every formula; take another name"));
-            }
-            if name == "kind" {
-                return refused("`kind` is a key of its own in every table; take another name".into());
-            }
-            let known: Vec<&str> = names[..=k].iter().map(String::as_str).collect();
-            if let Err(mistake) = Formula::parse("0", &known) {
-                return refused(format!("{}; take another name", mistake.message));
-            }
-        }
-        let tables = [
-            ("flux", self.flux.keys().collect::<Vec<_>>()),
-            ("diffusivity", self.diffusivity.keys().collect()),
-            ("source", self.source.keys().collect()),
-            ("initial", self.initial.keys().collect()),
-            ("boundary", self.boundary.keys().collect()),
-            ("exact", self.exact.keys().collect()),
-            ("bounds", self.bounds.keys().collect()),
-        ];
-        for (table, keys) in tables {
-            if let Some(key) = keys.into_iter().find(|key| !names.contains(key)) {
-                let rule = format!("`{key}` is not among pde.unknowns = {names:?}; add it there, or leave this out");
-                return Err(Error::invalid(format!("{table}.{key}"), "given", rule));
-            }
-        }
-        match names.iter().find(|name| !self.initial.contains_key(*name)) {
-            None => Ok(()),
-            Some(name) => {
-                let rule = format!("every unknown needs one; add {name} = \"…\"");
-                Err(Error::invalid("initial", format!("not given for `{name}`"), rule))
-            }
-        }
     }
 }
 

@@ -3,6 +3,7 @@
 mod bounds;
 mod burgers;
 mod curvilinear;
+mod diffusivity;
 mod finite_volumes;
 mod formula_law;
 mod formula_pde;
@@ -10,9 +11,11 @@ mod line;
 mod prescribed;
 mod shallow_water;
 mod sides;
+mod terms;
 mod uniform;
 
 pub use burgers::{Burgers, BurgersFlux, Convection};
+pub use diffusivity::Diffusivity;
 pub use finite_volumes::Stepper;
 pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE, Scheme};
 pub use line::{Coordinates, LineBurgers, LineFormulaPde, LinePdeKind};

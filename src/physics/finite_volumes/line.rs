@@ -1,19 +1,28 @@
 //! Finite volumes on a line: two faces around a dual cell, three nodes in a stencil.
 
-use super::{Around, Block, Crossing, Face, Half, Law, add};
+use super::{Around, Block, Crossing, Face, Half, Law, Made, add};
 use crate::geometry::Patch;
 
 impl Around<1, 3> for Half<'_, 1> {
-    fn faces<const B: usize, L: Law<B, 1>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; 1]> {
+    fn faces<const B: usize, L: Law<B, 1>>(
+        &self,
+        law: &L,
+        made: &Made<'_, L::Node, B, 1>,
+        u: &[[f64; B]],
+    ) -> Vec<[Face<B>; 1]> {
         let patch = self.cells.patch();
         let last = if patch.wraps[0] { patch.size[0] } else { patch.size[0] - 1 };
         let mut faces = vec![[Face::CLOSED]; u.len()];
         for (k, face) in faces.iter_mut().enumerate().take(last + 1).skip(1) {
-            *face = [self.face(law, nodes, u, [k, k + 1], 0, 0.0, |_| 0.0)];
+            *face = [self.face(law, made, u, [k, k + 1], 0, 0.0, |_| 0.0)];
         }
         patch.wrap(&mut faces);
-        self.open(law, nodes, u, &mut faces);
+        self.open(law, made.nodes, u, &mut faces);
         faces
+    }
+
+    fn change<const B: usize>(&self, _u: &[[f64; B]], _k: usize, _axis: usize) -> [f64; B] {
+        [0.0; B]
     }
 
     fn leaving<const B: usize>(&self, faces: &[[Face<B>; 1]], k: usize) -> [f64; B] {

@@ -1,6 +1,6 @@
 //! Newton's method for the implicit part of a step.
 
-use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Side, inside};
+use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Side};
 use crate::error::Failure;
 use crate::geometry::Patch;
 use crate::numerics::larger;
@@ -45,16 +45,13 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         for<'a> Half<'a, D>: Around<D, S>,
     {
         let patch = *half.cells.patch();
-        let seen = inside(half.mesh, half.x);
         let mut scale = Scale::of(u);
         let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
         let stalled = loop {
-            let nodes = law.nodes(half.t, &seen, u);
-            law.check(half.mesh, u, &nodes)?;
-            let faces = Around::<D, S>::faces(half, law, &nodes, u);
-            half.residual(law, excess, (&nodes, &faces), known, u, &mut residual);
+            let view = half.view::<S, B, L>(law, u)?;
+            half.residual(law, excess, &view, known, u, &mut residual);
             for side in sides {
                 for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
                     *residual = if given.is_some() { 0.0 } else { *residual };
@@ -75,7 +72,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                 let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
                 break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
             }
-            half.matrix(law, excess, (&nodes, &faces), sides, &mut matrix);
+            half.matrix(law, excess, &view, sides, &mut matrix);
             for (i, c) in bound {
                 matrix.rows[i].iter_mut().for_each(|block| block[c] = [0.0; B]);
                 matrix.rows[i][0][c][c] = 1.0;

@@ -1,11 +1,16 @@
 //! Finite volumes in the plane: four faces around a dual cell, nine nodes in a stencil.
 
-use super::{Around, Block, Crossing, Face, Half, Law, add};
+use super::{Around, Block, Crossing, Face, Half, Law, Made, add};
 use crate::geometry::Patch;
 use crate::parallel;
 
 impl Around<2, 9> for Half<'_, 2> {
-    fn faces<const B: usize, L: Law<B, 2>>(&self, law: &L, nodes: &[L::Node], u: &[[f64; B]]) -> Vec<[Face<B>; 2]> {
+    fn faces<const B: usize, L: Law<B, 2>>(
+        &self,
+        law: &L,
+        made: &Made<'_, L::Node, B, 2>,
+        u: &[[f64; B]],
+    ) -> Vec<[Face<B>; 2]> {
         let patch = self.cells.patch();
         let ([n, m], wraps) = (patch.size, patch.wraps);
         let s = m + 2;
@@ -17,16 +22,21 @@ impl Around<2, 9> for Half<'_, 2> {
             for (q, faces) in row.iter_mut().enumerate().take(m + 1).skip(1) {
                 let k = p * s + q;
                 if p < n || wraps[0] {
-                    faces[0] = self.between(law, nodes, u, [k, k + s], 0, [k + 1, k + s + 1, k - 1, k + s - 1]);
+                    faces[0] = self.between(law, made, u, [k, k + s], 0);
                 }
                 if q < m || wraps[1] {
-                    faces[1] = self.between(law, nodes, u, [k, k + 1], 1, [k - s, k - s + 1, k + s, k + s + 1]);
+                    faces[1] = self.between(law, made, u, [k, k + 1], 1);
                 }
             }
         });
         patch.wrap(&mut faces);
-        self.open(law, nodes, u, &mut faces);
+        self.open(law, made.nodes, u, &mut faces);
         faces
+    }
+
+    fn change<const B: usize>(&self, u: &[[f64; B]], k: usize, axis: usize) -> [f64; B] {
+        let [p, q, r, s] = self.ends(k, axis).map(|k| &u[k]);
+        std::array::from_fn(|c| (p[c] + q[c]) - (r[c] + s[c]))
     }
 
     #[inline(always)]
@@ -53,15 +63,17 @@ impl Around<2, 9> for Half<'_, 2> {
         #[allow(clippy::needless_range_loop)] // c is an equation and an unknown
         for c in 0..B {
             row[0][c][c] += 1.0;
-            // the ends b and a of the four faces, as points of the stencil
-            for (weight, b, a) in [
-                (share * right.tangent[c], [4, 8], [3, 7]),
-                (-share * left.tangent[c], [6, 4], [5, 3]),
-                (share * top.tangent[c], [1, 6], [2, 8]),
-                (-share * bottom.tangent[c], [5, 1], [7, 2]),
-            ] {
-                b.into_iter().for_each(|point| row[point][c][c] += weight);
-                a.into_iter().for_each(|point| row[point][c][c] -= weight);
+            for e in 0..B {
+                // the ends b and a of the four faces, as points of the stencil
+                for (weight, b, a) in [
+                    (share * right.tangent[c][e], [4, 8], [3, 7]),
+                    (-share * left.tangent[c][e], [6, 4], [5, 3]),
+                    (share * top.tangent[c][e], [1, 6], [2, 8]),
+                    (-share * bottom.tangent[c][e], [5, 1], [7, 2]),
+                ] {
+                    b.into_iter().for_each(|point| row[point][c][e] += weight);
+                    a.into_iter().for_each(|point| row[point][c][e] -= weight);
+                }
             }
         }
         row
@@ -102,20 +114,29 @@ impl Around<2, 9> for Half<'_, 2> {
 }
 
 impl Half<'_, 2> {
-    /// The face between two places; `ends` are the places around its end b, then those around its end a.
+    /// The face between two places.
     #[inline(always)]
     fn between<const B: usize, L: Law<B, 2>>(
         &self,
         law: &L,
-        nodes: &[L::Node],
+        made: &Made<'_, L::Node, B, 2>,
         u: &[[f64; B]],
         [i, k]: [usize; 2],
         axis: usize,
-        ends: [usize; 4],
     ) -> Face<B> {
         let (d, [nx, ny]) = (self.way(i, k), self.cells.normals()[i][axis]);
-        let [p, q, r, s] = ends.map(|k| &u[k]);
-        self.face(law, nodes, u, [i, k], axis, d[0] * ny - d[1] * nx, |c| (p[c] + q[c]) - (r[c] + s[c]))
+        let [p, q, r, s] = self.ends(i, axis).map(|k| &u[k]);
+        self.face(law, made, u, [i, k], axis, d[0] * ny - d[1] * nx, |c| (p[c] + q[c]) - (r[c] + s[c]))
+    }
+
+    /// The places around the end b of the face above a place, then those around its end a.
+    #[inline(always)]
+    fn ends(&self, k: usize, axis: usize) -> [usize; 4] {
+        let s = self.cells.patch().size[1] + 2;
+        match axis {
+            0 => [k + 1, k + s + 1, k - 1, k + s - 1],
+            _ => [k - s, k - s + 1, k + s, k + s + 1],
+        }
     }
 
     /// The faces of a dual cell: above and below along ξ, above and below along η.

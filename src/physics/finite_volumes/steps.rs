@@ -2,7 +2,9 @@
 
 use super::newton::Solved;
 use super::transport::Transport;
-use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, settle, sides, stretched};
+use super::{
+    Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, inside, settle, sides, stretched,
+};
 use crate::error::Failure;
 use crate::geometry::{Cells, DualCells, Mesh, diagonal, padded};
 use crate::numerics::linear::LinearSolver;
@@ -48,14 +50,16 @@ where
         Half { dt, t: self.t, mesh: self.mesh, cells: &self.cells, x: &self.x, swept, stretched }
     }
 
-    /// M u for each node.
-    fn mass(&self, u: &[[f64; B]]) -> Vec<[f64; B]> {
+    /// M u for each node, u being what is stored.
+    fn mass<L: Law<B, D>>(&self, law: &L, u: &[[f64; B]]) -> Result<Vec<[f64; B]>, Failure> {
+        let stored = law.stored((self.t, &inside(self.mesh, &self.x), u), self.mesh)?;
         let of = |(i, k): (usize, usize)| {
             let area = self.cells.areas()[i];
             let more = self.excess.as_ref().map_or([0.0; B], |excess| excess.product(i, k, |n| u[n]));
-            std::array::from_fn(|c| area * u[k][c] + more[c])
+            let stored = stored.get(k).map_or(u[k], |stored| stored.value);
+            std::array::from_fn(|c| area * stored[c] + more[c])
         };
-        self.cells.patch().places().enumerate().map(of).collect()
+        Ok(self.cells.patch().places().enumerate().map(of).collect())
     }
 }
 
@@ -111,7 +115,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let mut work = Work { substeps, ..Work::default() };
         if !implicit {
             let carried = &carried[shares.len() - 1];
-            let values = old.mass(&u).into_iter().zip(carried).zip(new.cells.areas());
+            let values = old.mass(law, &u)?.into_iter().zip(carried).zip(new.cells.areas());
             let mut values: Vec<[f64; B]> =
                 values.map(|((mass, carried), area)| std::array::from_fn(|c| (mass[c] + carried[c]) / area)).collect();
             for side in sides(law, new.t, new.mesh) {
@@ -129,7 +133,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         }
         let end = padded(new.mesh.lattice(), &values, [[0.0; B]; D]);
         let all = &carried[shares.len() - 1];
-        let brought: Vec<[f64; B]> = (old.mass(&u).into_iter().zip(new.mass(&end)).zip(all))
+        let brought: Vec<[f64; B]> = (old.mass(law, &u)?.into_iter().zip(new.mass(law, &end)?).zip(all))
             .map(|((before, after), carried)| {
                 let brought = |c: usize| if unknowns[c] { after[c] - before[c] - carried[c] } else { 0.0 };
                 std::array::from_fn(brought)
@@ -218,8 +222,8 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
 
         let scale = 1.0 / (gamma * (2.0 - gamma));
         let (later, earlier) = (scale, scale * (1.0 - gamma) * (1.0 - gamma));
-        let mut known = middle.mass(&there);
-        for (known, start) in known.iter_mut().zip(old.mass(&u)) {
+        let mut known = middle.mass(law, &there)?;
+        for (known, start) in known.iter_mut().zip(old.mass(law, &u)?) {
             *known = std::array::from_fn(|c| later * known[c] - earlier * start[c]);
         }
         if let [first, whole] = carried {
@@ -268,8 +272,9 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let Solved { residual, work, stalled } =
             self.newton(law, half, level.excess.as_ref(), known, (&sides, &bounds), &mut u)?;
         let mut values: Vec<[f64; B]> = patch.places().map(|k| u[k]).collect();
-        // an unknown that is given nowhere has no flux through the sides
-        settle(&level.cells, &residual, &mut values, |c| sides.iter().all(|side| side.given[c].is_none()));
+        // an unknown that is given nowhere has no flux through the sides; only of u itself is the residual one of u
+        let plain = law.stored((level.t, &inside(level.mesh, &level.x), &u), level.mesh)?.is_empty();
+        settle(&level.cells, &residual, &mut values, |c| plain && sides.iter().all(|side| side.given[c].is_none()));
         within(&bounds, &mut values);
         // of values that are not finite, that is what is wrong
         check_finite(law.names(), level.mesh, &values)?;

@@ -45,7 +45,7 @@ fn each_flux_keeps_its_own_invariant() {
         let u = law.initial(0.0, &mesh);
         let u = padded(mesh.lattice(), u.values().as_chunks::<1>().0, [[0.0]; 2]);
         let half = Half { dt, t: 0.0, mesh: &mesh, cells: &cells, x: &x, swept: &swept, stretched: &[] };
-        let faces = half.faces(&law, &Law::nodes(&law, 0.0, &x, &u), &u);
+        let faces = half.view(&law, &u).unwrap().faces;
         let sum = |f: fn(f64) -> f64| cells.patch().places().map(|k| half.leaving(&faces, k)[0] * f(u[k][0])).sum();
         [sum(|u| 1.0 / u), sum(|u| u)]
     };
@@ -100,7 +100,6 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
     let [old_cells, cells] = [old, new].map(DualCells::new);
     let (patch, swept) = (*cells.patch(), old_cells.swept(&cells));
     let [from, x] = [old, new].map(|mesh| padded(lattice, mesh.x(), diagonal(mesh.extent())));
-    let seen = inside(new, &x);
     let shares = law.shares_mass();
     let shared = shares.contains(&true);
     let stretched = if shared { stretched([&old_cells, &cells], [&from, &x]) } else { Vec::new() };
@@ -108,10 +107,8 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
     let half = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x, swept: &swept, stretched: &stretched };
     let nothing = vec![[0.0; B]; patch.len()];
     let residual = |u: &[[f64; B]]| -> Vec<[f64; B]> {
-        let nodes = law.nodes(half.t, &seen, u);
-        let faces = half.faces(law, &nodes, u);
         let mut residual = nothing.clone();
-        half.residual(law, excess.as_ref(), (&nodes, &faces), &nothing, u, &mut residual);
+        half.residual(law, excess.as_ref(), &half.view(law, u).unwrap(), &nothing, u, &mut residual);
         residual
     };
     let mut u = padded(lattice, u, [[0.0; B]; 2]);
@@ -124,13 +121,11 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
     }
     Half::repeat_sides(&patch, &mut direction);
 
-    let nodes = law.nodes(half.t, &seen, &u);
-    let faces = half.faces(law, &nodes, &u);
     let mut matrix = BlockMatrix::<2, 9, B>::zero_blocks(patch);
     let places: Vec<usize> = patch.places().collect();
     let sides: Vec<Side<B>> = lattice.sides().map(|i| Side { i, k: places[i], given: [None; B] }).collect();
     // of −residual
-    half.matrix(law, excess.as_ref(), (&nodes, &faces), &sides, &mut matrix);
+    half.matrix(law, excess.as_ref(), &half.view(law, &u).unwrap(), &sides, &mut matrix);
     let mut product = vec![[0.0; B]; patch.padded_len()];
     matrix.multiply(&direction, &mut product);
 

@@ -1,0 +1,185 @@
+//! Tensors, cross diffusion, gradients in fluxes, diffusivities and sources, storage: against exact solutions.
+
+use driftmesh::study::{Kind, MovingLine, MovingMesh, MovingRun, Source};
+
+const HEAD: &str = "[study]\nname = \"terms\"\nkind = \"moving-mesh\"\n";
+
+fn line(text: &str) -> MovingRun<1> {
+    let study = MovingLine::from_source(&Source::new("line.toml", format!("{HEAD}{text}"))).unwrap();
+    let (run, failure) = study.compute().unwrap();
+    assert!(failure.is_none(), "{failure:?}");
+    run
+}
+
+fn plane(text: &str) -> MovingRun {
+    let study = MovingMesh::from_source(&Source::new("plane.toml", format!("{HEAD}{text}"))).unwrap();
+    let (run, failure) = study.compute().unwrap();
+    assert!(failure.is_none(), "{failure:?}");
+    run
+}
+
+/// The order of the largest error from n to 2n cells and half the step, of a mesh that is moved about.
+fn order(pde: &str) -> f64 {
+    let error = |cells: usize| {
+        let run = plane(&format!(
+            r#"
+            [grid]
+            cells = [{cells}, {cells}]
+            [time]
+            start = 0.0
+            end = 0.2
+            step = {}
+            [monitor]
+            kind = "given"
+            of = "1 + 0.5*sin(2*pi*x)*cos(pi*(y - t))"
+            [mesh]
+            relaxation = {{ time = 0.05 }}
+            [pde]
+            kind = "formula"
+            {pde}
+            "#,
+            0.4 / cells as f64
+        ));
+        run.record.reports.last().unwrap().error.unwrap().linf
+    };
+    let errors = [12, 24].map(error);
+    println!("{errors:?}");
+    (errors[0] / errors[1]).log2()
+}
+
+/// u_t = ∇·(D∇u) + S with a full tensor, u = sin(x + 2y − t) and S = cos(…)(−1) + (D₁₁ + 4 D₂₂ + 4 D₁₂) sin(…).
+#[test]
+fn a_tensor_is_second_order() {
+    let order = order(
+        r#"
+        unknowns = ["u"]
+        diffusivity = { u = [["1", "0.3"], ["0.3", "0.5"]] }
+        source = { u = "-cos(x + 2*y - t) + 4.2*sin(x + 2*y - t)" }
+        initial = { u = "sin(x + 2*y - t)" }
+        boundary = { u = "sin(x + 2*y - t)" }
+        exact = { u = "sin(x + 2*y - t)" }
+        "#,
+    );
+    assert!(order > 1.7, "{order:.2}");
+}
+
+/// The same with one diffusivity an axis, 1 along x and .1 along y.
+#[test]
+fn diffusivities_by_axis_are_second_order() {
+    let order = order(
+        r#"
+        unknowns = ["u"]
+        diffusivity = { u = ["1", 0.1] }
+        source = { u = "-cos(x + 2*y - t) + 1.4*sin(x + 2*y - t)" }
+        initial = { u = "sin(x + 2*y - t)" }
+        boundary = { u = "sin(x + 2*y - t)" }
+        exact = { u = "sin(x + 2*y - t)" }
+        "#,
+    );
+    assert!(order > 1.7, "{order:.2}");
+}
+
+/// Cross diffusion and a flux by the gradient of another unknown: u_t = ∇·(∇u − u∇v) = Δu − u_x v_x − u_y v_y − uΔv
+/// with v = x² + y: v_x = 2x, v_y = 1, Δv = 2, and u = e^{−t} sin x + 2.
+#[test]
+fn gradients_of_others_are_second_order() {
+    let source = "-exp(-t)*sin(x) + exp(-t)*sin(x) + 2*x*exp(-t)*cos(x) + 2*(exp(-t)*sin(x) + 2)";
+    let exact = "exp(-t)*sin(x) + 2";
+    for how in [
+        r#"diffusivity = { u = { u = "1", v = "-u" }, v = "1" }"#,
+        "diffusivity = { u = \"1\", v = \"1\" }\nflux = { u = [\"u*v_x\", \"u*v_y\"] }",
+    ] {
+        let order = order(&format!(
+            r#"
+            unknowns = ["u", "v"]
+            {how}
+            source = {{ u = "{source}", v = "-2" }}
+            initial = {{ u = "{exact}", v = "x^2 + y" }}
+            boundary = {{ u = "{exact}", v = "x^2 + y" }}
+            exact = {{ u = "{exact}", v = "x^2 + y" }}
+            "#
+        ));
+        assert!(order > 1.7, "{how}: {order:.2}");
+    }
+}
+
+/// Gradients in a diffusivity and in a source: u_t = ∇·((1 + |∇u|²)∇u) + u_x² + S with u = t + x² − y/2, for which
+/// the flux is (2x (1.25 + 4x²), …), its divergence 2.5 + 24x², u_x² = 4x², and S = 1 − 2.5 − 28x².
+#[test]
+fn gradients_of_itself_are_second_order() {
+    let order = order(
+        r#"
+        unknowns = ["u"]
+        diffusivity = { u = "1 + u_x^2 + u_y^2" }
+        source = { u = "u_x^2 - 1.5 - 28*x^2" }
+        initial = { u = "t + x^2 - y/2" }
+        boundary = { u = "t + x^2 - y/2" }
+        exact = { u = "t + x^2 - y/2" }
+        "#,
+    );
+    assert!(order > 1.7, "{order:.2}");
+}
+
+/// (u + u²/2)_t = Δu + S with u = 2 + sin(x + y − t): (1 + u) u_t = −(1 + u) cos(…), Δu = −2 sin(…).
+#[test]
+fn storage_is_second_order() {
+    let order = order(
+        r#"
+        unknowns = ["u"]
+        storage = { u = "u + u^2/2" }
+        diffusivity = { u = "1" }
+        source = { u = "-(3 + sin(x + y - t))*cos(x + y - t) + 2*sin(x + y - t)" }
+        initial = { u = "2 + sin(x + y - t)" }
+        boundary = { u = "2 + sin(x + y - t)" }
+        exact = { u = "2 + sin(x + y - t)" }
+        "#,
+    );
+    assert!(order > 1.7, "{order:.2}");
+}
+
+/// An unknown without time derivative: 0 = Δp + u with u_t = Δu; u = e^{−π²t} sin πx and p = u/π², on a line too.
+#[test]
+fn an_elliptic_unknown_is_second_order() {
+    let pde = r#"
+        unknowns = ["u", "p"]
+        storage = { p = 0 }
+        diffusivity = { u = "1", p = "1" }
+        source = { p = "u" }
+        initial = { u = "sin(pi*x)", p = "0" }
+        boundary = { u = "exp(-pi^2*t)*sin(pi*x)", p = "exp(-pi^2*t)*sin(pi*x)/pi^2" }
+        exact = { u = "exp(-pi^2*t)*sin(pi*x)", p = "exp(-pi^2*t)*sin(pi*x)/pi^2" }
+        "#;
+    let order = order(pde);
+    assert!(order > 1.7, "{order:.2}");
+    let run = line(&format!(
+        "[grid]\ncells = [40]\n[time]\nstart = 0.0\nend = 0.1\n[pde]\nkind = \"formula\"\n{}",
+        pde.replace(
+            "boundary = { u = \"exp(-pi^2*t)*sin(pi*x)\", p = \"exp(-pi^2*t)*sin(pi*x)/pi^2\" }",
+            "boundary = { u = 0, p = 0 }"
+        )
+    ));
+    let off = run.record.reports.last().unwrap().error.unwrap().linf;
+    assert!(off < 1e-3, "{off}");
+}
+
+/// What cannot be is told by its key.
+#[test]
+fn terms_that_make_no_sense_are_refused() {
+    let refused = |more: &str| {
+        let text = format!(
+            "{HEAD}[grid]\ncells = [20, 20]\n[time]\nstart = 0\nend = 1\n[pde]\nkind = \"formula\"\n\
+             unknowns = [\"u\"]\ninitial = {{ u = \"0.5\" }}\nboundary = {{ u = \"no-flux\" }}\n{more}\n"
+        );
+        MovingMesh::from_source(&Source::new("plane.toml", text)).map(|_| ()).unwrap_err().to_string()
+    };
+    for (more, key, words) in [
+        ("diffusivity = { u = [\"1\"] }", "diffusivity.u", "there are 2 axes"),
+        ("diffusivity = { u = { v = \"1\" } }", "diffusivity.u.v", "unknowns"),
+        ("storage = { u = \"u_x\" }", "storage.u", "gradients"),
+        ("storage = { u = \"u^2\" }\nscheme = \"limited\"", "storage.u", "limited"),
+        ("diffusivity = { u = [\"w\", \"1\"] }", "diffusivity.u[0]", "w"),
+    ] {
+        let said = refused(more);
+        assert!(said.contains(key) && said.contains(words), "{more}: {said}");
+    }
+}
