@@ -155,6 +155,12 @@ impl RunDirectory {
         &self.path
     }
 
+    /// What the run in a directory warned of, as its `summary.json` says.
+    pub fn warnings(path: &Path) -> Vec<String> {
+        let summary = summary(path).unwrap_or_default();
+        summary["warnings"].as_array().into_iter().flatten().filter_map(|w| Some(w.as_str()?.into())).collect()
+    }
+
     /// Writes one file, which bears its name only once it is complete.
     ///
     /// # Errors
