@@ -3,6 +3,7 @@
 mod benefit;
 mod checkpoint;
 mod clock;
+mod conserved;
 mod control;
 mod coupling;
 mod doors;
@@ -18,9 +19,10 @@ mod warnings;
 
 pub use benefit::Benefit;
 pub(crate) use checkpoint::{Checkpoint, Course, Keeper};
+pub use conserved::{Amount, Conserved};
 pub use coupling::Coupling;
 pub use observer::{Event, Moving, Observer, Snapshot};
-pub use record::{Conserved, ErrorNorms, Record, Report, Seconds, WorkTotal};
+pub use record::{ErrorNorms, Record, Report, Seconds, WorkTotal};
 pub use safety::{Retries, Safety};
 pub use scene::{Scene, Values};
 pub use schedule::Schedule;
@@ -33,6 +35,7 @@ use crate::meshing::{Interface, Movable};
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use clock::Clock;
+use conserved::AtStart;
 use doubts::ends;
 use pace::Pace;
 use std::any::Any;
@@ -193,13 +196,13 @@ where
         course: Option<Course>,
     ) -> Result<()> {
         let clock = Clock::start(course.as_ref(), record);
-        let (event, mass_at_start) = match &course {
-            Some(course) => (Event::Resumed, course.mass_at_start),
-            None => (Event::Started, self.physics.conserved(&state.mesh, &state.u)),
+        let (event, at_start) = match &course {
+            Some(course) => (Event::Resumed, course.at_start.clone()),
+            None => (Event::Started, AtStart::of(&*self.physics, &state.mesh, &state.u)),
         };
         self.show(event, state, record, observers, 0.0, &clock)?;
         if course.is_none() && self.schedule.reports_at(state.t) {
-            let report = self.report(state, mass_at_start, record.interface);
+            let report = self.report(state, &at_start, record.interface);
             record.reports.push(report);
         }
         if record.data.is_empty() {
@@ -209,7 +212,7 @@ where
             Some(course) => course.pace,
             None => timed(&mut record.seconds.pde, || Pace::new(self, state))?,
         };
-        let course = |pace: &Pace| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
+        let course = |pace: &Pace| Course { at_start: at_start.clone(), pace: pace.clone(), seconds: clock.seconds() };
         self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
         while let Some((t, dt)) = pace.next(&self.schedule, state) {
             let step = state.step + 1;
@@ -231,7 +234,7 @@ where
             self.warn_of_unrest(state, dt, record);
             self.warn_of_range(state, record);
             if self.schedule.reports_at(t) {
-                let report = self.report(state, mass_at_start, record.interface);
+                let report = self.report(state, &at_start, record.interface);
                 record.reports.push(report);
             }
             self.show(Event::Stepped, state, record, observers, dt, &clock)?;
@@ -328,12 +331,7 @@ where
         (quality, Some(ErrorNorms { linf, l2: mean.sqrt() }))
     }
 
-    fn report(&self, state: &State<D>, mass_at_start: f64, interface: Option<Interface>) -> Report {
-        let mass = self.physics.conserved(&state.mesh, &state.u);
-        // an integral that began with nothing but rounding is no measure
-        let rounding = 1e-12 * state.mesh.extent().iter().product::<f64>() * largest(state.u.values());
-        let size = if mass_at_start.abs() > rounding { mass_at_start.abs() } else { 1.0 };
-        let drift = (mass - mass_at_start) / size;
+    fn report(&self, state: &State<D>, at_start: &AtStart, interface: Option<Interface>) -> Report {
         let (quality, error) = self.assess(state);
         let followed = self.monitor.followed(state.t, &state.mesh, &state.u).ok();
         let benefit = followed.and_then(|u| Benefit::of(&state.mesh, &u).ok());
@@ -341,7 +339,7 @@ where
             t: state.t,
             error,
             quality,
-            conserved: Conserved { mass, drift },
+            conserved: at_start.conserved(&*self.physics, &state.mesh, &state.u),
             interface,
             comparison: None,
             benefit,
