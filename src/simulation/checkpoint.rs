@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 
 /// Where the checkpoints of a run go.
 pub(crate) trait Keeper<const D: usize = 2> {
-    /// Whether one is to be kept after a step, or after the last.
-    fn due(&self, step: usize, last: bool) -> bool;
+    /// Whether one is to be kept after a step.
+    fn due(&self, step: usize) -> bool;
 
-    /// Keeps one.
+    /// Keeps one, which may be that after the last step.
     ///
     /// # Errors
     /// What hinders that.
-    fn keep(&mut self, checkpoint: &Checkpoint<D>) -> Result<()>;
+    fn keep(&mut self, checkpoint: &Checkpoint<D>, last: bool) -> Result<()>;
 }
 
 /// What the loop carries from step to step beside state and record.

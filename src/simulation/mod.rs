@@ -25,6 +25,7 @@ pub use observer::{Event, Moving, Observer, Snapshot};
 pub use record::{ErrorNorms, Record, Report, Seconds, WorkTotal};
 pub use safety::{Retries, Safety};
 pub use scene::{Scene, Values};
+pub(crate) use schedule::Past;
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
@@ -201,7 +202,8 @@ where
             None => (Event::Started, AtStart::of(&*self.physics, &state.mesh, &state.u)),
         };
         self.show(event, state, record, observers, 0.0, &clock)?;
-        if course.is_none() && self.schedule.reports_at(state.t) {
+        // at the start; and at the end of an earlier run that made no report there
+        if self.schedule.reports_at(state.t) && record.reports.last().is_none_or(|report| report.t != state.t) {
             let report = self.report(state, &at_start, record.interface);
             record.reports.push(report);
         }
@@ -240,7 +242,7 @@ where
             self.show(Event::Stepped, state, record, observers, dt, &clock)?;
             self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
         }
-        if let Some(keeper) = keeper.filter(|keeper| keeper.due(state.step, true)) {
+        if let Some(keeper) = keeper {
             self.checkpoint(state, record, observers, keeper, &clock, course(&pace))?;
         }
         self.show(Event::Finished, state, record, observers, 0.0, &clock)
@@ -258,7 +260,7 @@ where
     ) -> Result<()> {
         let asked = end_where_asked(observers, state);
         if let Some(keeper) = keeper
-            && (asked.is_err() || keeper.due(state.step, false))
+            && (asked.is_err() || keeper.due(state.step))
         {
             self.checkpoint(state, record, observers, *keeper, clock, course())?;
         }
@@ -278,7 +280,8 @@ where
         let mut kept = Kept::default();
         self.mover.generator.keep(&mut kept);
         observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
-        keeper.keep(&Checkpoint::of(state, clock.counted(record), course, kept))?;
+        let last = state.t >= self.schedule.end();
+        keeper.keep(&Checkpoint::of(state, clock.counted(record), course, kept), last)?;
         record.seconds.output += began.elapsed().as_secs_f64();
         Ok(())
     }
