@@ -146,6 +146,17 @@ pub enum Unfit {
         /// Its value now.
         is: String,
     },
+    /// The run came to its end, behind which it is not to go on.
+    #[error("its run is complete up to t = {was}, and here it would end at t = {is}")]
+    Earlier {
+        /// The end of the run.
+        was: f64,
+        /// The end that is asked for.
+        is: f64,
+    },
+    /// A complete run goes on from it alone.
+    #[error("it is not there, and a complete run goes on to a later end from it alone")]
+    Missing,
     /// What the run left beside it does not fit.
     #[error("{file} does not go with it: {reason}")]
     Beside {
@@ -241,6 +252,10 @@ impl Error {
                 Some((_, Unfit::Study { .. })) => {
                     "go on with the settings in its study.toml; or leave --resume out to begin anew, or name another \
                      directory with --out"
+                }
+                Some((_, Unfit::Earlier { .. })) => {
+                    "a complete run goes on to a later time.end only; leave --resume out to begin anew, or name \
+                     another directory with --out"
                 }
                 Some((_, Unfit::Version { .. })) => "go on with that version, or leave --resume out to begin anew",
                 _ => "leave --resume out to begin anew",

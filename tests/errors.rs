@@ -344,6 +344,9 @@ fn unfit_checkpoints() {
     assert_says(error(other), &[said], Some("study.toml"), false);
     let version = Unfit::Version { found: "0.0.9".into() };
     assert_says(error(version), &["it was written by driftmesh 0.0.9, and this is"], Some("that version"), false);
+    let earlier = Unfit::Earlier { was: 2.0, is: 1.5 };
+    assert_says(error(earlier), &["complete up to t = 2, and here it would end at t = 1.5"], Some("later"), false);
+    assert_says(error(Unfit::Missing), &["it is not there, and a complete run"], Some("leave --resume out"), false);
     assert_says(error(Unfit::Foreign), &["it is no checkpoint"], Some("leave --resume out"), false);
     let damaged = Unfit::Damaged("its checksum does not match".into());
     assert_says(error(damaged), &["it is damaged: its checksum"], Some("leave --resume out"), false);

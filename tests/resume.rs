@@ -71,6 +71,8 @@ fn untimed(name: &Path, bytes: Vec<u8>) -> Vec<u8> {
             summary.as_object_mut().unwrap().remove("seconds");
             summary.to_string().into()
         }
+        // it has the seconds that the run took
+        Some("final.state") => Vec::new(),
         _ => bytes,
     }
 }

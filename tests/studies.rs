@@ -191,7 +191,7 @@ fn the_uniform_mesh_of_the_same_error_has_it() {
         set.iter().for_each(|assignment| source.set(assignment).unwrap());
         MovingMesh::from_source(&source).unwrap()
     };
-    let moving = study(&[]).compute().unwrap().0.record.reports[0];
+    let moving = study(&[]).compute().unwrap().0.record.reports[0].clone();
     let found = study(&[]).uniform_equivalent(&moving).unwrap().unwrap();
     assert_eq!((found.thicker, found.t, found.nodes[0]), (2.5, 0.75, found.nodes[1]));
     let cells = format!("grid.cells={:?}", found.nodes.map(|n| n - 1));

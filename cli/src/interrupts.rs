@@ -4,6 +4,7 @@ use driftmesh::Result;
 use driftmesh::simulation::{Event, Observer, Snapshot};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -39,9 +40,15 @@ pub fn outlive_file_limits() {
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }
 
-/// This command line, to go on with.
-pub fn command() -> String {
+/// The command that goes on with a run: this command line, or where the study came from standard input, which is read
+/// once, one with the study in the directory of the run.
+pub fn command(standard_input: bool, out: &Path) -> String {
     let mut words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if standard_input {
+        let [study, out] = [&out.join("study.toml"), out].map(|path| path.to_string_lossy().into_owned());
+        words.truncate(1);
+        words.extend(["run".into(), study, "--out".into(), out]);
+    }
     if !words.iter().any(|word| word == "--resume") {
         words.push("--resume".into());
     }

@@ -27,10 +27,13 @@ struct Cli {
 #[derive(Subcommand)]
 enum Verb {
     /// Run a study.
-    #[command(after_help = "Example:\n  driftmesh run studies/burgers.toml --set time.step=5e-4 --out out/finer")]
+    #[command(after_help = "Example:\n  driftmesh run studies/burgers.toml --set time.step=5e-4 --out out/finer\n\n\
+                      Exit status: 0 done; 1 the computation failed, or warned with --strict; 2 the study or the \
+                      command line is wrong.")]
     Run(run::Run),
     /// Validate a study without running it, and print it with every default filled in.
-    #[command(after_help = "Example:\n  driftmesh check studies/burgers.toml --set grid.cells=[80,80]")]
+    #[command(after_help = "Example:\n  driftmesh check studies/burgers.toml --set grid.cells=[80,80]\n  \
+                      driftmesh check - < studies/burgers.toml")]
     Check(check::Check),
     /// List every kind that a study may name.
     #[command(after_help = "Example:\n  driftmesh list generators")]
@@ -50,19 +53,32 @@ enum Verb {
 /// A study file and what is set on top of it.
 #[derive(Args)]
 struct StudyArgs {
-    /// The study file.
+    /// The study file; `-` reads the study from standard input.
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
     /// Override one setting: a dotted key and a TOML value.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// End with status 1 where there are warnings, too.
+    #[arg(long)]
+    strict: bool,
 }
+
+/// What names standard input in the place of a file.
+const STANDARD_INPUT: &str = "-";
 
 impl StudyArgs {
     fn read(&self) -> driftmesh::Result<Study> {
-        let mut source = Source::read(&self.study)?;
+        let mut source = match self.is_standard_input() {
+            true => Source::from_reader("standard input", std::io::stdin())?,
+            false => Source::read(&self.study)?,
+        };
         self.set.iter().try_for_each(|assignment| source.set(assignment))?;
         Study::from_source(&source)
+    }
+
+    fn is_standard_input(&self) -> bool {
+        self.study.as_os_str() == STANDARD_INPUT
     }
 }
 

@@ -28,6 +28,9 @@ pub struct Run {
 
 impl Run {
     pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+        if self.resume && self.study.is_standard_input() {
+            return Err(unrepeated());
+        }
         let study = self.study.read()?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(study.name()));
         RunDirectory::check(&out)?;
@@ -36,7 +39,10 @@ impl Run {
                 if !self.quiet {
                     terminal::say(format_args!("complete: {} needs nothing more", out.display()));
                 }
-                return Ok(ExitCode::SUCCESS);
+                if self.study.strict {
+                    RunDirectory::warnings(&out).iter().for_each(|warning| terminal::warn(warning));
+                }
+                return Ok(self.succeeded(&out));
             }
             (standing, true) => {
                 if standing? == Standing::Nothing && !self.quiet {
@@ -89,22 +95,34 @@ impl Run {
             terminal::say(format_args!("run      {}", out.display()));
         }
         match failure {
-            None => Ok(ExitCode::SUCCESS),
+            None => Ok(self.succeeded(out)),
             Some(error) => {
                 let note = format!("{} in {}", K::left(&summary), out.display());
-                Ok(terminal::complain(&error, remedy(&error, out, study.remedy(&error)), Some(note)))
+                Ok(terminal::complain(&error, self.remedy(&error, out, study.remedy(&error)), Some(note)))
             }
         }
     }
+
+    fn succeeded(&self, out: &Path) -> ExitCode {
+        terminal::succeeded(self.study.strict, &format!("the run is complete in {}", out.display()))
+    }
+
+    /// The remedy for what ended a run: where it can go on, the command for that.
+    fn remedy(&self, error: &Error, out: &Path, other: Option<String>) -> Option<String> {
+        let resumable = error.is_resumable() && RunDirectory::standing(out) == Standing::Unfinished;
+        let command = || interrupts::command(self.study.is_standard_input(), out);
+        let go_on = resumable.then(|| format!("go on with: {}", command()));
+        Some([other, go_on].into_iter().flatten().collect::<Vec<_>>().join("; then ")).filter(|help| !help.is_empty())
+    }
+}
+
+/// Going on takes the study once more, and standard input is read once.
+fn unrepeated() -> Error {
+    let rule = "a run goes on with a study in a file, since standard input is read once; the directory of a run holds \
+                its study: driftmesh run DIR/study.toml --out DIR --resume";
+    Error::invalid("--resume", "given with -", rule)
 }
 
 /// Files that are named where they are there.
 const FILES: [(&str, &str); 4] =
     [("picture", "mesh.png"), ("front", "front.png"), ("history", "convergence.png"), ("report", "report.html")];
-
-/// The remedy for what ended a run: where it can go on, the command for that.
-fn remedy(error: &Error, out: &Path, other: Option<String>) -> Option<String> {
-    let resumable = error.is_resumable() && RunDirectory::standing(out) == Standing::Unfinished;
-    let go_on = resumable.then(|| format!("go on with: {}", interrupts::command()));
-    Some([other, go_on].into_iter().flatten().collect::<Vec<_>>().join("; then ")).filter(|help| !help.is_empty())
-}

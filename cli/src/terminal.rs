@@ -5,9 +5,12 @@ use std::io::{ErrorKind, Write, stderr, stdout};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Why something could not be printed.
 static UNSAID: OnceLock<String> = OnceLock::new();
+/// Warnings printed so far.
+static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
 /// Prints to standard output.
 pub fn say(text: impl std::fmt::Display) {
@@ -41,7 +44,21 @@ pub fn say_files(out: &Path, files: &[(&str, &str)]) {
 
 /// Prints something that did not stop the program.
 pub fn warn(text: &str) {
+    WARNINGS.fetch_add(1, Ordering::Relaxed);
     let _ = writeln!(stderr(), "warning: {text}");
+}
+
+/// How the program ends where nothing failed: with `strict`, any warning makes it fail, and one line says so. `what`
+/// says what there is all the same.
+pub fn succeeded(strict: bool, what: &str) -> ExitCode {
+    let count = match WARNINGS.load(Ordering::Relaxed) {
+        _ if !strict => return ExitCode::SUCCESS,
+        0 => return ExitCode::SUCCESS,
+        1 => "1 warning, which --strict makes a failure".into(),
+        n => format!("{n} warnings, which --strict makes a failure"),
+    };
+    let _ = writeln!(stderr(), "error: {count}: {what}");
+    ExitCode::FAILURE
 }
 
 /// Prints what the user may not expect.

@@ -92,6 +92,7 @@ fn a_run_leaves_its_directory() {
         "error.png",
         "error.svg",
         "final.npz",
+        "final.state",
         "frames",
         "history.csv",
         "mesh.png",

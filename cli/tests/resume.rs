@@ -139,6 +139,7 @@ fn what_is_replaced_is_said() {
         words(&output)
     };
     assert!(run(&["--resume"]).contains("note: nothing to go on from in out: the run begins at its start"));
+    std::fs::remove_file(sandbox.path("out/final.state")).unwrap();
     std::fs::write(sandbox.path("out/checkpoint.1"), "of another run").unwrap();
     let refused = sandbox.command(PROGRAM, &["run", "a study.toml", "--out", "out", "--resume"]).output().unwrap();
     assert_eq!(refused.status.code(), Some(2));

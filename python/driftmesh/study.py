@@ -154,7 +154,8 @@ def run(
         set: Settings that replace those of the study, by dotted key, such as ``{"time.step": 5e-4}``.
         progress: Shows a progress bar (of tqdm), in terminals and notebooks.
         resume: Goes on from the newest checkpoint in the directory; the results have the same bits as those of a run
-            without interruption. Without a checkpoint the run begins at its start; a complete one is opened.
+            without interruption. Without a checkpoint the run begins at its start. A complete one is opened, or goes on
+            to a later end where ``time.end`` is later now.
 
     Raises:
         driftmesh.StudyError: A mistake in the study. The message shows its line with a caret and, for a key that does
@@ -258,7 +259,8 @@ def _interrupted(directory: Path, ended: bool) -> str:
         message = summary.get("failure", summary.get("error"))["message"]
         if not (directory / "final.npz").is_file():
             return f"{message}, before the first step"
-        on = "; run(…, resume=True) goes on" if any(directory.glob("checkpoint.[01]")) else ""
+        left = [*directory.glob("checkpoint.[01]"), *directory.glob("final.state")]
+        on = "; run(…, resume=True) goes on" if left else ""
         return f"{message}; the last good state is in {directory}{on}"
     return f"the run had just ended ({summary['status']}); it is in {directory}"
 

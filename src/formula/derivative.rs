@@ -107,6 +107,15 @@ impl Graph {
             }
             Node::Binary(Binary::Min, a, b) => self.choice(Comparison::Less, b, a, [d(b), d(a)]),
             Node::Binary(Binary::Max, a, b) => self.choice(Comparison::Greater, b, a, [d(b), d(a)]),
+            Node::Binary(Binary::Modulo, a, b) => {
+                // a − b ⌊a/b⌋ with ⌊a/b⌋ as it is
+                let right = d(b).map(|db| {
+                    let quotient = self.over(a, b);
+                    let whole = self.unary(Unary::Floor, quotient);
+                    self.times(whole, db)
+                });
+                self.minus(d(a), right)
+            }
             Node::Choice(comparison, [left, right, a, b]) => self.choice(comparison, left, right, [d(a), d(b)]),
         }
     }
@@ -122,7 +131,7 @@ impl Graph {
                 let bottom = self.times(two, id);
                 return Some(self.over(da, bottom));
             }
-            Unary::Sign => return None,
+            Unary::Sign | Unary::Floor => return None,
             Unary::Sin => self.unary(Unary::Cos, a),
             Unary::Cos => {
                 let sin = self.unary(Unary::Sin, a);

@@ -21,6 +21,7 @@ pub(super) enum Unary {
     Sqrt,
     Abs,
     Erf,
+    Floor,
     /// −1, 0, 1 or NaN. It is not in the language, and only derivatives of `abs` contain it.
     Sign,
 }
@@ -35,6 +36,8 @@ pub(super) enum Binary {
     Power,
     Min,
     Max,
+    /// With the sign of the second operand.
+    Modulo,
 }
 
 /// The comparison in the first place of `if`.

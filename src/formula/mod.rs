@@ -7,7 +7,8 @@
 //! |---|---|
 //! | numbers | `1`, `.5`, `1e-3`, `2.5E+4`; the constants `pi` and `e` |
 //! | operators | `+ - * / ^ ( )`; `^` binds tighter than a sign, and to the right: `-2^2` is -4, `2^3^2` is 512 |
-//! | functions | `sin cos tan sinh cosh tanh exp log sqrt abs erf min max`; `log` is the natural logarithm |
+//! | functions | `sin cos tan sinh cosh tanh exp log sqrt abs erf floor min max mod`; `log` is the natural logarithm |
+//! | remainders | `mod(a, b)` is a − b ⌊a/b⌋, which has the sign of b: `mod(-1, 3)` is 2, `mod(1, -3)` is -2 |
 //! | cases | `if(x < 0, a, b)`, with one of `< <= > >= == !=` in its first place and nowhere else |
 //!
 //! Arithmetic is that of `f64`: `1/0` is infinite, `sqrt(-1)` is NaN, and NaN passes through `min` and `max` too.
@@ -16,7 +17,8 @@
 //! # Derivatives
 //!
 //! Derivatives are formulas again. Where a function has none, a side is chosen: |f|′ = 0 at f = 0; `min`, `max` and
-//! `if` have the derivative of the branch that is taken, and `min` and `max` of equal arguments that of the first one.
+//! `if` have the derivative of the branch that is taken, and `min` and `max` of equal arguments that of the first one;
+//! `floor(f)` has 0 everywhere, and `mod(f, g)` has f′ − ⌊f/g⌋ g′, also where they jump.
 //!
 //! ```text
 //! (fᶜ)′ = c fᶜ⁻¹ f′,   (f^g)′ = g f^(g−1) f′ + f^g log(f) g′

@@ -16,7 +16,7 @@ enum Function {
     If,
 }
 
-const FUNCTIONS: [(&str, Function); 14] = [
+const FUNCTIONS: [(&str, Function); 16] = [
     ("sin", Function::Unary(Unary::Sin)),
     ("cos", Function::Unary(Unary::Cos)),
     ("tan", Function::Unary(Unary::Tan)),
@@ -28,13 +28,15 @@ const FUNCTIONS: [(&str, Function); 14] = [
     ("sqrt", Function::Unary(Unary::Sqrt)),
     ("abs", Function::Unary(Unary::Abs)),
     ("erf", Function::Unary(Unary::Erf)),
+    ("floor", Function::Unary(Unary::Floor)),
     ("min", Function::Binary(Binary::Min)),
     ("max", Function::Binary(Binary::Max)),
+    ("mod", Function::Binary(Binary::Modulo)),
     ("if", Function::If),
 ];
 
 /// Names from other languages for which the nearest name here would mislead, with what to write instead.
-const ABSENT: [(&str, &str); 17] = [
+const ABSENT: [(&str, &str); 19] = [
     ("ln", "the natural logarithm is log(…)"),
     ("log10", "write log(…)/log(10)"),
     ("log2", "write log(…)/log(2)"),
@@ -42,6 +44,8 @@ const ABSENT: [(&str, &str); 17] = [
     ("pow", "write ^ for powers"),
     ("cbrt", "write (…)^(1/3)"),
     ("erfc", "write 1 - erf(…)"),
+    ("ceil", "write -floor(-(…))"),
+    ("round", "write floor(… + 0.5)"),
     ("sign", "write if(x < 0, -1, 1)"),
     ("sgn", "write if(x < 0, -1, 1)"),
     ("heaviside", "write if(x < 0, 0, 1)"),

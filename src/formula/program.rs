@@ -110,6 +110,7 @@ pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
                 Unary::Sqrt => each(to, a, f64::sqrt),
                 Unary::Abs => each(to, a, f64::abs),
                 Unary::Erf => each(to, a, libm::erf),
+                Unary::Floor => each(to, a, f64::floor),
                 Unary::Sign => each(to, a, |a| if a == 0.0 || a.is_nan() { a } else { a.signum() }),
             }
         }
@@ -124,6 +125,7 @@ pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
                 // the functions of the standard library drop NaN
                 Binary::Min => pairs(to, a, b, |a, b| if b < a || b.is_nan() { b } else { a }),
                 Binary::Max => pairs(to, a, b, |a, b| if b > a || b.is_nan() { b } else { a }),
+                Binary::Modulo => pairs(to, a, b, modulo),
             }
         }
         Node::Power(a, n) => {
@@ -155,6 +157,17 @@ fn each(to: &mut [f64], a: &[f64], f: impl Fn(f64) -> f64) {
 #[inline(always)]
 fn pairs(to: &mut [f64], a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
     to.iter_mut().zip(a).zip(b).for_each(|((to, a), b)| *to = f(*a, *b));
+}
+
+/// a − b ⌊a/b⌋ without the rounding of the quotient: what `%` leaves is exact, and has the sign of a.
+#[inline(always)]
+fn modulo(a: f64, b: f64) -> f64 {
+    let rest = a % b;
+    match rest {
+        0.0 => rest.copysign(b),
+        _ if (rest < 0.0) != (b < 0.0) => rest + b,
+        _ => rest,
+    }
 }
 
 /// aⁿ by repeated squaring; the result of `powi` may be rounded differently from call to call.

@@ -1,3 +1,5 @@
+mod remainders;
+
 use super::*;
 use proptest::prelude::*;
 
@@ -194,7 +196,10 @@ enum Tree {
     If(&'static str, Box<[Tree; 4]>),
 }
 
-const UNARY: [&str; 12] = ["-", "sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "erf"];
+const UNARY: [&str; 13] =
+    ["-", "sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "erf", "floor"];
+
+const BINARY: [&str; 8] = ["+", "-", "*", "/", "^", "min", "max", "mod"];
 
 fn trees() -> impl Strategy<Value = Tree> {
     let leaf = prop_oneof![
@@ -205,7 +210,7 @@ fn trees() -> impl Strategy<Value = Tree> {
     leaf.prop_recursive(5, 40, 4, |inner| {
         prop_oneof![
             3 => (prop::sample::select(&UNARY[..]), inner.clone()).prop_map(|(f, a)| Tree::Unary(f, a.into())),
-            5 => (prop::sample::select(&["+", "-", "*", "/", "^", "min", "max"][..]), inner.clone(), inner.clone())
+            5 => (prop::sample::select(&BINARY[..]), inner.clone(), inner.clone())
                 .prop_map(|(f, a, b)| Tree::Binary(f, a.into(), b.into())),
             1 => (inner.clone(), -3..5i32).prop_map(|(a, n)| Tree::Power(a.into(), n)),
             1 => (prop::sample::select(&["<", "<=", ">", ">="][..]), std::array::from_fn::<_, 4, _>(|_| inner.clone()))
@@ -237,7 +242,7 @@ impl Tree {
             Self::Variable(v) => XYT[*v].into(),
             Self::Unary("-", a) => format!("(-{})", a.text()),
             Self::Unary(f, a) => format!("{f}({})", a.text()),
-            Self::Binary(f @ ("min" | "max"), a, b) => format!("{f}({}, {})", a.text(), b.text()),
+            Self::Binary(f @ ("min" | "max" | "mod"), a, b) => format!("{f}({}, {})", a.text(), b.text()),
             Self::Binary(f, a, b) => format!("({} {f} {})", a.text(), b.text()),
             Self::Power(a, n) => format!("(({})^{n})", a.text()),
             Self::If(c, parts) => {
@@ -256,6 +261,9 @@ impl Tree {
                 let a = a.jet(at, hard);
                 if ["abs", "sqrt", "log"].contains(f) {
                     *hard = hard.max(1.0 / a[0].abs());
+                }
+                if *f == "floor" {
+                    *hard = hard.max(1.0 / from_whole(a[0]));
                 }
                 composed(unary(f, a[0]), a)
             }
@@ -295,8 +303,14 @@ fn unary(name: &str, x: f64) -> Jet {
         "sqrt" => [x.sqrt(), 0.5 / x.sqrt(), -0.25 / x.powf(1.5)],
         "abs" => [x.abs(), x.signum(), 0.0],
         "erf" => [libm::erf(x), bell, -2.0 * x * bell],
+        "floor" => [x.floor(), 0.0, 0.0],
         _ => unreachable!(),
     }
+}
+
+/// How far a number is from a whole one.
+fn from_whole(x: f64) -> f64 {
+    (x - x.round()).abs()
 }
 
 fn binary(name: &str, a: Jet, b: Jet, hard: &mut f64) -> Jet {
@@ -321,6 +335,11 @@ fn binary(name: &str, a: Jet, b: Jet, hard: &mut f64) -> Jet {
         "min" | "max" => {
             *hard = hard.max(1.0 / (a[0] - b[0]).abs());
             if (a[0] < b[0]) == (name == "min") { a } else { b }
+        }
+        "mod" => {
+            let quotient = a[0] / b[0];
+            *hard = hard.max(1.0 / from_whole(quotient)).max(quotient.abs());
+            std::array::from_fn(|k| a[k] - b[k] * quotient.floor())
         }
         _ => unreachable!(),
     }
@@ -405,7 +424,8 @@ proptest! {
 /// Every kind of mistake: what is marked, what is said, what is advised.
 #[test]
 fn mistakes_say_what_where_and_what_instead() {
-    let known = "known here: x, y, t, pi, e, sin, cos, tan, sinh, cosh, tanh, exp, log, sqrt, abs, erf, min, max, if";
+    let known = "known here: x, y, t, pi, e, sin, cos, tan, sinh, cosh, tanh, exp, log, sqrt, abs, erf, floor, min, \
+                 max, mod, if";
     let stray = |sign: &str| format!("`{sign}` has no meaning in a formula");
     let cases: &[(&str, &str, &str, Option<&str>)] = &[
         ("", "", "the formula is empty", Some("write a number, such as 0")),

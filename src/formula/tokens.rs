@@ -16,8 +16,9 @@ pub(super) const COMPARISONS: [(&str, Comparison); 6] = [
 ];
 
 /// Texts of other languages in the place of a symbol, with what to write instead.
-const FOREIGN: [(&str, &str); 16] = [
+const FOREIGN: [(&str, &str); 17] = [
     ("**", "write ^ for powers"),
+    ("%", "write mod(…, …) for the remainder"),
     ("&", "put one if(…) into another"),
     ("|", "write abs(…) for the absolute value"),
     ("=", "write == to compare"),

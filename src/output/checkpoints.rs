@@ -3,7 +3,7 @@
 use super::directory::{remove, sync_directory, write_file};
 use crate::error::{Error, Result, Unfit};
 use crate::kept::encoded;
-use crate::simulation::{Checkpoint, Keeper};
+use crate::simulation::{Checkpoint, Keeper, Past, Schedule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_bytes::ByteBuf;
@@ -59,6 +59,9 @@ struct Sealed {
     /// The resolved study without `[output]`, which changes no number.
     study: String,
     step: usize,
+    /// Of a run with steps in time.
+    #[serde(default)]
+    past: Option<Past>,
     /// A value as MessagePack, which depends on the kind of the study.
     content: ByteBuf,
 }
@@ -73,20 +76,50 @@ pub(crate) struct Checkpoints {
     next: usize,
     /// The step of the newest, and when it was written.
     newest: (Option<usize>, Instant),
-    /// Whether one is written after the last step too, since much is left to do then.
-    pub(crate) at_the_end: bool,
+    /// What a run that goes on must know of the times of this one.
+    pub(crate) past: Option<Past>,
+    /// Whether the one after the last step is written.
+    ended: bool,
 }
 
-/// A checkpoint that was found, and is meant for this study.
+/// A checkpoint that was found, and may be meant for this study.
 struct Found {
-    slot: usize,
-    step: usize,
+    name: &'static str,
+    behind: Behind,
     content: ByteBuf,
+}
+
+/// What a checkpoint says of the run that is to go on behind it.
+pub(crate) struct Behind {
+    /// Steps done.
+    pub step: usize,
+    past: Option<Past>,
+    /// The end or the reports of its study, where this study has others.
+    differs: Option<Unfit>,
+}
+
+impl Behind {
+    /// Puts a schedule behind it. True where the run was complete, and the schedule ends later.
+    ///
+    /// # Errors
+    /// [`Unfit`] where the schedule is no continuation.
+    pub(crate) fn followed_by(&self, schedule: Option<&mut Schedule>) -> Result<bool, Unfit> {
+        let later = match (&self.past, schedule) {
+            (Some(past), Some(schedule)) => schedule.follow(past, self.step)?,
+            _ => false,
+        };
+        match &self.differs {
+            Some(unfit) if !later => Err(unfit.clone()),
+            _ => Ok(later),
+        }
+    }
 }
 
 impl Checkpoints {
     /// The newest and the one before, written in turns.
     pub(crate) const NAMES: [&str; 2] = ["checkpoint.0", "checkpoint.1"];
+    /// That after the last step, which stays: from there a run goes on to a later end.
+    pub(crate) const LAST: &str = "final.state";
 
     /// The checkpoints of a run; `study` is the resolved study.
     ///
@@ -95,7 +128,15 @@ impl Checkpoints {
     pub fn new(directory: &Path, at: CheckpointsAt, study: &str) -> Result<Self> {
         let study = numbers(study)
             .map_err(|reason| Error::Unreadable { path: directory.join("study.toml"), reason: reason.to_string() })?;
-        Ok(Self { directory: directory.into(), at, study, next: 0, newest: (None, Instant::now()), at_the_end: false })
+        Ok(Self {
+            directory: directory.into(),
+            at,
+            study,
+            next: 0,
+            newest: (None, Instant::now()),
+            past: None,
+            ended: false,
+        })
     }
 
     /// Whether a directory holds one, by how it begins.
@@ -130,11 +171,36 @@ impl Checkpoints {
         if self.newest.0 == Some(step) {
             return Ok(());
         }
-        write_file(&self.directory.join(Self::NAMES[self.next]), &sealed(&self.study, step, content))?;
-        sync_directory(&self.directory)?;
+        self.write_as(Self::NAMES[self.next], step, content)?;
         self.next = 1 - self.next;
+        Ok(())
+    }
+
+    /// Writes the one after the last step, once.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub(crate) fn write_last(&mut self, step: usize, content: &impl Serialize) -> Result<()> {
+        if !self.ended {
+            self.write_as(Self::LAST, step, content)?;
+            self.ended = true;
+        }
+        Ok(())
+    }
+
+    fn write_as(&mut self, name: &str, step: usize, content: &impl Serialize) -> Result<()> {
+        write_file(&self.directory.join(name), &self.sealed(step, content))?;
+        sync_directory(&self.directory)?;
         self.newest = (Some(step), Instant::now());
         Ok(())
+    }
+
+    /// A checkpoint as the bytes of its file.
+    fn sealed(&self, step: usize, content: &impl Serialize) -> Vec<u8> {
+        let (content, past) = (ByteBuf::from(encoded(content)), self.past.clone());
+        let (program, study) = (env!("CARGO_PKG_VERSION").into(), self.study.to_string());
+        let sealed = encoded(&Sealed { program, study, step, past, content });
+        [MAGIC, blake3::hash(&sealed).as_bytes(), &sealed].concat()
     }
 
     /// Goes on from the newest checkpoint that `take_up` accepts; none where there is no file. What was refused before
@@ -144,63 +210,82 @@ impl Checkpoints {
     /// [`Error::Checkpoint`] where there are files, but none that will do.
     pub(crate) fn resume<T, C: DeserializeOwned>(
         &mut self,
-        mut take_up: impl FnMut(C) -> Result<T, Unfit>,
+        mut take_up: impl FnMut(C, &Behind) -> Result<T, Unfit>,
     ) -> Result<Option<(T, Vec<String>)>> {
         let mut refused = Vec::new();
         let mut found = Vec::new();
-        for (slot, path) in Self::NAMES.iter().map(|name| self.directory.join(name)).enumerate() {
-            match read(&path) {
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-                Err(error) => refused.push((path, Unfit::Damaged(error.to_string()))),
-                Ok(bytes) => match opened(&bytes).and_then(|bytes| meant(bytes, &self.study)) {
-                    Ok((step, content)) => found.push(Found { slot, step, content }),
-                    Err(unfit) => refused.push((path, unfit)),
-                },
+        for name in Self::NAMES.into_iter().chain([Self::LAST]) {
+            match self.found(name) {
+                Ok(None) => {}
+                Ok(Some((behind, content))) => found.push(Found { name, behind, content }),
+                Err(unfit) => refused.push((self.directory.join(name), unfit)),
             }
         }
-        found.sort_by_key(|found| std::cmp::Reverse(found.step));
-        for Found { slot, step, content } in found {
-            match decoded(&content).and_then(&mut take_up) {
+        found.sort_by_key(|found| std::cmp::Reverse(found.behind.step));
+        for Found { name, behind, content } in found {
+            match decoded(&content).and_then(|content| take_up(content, &behind)) {
                 Ok(taken) => {
-                    self.next = 1 - slot;
-                    self.newest = (Some(step), Instant::now());
+                    self.next = usize::from(name == Self::NAMES[0]);
+                    self.newest = (Some(behind.step), Instant::now());
                     let words = |(path, unfit): (PathBuf, Unfit)| {
-                        format!("{} was left out: {unfit}; the run went on from {}", path.display(), Self::NAMES[slot])
+                        format!("{} was left out: {unfit}; the run went on from {name}", path.display())
                     };
                     return Ok(Some((taken, refused.into_iter().map(words).collect())));
                 }
-                Err(unfit) => refused.push((self.directory.join(Self::NAMES[slot]), unfit)),
+                Err(unfit) => refused.push((self.directory.join(name), unfit)),
             }
         }
         if refused.is_empty() { Ok(None) } else { Err(Error::Checkpoint { refused }) }
     }
 
-    /// The step and the content of a checkpoint of this study from the bytes behind its checksum.
-    pub(crate) fn read<C: DeserializeOwned>(&self, bytes: &[u8]) -> Result<(usize, C), Unfit> {
-        let (step, content) = meant(bytes, &self.study)?;
-        Ok((step, decoded(&content)?))
+    /// A checkpoint of this study, where there is a file of that name.
+    fn found(&self, name: &str) -> Result<Option<(Behind, ByteBuf)>, Unfit> {
+        match read(&self.directory.join(name)) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Unfit::Damaged(error.to_string())),
+            Ok(bytes) => meant(opened(&bytes)?, &self.study, name == Self::LAST).map(Some),
+        }
     }
 
-    /// Refuses another study than the one whose text is given.
+    /// What a checkpoint of this study is, and its content, from the bytes behind its checksum.
+    pub(crate) fn read<C: DeserializeOwned>(&self, bytes: &[u8]) -> Result<(Behind, C), Unfit> {
+        let (behind, content) = meant(bytes, &self.study, false)?;
+        Ok((behind, decoded(&content)?))
+    }
+
+    /// What a complete run of the study with this text left, to go on from to a later end; none where the study is this
+    /// very one.
     ///
     /// # Errors
-    /// [`Unfit::Study`] with the first key that differs.
-    pub(crate) fn check_study(&self, text: &str) -> Result<(), Unfit> {
-        let was = numbers(text).map_err(|error| Unfit::Damaged(error.message().into()))?;
-        match differing(&was, &self.study, "") {
-            None => Ok(()),
-            Some((key, was, is)) => Err(Unfit::Study { key, was, is }),
+    /// The file that is to blame, with what is wrong: [`Unfit::Study`] with the first key that differs, or
+    /// [`Unfit::Missing`].
+    pub(crate) fn behind(&self, text: &str) -> Result<Option<Behind>, (&'static str, Unfit)> {
+        let of_study = |unfit: Unfit| ("study.toml", unfit);
+        let was = numbers(text).map_err(|error| of_study(Unfit::Damaged(error.message().into())))?;
+        if unlike(&was, &self.study).is_none() {
+            return Ok(None);
+        }
+        if let Some(unfit) = unlike(&unended(&was), &unended(&self.study)) {
+            return Err(of_study(unfit));
+        }
+        match self.found(Self::LAST) {
+            Ok(Some((behind, _))) => Ok(Some(behind)),
+            Ok(None) => Err((Self::LAST, Unfit::Missing)),
+            Err(unfit) => Err((Self::LAST, unfit)),
         }
     }
 }
 
 impl<const D: usize> Keeper<D> for Checkpoints {
-    fn due(&self, step: usize, last: bool) -> bool {
-        if last { self.at_the_end } else { self.is_due(step) }
+    fn due(&self, step: usize) -> bool {
+        self.is_due(step)
     }
 
-    fn keep(&mut self, checkpoint: &Checkpoint<D>) -> Result<()> {
-        self.write(checkpoint.step, checkpoint)
+    fn keep(&mut self, checkpoint: &Checkpoint<D>, last: bool) -> Result<()> {
+        match last {
+            true => self.write_last(checkpoint.step, checkpoint),
+            false => self.write(checkpoint.step, checkpoint),
+        }
     }
 }
 
@@ -209,6 +294,23 @@ fn numbers(study: &str) -> Result<toml::Table, toml::de::Error> {
     let mut table: toml::Table = study.parse()?;
     table.remove("output");
     Ok(table)
+}
+
+/// What a later end of a run may change.
+const OF_THE_END: [&str; 3] = ["end", "duration", "report"];
+
+/// A study but for how far it goes.
+fn unended(study: &toml::Table) -> toml::Table {
+    let mut study = study.clone();
+    if let Some(time) = study.get_mut("time").and_then(toml::Value::as_table_mut) {
+        OF_THE_END.iter().for_each(|key| drop(time.remove(*key)));
+    }
+    study
+}
+
+/// The first key in which two studies differ.
+fn unlike(was: &toml::Table, is: &toml::Table) -> Option<Unfit> {
+    differing(was, is, "").map(|(key, was, is)| Unfit::Study { key, was, is })
 }
 
 /// The first key in which two studies differ, with both values.
@@ -230,14 +332,6 @@ fn differing(was: &toml::Table, is: &toml::Table, path: &str) -> Option<(String,
     None
 }
 
-/// A checkpoint as the bytes of its file.
-fn sealed(study: &toml::Table, step: usize, content: &impl Serialize) -> Vec<u8> {
-    let content = ByteBuf::from(encoded(content));
-    let sealed =
-        encoded(&Sealed { program: env!("CARGO_PKG_VERSION").into(), study: study.to_string(), step, content });
-    [MAGIC, blake3::hash(&sealed).as_bytes(), &sealed].concat()
-}
-
 /// The bytes behind the checksum of a file, if that is right.
 fn opened(bytes: &[u8]) -> Result<&[u8], Unfit> {
     let sealed = bytes.strip_prefix(MAGIC).ok_or(Unfit::Foreign)?;
@@ -248,16 +342,19 @@ fn opened(bytes: &[u8]) -> Result<&[u8], Unfit> {
     }
 }
 
-/// The step and the content of these, if they are meant for this program and study.
-fn meant(bytes: &[u8], study: &toml::Table) -> Result<(usize, ByteBuf), Unfit> {
-    let Sealed { program, study: text, step, content } = decoded(bytes)?;
+/// What these are and their content, if they are meant for this program and study; the last one may be so but for how
+/// far its study goes.
+fn meant(bytes: &[u8], study: &toml::Table, last: bool) -> Result<(Behind, ByteBuf), Unfit> {
+    let Sealed { program, study: text, step, past, content } = decoded(bytes)?;
     if program != env!("CARGO_PKG_VERSION") {
         return Err(Unfit::Version { found: program });
     }
     let was = text.parse().map_err(|error: toml::de::Error| Unfit::Damaged(error.message().into()))?;
-    match differing(&was, study, "") {
-        Some((key, was, is)) => Err(Unfit::Study { key, was, is }),
-        None => Ok((step, content)),
+    let differs = unlike(&was, study);
+    let refused = if last { unlike(&unended(&was), &unended(study)) } else { differs.clone() };
+    match refused {
+        Some(unfit) => Err(unfit),
+        None => Ok((Behind { step, past, differs }, content)),
     }
 }
 

@@ -20,7 +20,8 @@ pub struct RunDirectory {
 const LOCK: &str = "run.lock";
 
 /// Everything that a run may write, beside its frames.
-const OURS: [&str; 31] = [
+const OURS: [&str; 32] = [
+    Checkpoints::LAST,
     "summary.json",
     "study.toml",
     "history.csv",
@@ -105,7 +106,9 @@ impl RunDirectory {
 
     /// Removes what only a run that ended writes, and leaves checkpoints and what the run adds to.
     pub(crate) fn clear_ended(&self) -> Result<()> {
-        self.clear_but(&[&["summary.json", "study.toml"], &Self::GROWING[..], &Checkpoints::NAMES].concat())
+        self.clear_but(
+            &[&["summary.json", "study.toml", Checkpoints::LAST], &Self::GROWING[..], &Checkpoints::NAMES].concat(),
+        )
     }
 
     /// Removes what an earlier run wrote, and nothing else.
@@ -146,8 +149,16 @@ impl RunDirectory {
         match summary(path) {
             // a run that was killed while it wrote its report has left its lock
             Some(summary) if summary["status"] == "completed" && !there(LOCK) => Standing::Complete,
+            // after its last step, or while it goes on behind that to a later end
+            _ if there(Checkpoints::LAST) => Standing::Unfinished,
             _ => Standing::Nothing,
         }
+    }
+
+    /// What the run in a directory warned of, as its `summary.json` says.
+    pub fn warnings(path: &Path) -> Vec<String> {
+        let summary = summary(path).unwrap_or_default();
+        summary["warnings"].as_array().into_iter().flatten().filter_map(|w| Some(w.as_str()?.into())).collect()
     }
 
     /// Where it is.
@@ -192,10 +203,12 @@ pub(crate) fn is_frame(path: &Path) -> bool {
 pub enum Standing {
     /// Nothing to go on from.
     Nothing,
-    /// Checkpoints.
+    /// Checkpoints, or the last state of a run that did not write everything, or that was to go on to a later end.
     Unfinished,
     /// A run that came to its end.
     Complete,
+    /// The same, where the study that is asked about ends later.
+    Shorter,
 }
 
 /// True if a run of ours wrote this directory: its summary says so, a checkpoint, or the lock of a run that was killed

@@ -18,8 +18,8 @@ mod ticks;
 mod vtu;
 
 pub use arrays::final_arrays;
-pub(crate) use checkpoints::Checkpoints;
 pub use checkpoints::CheckpointsAt;
+pub(crate) use checkpoints::{Behind, Checkpoints};
 pub use curves::draw_curves;
 pub(crate) use directory::write_file;
 pub use directory::{RunDirectory, Standing};

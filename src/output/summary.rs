@@ -25,8 +25,7 @@ pub struct Summary<F: Figures> {
     /// What a study of this kind finds.
     #[serde(flatten)]
     pub figures: F,
-    /// What the user should know although nothing failed.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    /// What the user should know although nothing failed; empty where that is nothing.
     pub warnings: Vec<String>,
 }
 

@@ -8,7 +8,6 @@ use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
 use crate::geometry::{DualCells, Field, Mesh, node_areas};
 use crate::numerics::linear::Robust;
-use crate::numerics::sum;
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -253,12 +252,11 @@ impl Physics for Burgers {
         self.given[0].is_none().then(|| self.on_mesh(t, mesh))
     }
 
-    fn conserved(&self, mesh: &Mesh<2>, u: &Field) -> f64 {
-        let areas = match self.convection {
+    fn areas(&self, mesh: &Mesh<2>) -> Vec<f64> {
+        match self.convection {
             Convection::Flux => DualCells::new(mesh).areas().to_vec(),
             Convection::Conservative | Convection::Advective => node_areas(mesh),
-        };
-        sum(areas.iter().zip(u.component(0)).map(|(area, u)| area * u))
+        }
     }
 
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {

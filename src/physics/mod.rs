@@ -82,12 +82,29 @@ pub trait Physics<const D: usize = 2>: Send {
         None
     }
 
-    /// The integral of the first unknown, with the areas for which a conservative scheme conserves it.
+    /// Areas of the nodes for which a conservative scheme conserves integrals.
+    fn areas(&self, mesh: &Mesh<D>) -> Vec<f64>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        node_areas(mesh)
+    }
+
+    /// The integral of each unknown, or of what its equation conserves in its place.
+    fn integrals(&self, mesh: &Mesh<D>, u: &Field) -> Vec<f64>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let areas = self.areas(mesh);
+        (0..u.components()).map(|c| sum(areas.iter().zip(u.component(c)).map(|(area, u)| area * u))).collect()
+    }
+
+    /// The integral of the first unknown.
     fn conserved(&self, mesh: &Mesh<D>, u: &Field) -> f64
     where
         Mesh<D>: Cells<D>,
     {
-        sum(node_areas(mesh).iter().zip(u.component(0)).map(|(area, u)| area * u))
+        self.integrals(mesh, u)[0]
     }
 
     /// The exact solution, if there is one, for the unknowns in [`known`](Self::known).

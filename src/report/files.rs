@@ -1,6 +1,6 @@
 use super::frame::{Frame, attribute};
 use crate::error::{Error, Result};
-use crate::output::{Checkpoints, RunDirectory};
+use crate::output::{Checkpoints, RunDirectory, Standing};
 use crate::parallel::map;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
@@ -72,7 +72,8 @@ impl RunFiles {
             notes.push("the mesh is not here: the run has written no frame".into());
         }
         let busy = RunDirectory::is_busy(directory);
-        let resumable = Checkpoints::are_in(directory);
+        let unfinished = RunDirectory::standing(directory) == Standing::Unfinished;
+        let resumable = unfinished || Checkpoints::are_in(directory);
         Ok(Self { directory: directory.into(), summary, study_text, study, history, series, busy, resumable, notes })
     }
 

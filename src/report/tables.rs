@@ -151,6 +151,10 @@ fn of_records(key: &str, records: &[Value]) -> Table {
     // quantities that no record has are left out
     let said = |path: &str, value: &Value| !(value.is_null() || path.starts_with("interface.") && *value == 0);
     paths.retain(|path| flat.iter().flatten().any(|(other, value)| other == *path && said(path, value)));
+    // those of the first unknown are there under its name, too
+    if paths.iter().any(|path| of_unknown(path).is_some()) {
+        paths.retain(|path| !["conserved.mass", "conserved.drift"].contains(&path.as_str()));
+    }
     let at = |record: &[(String, Value)], path: &String| {
         record.iter().find(|(other, _)| other == path).map_or("–".into(), |(_, value)| shown(value))
     };
@@ -206,18 +210,34 @@ fn flat(value: &Value, path: &str) -> Vec<(String, Value)> {
     }
 }
 
+/// The unknown whose integral a path is of, and the path that this quantity has without it.
+fn of_unknown(path: &str) -> Option<(&str, &'static str)> {
+    let inner = path.strip_prefix("conserved.")?;
+    let mass = inner.strip_suffix(".mass").map(|unknown| (unknown, "conserved.mass"));
+    mass.or_else(|| inner.strip_suffix(".drift").map(|unknown| (unknown, "conserved.drift")))
+}
+
 fn known(path: &str) -> Option<&'static (&'static str, &'static str, &'static str)> {
+    let path = of_unknown(path).map_or(path, |(_, plain)| plain);
     let ends = |(key, ..): &&(&str, &str, &str)| path == *key || path.ends_with(&format!(".{key}"));
     NAMES.iter().filter(ends).max_by_key(|(key, ..)| key.len())
 }
 
 pub fn name(path: &str) -> String {
+    match of_unknown(path) {
+        Some((unknown, "conserved.mass")) => return format!("integral of {unknown}"),
+        Some((unknown, _)) => return format!("change of the integral of {unknown}"),
+        None => {}
+    }
     let last = path.rsplit('.').next().unwrap_or(path);
     known(path).map_or_else(|| last.replace('_', " "), |(_, name, _)| (*name).into())
 }
 
 fn meanings<'a>(paths: impl Iterator<Item = &'a str>) -> Vec<[&'static str; 2]> {
-    paths.filter_map(known).filter(|(_, _, words)| !words.is_empty()).map(|(_, name, words)| [*name, *words]).collect()
+    let told = paths.filter_map(known).filter(|(_, _, words)| !words.is_empty());
+    let mut meanings: Vec<_> = told.map(|(_, name, words)| [*name, *words]).collect();
+    meanings.dedup();
+    meanings
 }
 
 fn title(key: &str) -> String {
@@ -279,6 +299,23 @@ mod tests {
         assert_eq!(name("interface.contraction.observed"), "contraction, observed");
         assert_eq!(name("work.newton_iterations"), "iterations of Newton's method");
         assert_eq!(name("work.rejected_steps"), "rejected steps");
+    }
+
+    /// The integrals of unknowns bear their names; of a run that knew that of the first alone there is that.
+    #[test]
+    fn integrals_are_told_by_the_names_of_their_unknowns() {
+        let amount = |mass: f64| serde_json::json!({"mass": mass, "drift": 0.0});
+        let old = serde_json::json!({"reports": [{"t": 0.5, "conserved": amount(2.0)}]});
+        let table = of(old.as_object().unwrap()).remove(0);
+        assert_eq!(table.rows, [["integral of the first unknown", "2"], ["change of the integral", "0"]]);
+        let mut conserved = amount(2.0);
+        conserved["u"] = amount(2.0);
+        conserved["unknown mass"] = amount(3.0);
+        let new = serde_json::json!({"reports": [{"t": 0.5, "conserved": conserved}]});
+        let rows = of(new.as_object().unwrap()).remove(0).rows;
+        assert_eq!(rows.len(), 4, "{rows:?}");
+        assert!(rows.contains(&vec!["integral of u".to_string(), "2".into()]), "{rows:?}");
+        assert!(rows.contains(&vec!["integral of unknown mass".to_string(), "3".into()]), "{rows:?}");
     }
 
     /// Three reports stand side by side, a hundred iterations below each other; a record may lack a value.

@@ -1,5 +1,6 @@
 //! Everything that the rest of a run depends on, as a value.
 
+use super::conserved::AtStart;
 use super::pace::Pace;
 use super::{Record, Safety, Schedule, State};
 use crate::error::{Result, Unfit};
@@ -11,20 +12,20 @@ use serde::{Deserialize, Serialize};
 
 /// Where the checkpoints of a run go.
 pub(crate) trait Keeper<const D: usize = 2> {
-    /// Whether one is to be kept after a step, or after the last.
-    fn due(&self, step: usize, last: bool) -> bool;
+    /// Whether one is to be kept after a step.
+    fn due(&self, step: usize) -> bool;
 
-    /// Keeps one.
+    /// Keeps one, which may be that after the last step.
     ///
     /// # Errors
     /// What hinders that.
-    fn keep(&mut self, checkpoint: &Checkpoint<D>) -> Result<()>;
+    fn keep(&mut self, checkpoint: &Checkpoint<D>, last: bool) -> Result<()>;
 }
 
 /// What the loop carries from step to step beside state and record.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Course {
-    pub mass_at_start: f64,
+    pub at_start: AtStart,
     pub pace: Pace,
     /// Since the run began, over all its parts.
     pub seconds: f64,
@@ -88,8 +89,8 @@ impl<const D: usize> Checkpoint<D> {
         if !schedule.meets(*step, *t) {
             return damaged(format!("its step {step} at t = {t} is none of the run"));
         }
-        if ![course.mass_at_start, course.seconds].iter().all(|v| v.is_finite()) {
-            return damaged(format!("its mass {} or its seconds {} cannot be", course.mass_at_start, course.seconds));
+        if !(course.at_start.is_sound(components) && course.seconds.is_finite()) {
+            return damaged(format!("its integrals {:?} or seconds {} cannot be", course.at_start, course.seconds));
         }
         if !course.pace.is_sound(schedule, safety) {
             return damaged("its time steps are none of the run".into());

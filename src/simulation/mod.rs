@@ -3,6 +3,7 @@
 mod benefit;
 mod checkpoint;
 mod clock;
+mod conserved;
 mod control;
 mod coupling;
 mod doors;
@@ -18,11 +19,13 @@ mod warnings;
 
 pub use benefit::Benefit;
 pub(crate) use checkpoint::{Checkpoint, Course, Keeper};
+pub use conserved::{Amount, Conserved};
 pub use coupling::Coupling;
 pub use observer::{Event, Moving, Observer, Snapshot};
-pub use record::{Conserved, ErrorNorms, Record, Report, Seconds, WorkTotal};
+pub use record::{ErrorNorms, Record, Report, Seconds, WorkTotal};
 pub use safety::{Retries, Safety};
 pub use scene::{Scene, Values};
+pub(crate) use schedule::Past;
 pub use schedule::Schedule;
 
 use crate::density::Monitor;
@@ -33,6 +36,7 @@ use crate::meshing::{Interface, Movable};
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use clock::Clock;
+use conserved::AtStart;
 use doubts::ends;
 use pace::Pace;
 use std::any::Any;
@@ -194,13 +198,14 @@ where
         course: Option<Course>,
     ) -> Result<()> {
         let clock = Clock::start(course.as_ref(), record);
-        let (event, mass_at_start) = match &course {
-            Some(course) => (Event::Resumed, course.mass_at_start),
-            None => (Event::Started, self.physics.conserved(&state.mesh, &state.u)),
+        let (event, at_start) = match &course {
+            Some(course) => (Event::Resumed, course.at_start.clone()),
+            None => (Event::Started, AtStart::of(&*self.physics, &state.mesh, &state.u)),
         };
         self.show(event, state, record, observers, 0.0, &clock)?;
-        if course.is_none() && self.schedule.reports_at(state.t) {
-            let report = self.report(state, mass_at_start, record.interface);
+        // at the start; and at the end of an earlier run that made no report there
+        if self.schedule.reports_at(state.t) && record.reports.last().is_none_or(|report| report.t != state.t) {
+            let report = self.report(state, &at_start, record.interface);
             record.reports.push(report);
         }
         if record.data.is_empty() {
@@ -210,7 +215,7 @@ where
             Some(course) => course.pace,
             None => timed(&mut record.seconds.pde, || Pace::new(self, state))?,
         };
-        let course = |pace: &Pace| Course { mass_at_start, pace: pace.clone(), seconds: clock.seconds() };
+        let course = |pace: &Pace| Course { at_start: at_start.clone(), pace: pace.clone(), seconds: clock.seconds() };
         self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
         while let Some((t, dt)) = pace.next(&self.schedule, state) {
             let step = state.step + 1;
@@ -232,13 +237,13 @@ where
             self.warn_of_unrest(state, dt, record);
             self.warn_of_range(state, record);
             if self.schedule.reports_at(t) {
-                let report = self.report(state, mass_at_start, record.interface);
+                let report = self.report(state, &at_start, record.interface);
                 record.reports.push(report);
             }
             self.show(Event::Stepped, state, record, observers, dt, &clock)?;
             self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
         }
-        if let Some(keeper) = keeper.filter(|keeper| keeper.due(state.step, true)) {
+        if let Some(keeper) = keeper {
             self.checkpoint(state, record, observers, keeper, &clock, course(&pace))?;
         }
         self.show(Event::Finished, state, record, observers, 0.0, &clock)
@@ -256,7 +261,7 @@ where
     ) -> Result<()> {
         let asked = end_where_asked(observers, state);
         if let Some(keeper) = keeper
-            && (asked.is_err() || keeper.due(state.step, false))
+            && (asked.is_err() || keeper.due(state.step))
         {
             self.checkpoint(state, record, observers, *keeper, clock, course())?;
         }
@@ -276,7 +281,8 @@ where
         let mut kept = Kept::default();
         self.mover.generator.keep(&mut kept);
         observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
-        keeper.keep(&Checkpoint::of(state, clock.counted(record), course, kept))?;
+        let last = state.t >= self.schedule.end();
+        keeper.keep(&Checkpoint::of(state, clock.counted(record), course, kept), last)?;
         record.seconds.output += began.elapsed().as_secs_f64();
         Ok(())
     }
@@ -329,12 +335,7 @@ where
         (quality, Some(ErrorNorms { linf, l2: mean.sqrt() }))
     }
 
-    fn report(&self, state: &State<D>, mass_at_start: f64, interface: Option<Interface>) -> Report {
-        let mass = self.physics.conserved(&state.mesh, &state.u);
-        // an integral that began with nothing but rounding is no measure
-        let rounding = 1e-12 * state.mesh.extent().iter().product::<f64>() * largest(state.u.values());
-        let size = if mass_at_start.abs() > rounding { mass_at_start.abs() } else { 1.0 };
-        let drift = (mass - mass_at_start) / size;
+    fn report(&self, state: &State<D>, at_start: &AtStart, interface: Option<Interface>) -> Report {
         let (quality, error) = self.assess(state);
         let followed = self.monitor.followed(state.t, &state.mesh, &state.u).ok();
         let benefit = followed.and_then(|u| Benefit::of(&state.mesh, &u).ok());
@@ -342,7 +343,7 @@ where
             t: state.t,
             error,
             quality,
-            conserved: Conserved { mass, drift },
+            conserved: at_start.conserved(&*self.physics, &state.mesh, &state.u),
             interface,
             comparison: None,
             benefit,

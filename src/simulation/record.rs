@@ -1,6 +1,6 @@
 //! What a run did: its reports, its cost and where its time went.
 
-use super::{Benefit, Retries};
+use super::{Benefit, Conserved, Retries};
 use crate::geometry::{Comparison, Quality};
 use crate::meshing::Interface;
 use crate::stopwatch::Stopwatch;
@@ -70,7 +70,7 @@ pub struct WorkTotal {
 }
 
 /// The state of a run at one of the times asked for.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Report {
     /// Time.
     pub t: f64,
@@ -99,15 +99,6 @@ pub struct ErrorNorms {
     pub linf: f64,
     /// √(Σ e²·area / Σ area), a node's area being a quarter of its cells'.
     pub l2: f64,
-}
-
-/// What a conservative scheme keeps, up to what flows through the sides.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub struct Conserved {
-    /// ∫u dA of the first unknown.
-    pub mass: f64,
-    /// Its change since the start over its size there (its change itself where it was 0).
-    pub drift: f64,
 }
 
 impl WorkTotal {

@@ -1,4 +1,5 @@
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Unfit};
+use serde::{Deserialize, Serialize};
 
 /// The times of all steps
 ///
@@ -18,8 +19,20 @@ pub struct Schedule {
     start: f64,
     reports: Vec<f64>,
     steps: Steps,
+    /// The longest step that is asked for; the whole run where the solution decides.
+    step: f64,
+    /// Ends of earlier runs that this one goes on behind, where it would not meet them by itself.
+    met: Vec<f64>,
     /// End of each interval, and the number of steps done there.
     intervals: Vec<(f64, usize)>,
+}
+
+/// What a run that goes on behind another must know of the schedule of that.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Past {
+    end: f64,
+    reports: Vec<f64>,
+    met: Vec<f64>,
 }
 
 /// What decides how long steps are.
@@ -102,18 +115,49 @@ impl Schedule {
         }
         reports.sort_by(f64::total_cmp);
         reports.dedup();
-        let mut intervals: Vec<(f64, usize)> = Vec::new();
-        let mut from = start;
-        for &to in reports.iter().chain([&end]).filter(|&&t| t > start) {
-            if to > from {
-                // a quotient that is whole up to round-off is whole
-                let count = ((to - from) / step - 1e-9).ceil().max(1.0) as usize;
-                let done = intervals.last().map_or(0, |i| i.1);
-                intervals.push((to, done + count));
-                from = to;
-            }
+        let intervals = divided(start, step, reports.iter().copied().chain([end]));
+        Ok(Self { start, reports, steps: Steps::Even, step, met: Vec::new(), intervals })
+    }
+
+    /// What a run that goes on behind this one must know of it.
+    pub(crate) fn past(&self) -> Past {
+        Past { end: self.end(), reports: self.reports.clone(), met: self.met.clone() }
+    }
+
+    /// Goes on behind a run that was at its end after so many steps: the steps up to there stay as they were. True
+    /// where this schedule ends later.
+    ///
+    /// # Errors
+    /// [`Unfit::Earlier`] where it ends earlier, [`Unfit::Study`] where it has other reports up to there.
+    pub(crate) fn follow(&mut self, past: &Past, step: usize) -> Result<bool, Unfit> {
+        past.met.iter().for_each(|t| self.meet(*t));
+        if past.end == self.end() {
+            return Ok(false);
         }
-        Ok(Self { start, reports, steps: Steps::Even, intervals })
+        if past.end > self.end() || past.end.is_nan() {
+            return Err(Unfit::Earlier { was: past.end, is: self.end() });
+        }
+        let earlier = |reports: &[f64]| reports.iter().copied().filter(|t| *t < past.end).collect::<Vec<f64>>();
+        let [was, is] = [&past.reports, &self.reports].map(|reports| earlier(reports));
+        if was != is {
+            let [was, is] = [was, is].map(|reports| format!("{reports:?} before t = {}", past.end));
+            return Err(Unfit::Study { key: "time.report".into(), was, is });
+        }
+        if !self.meets(step, past.end) {
+            self.meet(past.end);
+        }
+        Ok(true)
+    }
+
+    /// Meets a time exactly, as if there were a report.
+    fn meet(&mut self, t: f64) {
+        let end = self.end();
+        if t > self.start && t < end && !self.met.contains(&t) {
+            self.met.push(t);
+            let mut times: Vec<f64> = self.reports.iter().chain(&self.met).copied().chain([end]).collect();
+            times.sort_by(f64::total_cmp);
+            self.intervals = divided(self.start, self.step, times.into_iter());
+        }
     }
 
     /// Time of the initial state.
@@ -189,6 +233,22 @@ impl Schedule {
     }
 }
 
+/// Intervals between times in their order, and the steps done at the end of each.
+fn divided(start: f64, step: f64, times: impl Iterator<Item = f64>) -> Vec<(f64, usize)> {
+    let mut intervals: Vec<(f64, usize)> = Vec::new();
+    let mut from = start;
+    for to in times {
+        if to > from {
+            // a quotient that is whole up to round-off is whole
+            let count = ((to - from) / step - 1e-9).ceil().max(1.0) as usize;
+            let done = intervals.last().map_or(0, |i| i.1);
+            intervals.push((to, done + count));
+            from = to;
+        }
+    }
+    intervals
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -225,6 +285,34 @@ mod tests {
         assert_eq!(schedule.steps(), Some(1000));
         assert_eq!(schedule.time(500), 0.75);
         assert!((schedule.step_from(3).unwrap() - 1e-3).abs() < 1e-18);
+    }
+
+    /// 0.3 is met after two steps of at most 0.2 in any run to a later end, however that divides its steps: by 0.25
+    /// up to 1, were it not for the earlier end.
+    #[test]
+    fn a_later_end_leaves_the_steps_before_as_they_were() {
+        let short = Schedule::new(0.0, 0.3, 0.2, vec![0.3]).unwrap();
+        let mut longer = Schedule::new(0.0, 1.0, 0.2, vec![1.0]).unwrap();
+        assert_eq!((longer.steps(), longer.meets(2, 0.3)), (Some(5), false));
+        assert!(longer.follow(&short.past(), 2).unwrap());
+        assert_eq!((longer.steps(), longer.meets(2, 0.3), longer.reports_at(0.3)), (Some(6), true, false));
+        assert_eq!([1, 2].map(|n| longer.time(n)), [1, 2].map(|n| short.time(n)));
+        // and so does one that goes on behind that, and one that goes on half-way
+        let mut longest = Schedule::new(0.0, 1.7, 0.2, vec![1.7]).unwrap();
+        assert!(longest.follow(&longer.past(), 6).unwrap());
+        assert!((0..=6).all(|n| longest.time(n) == longer.time(n)) && longest.steps() == Some(10));
+        let mut again = Schedule::new(0.0, 1.7, 0.2, vec![1.7]).unwrap();
+        assert!(!again.follow(&longest.past(), 8).unwrap() && again == longest);
+        assert_eq!(longest.follow(&short.past(), 2), Ok(true));
+        assert_eq!(short.clone().follow(&longer.past(), 6), Err(Unfit::Earlier { was: 1.0, is: 0.3 }));
+        let other = Schedule::new(0.0, 2.0, 0.2, vec![0.1]).unwrap();
+        assert!(
+            matches!(other.clone().follow(&short.past(), 2), Err(Unfit::Study { key, .. }) if key == "time.report")
+        );
+        // a time that both meet by themselves needs nothing
+        let mut even = Schedule::new(0.0, 2.0, 0.25, vec![]).unwrap();
+        let alone = even.clone();
+        assert!(even.follow(&Schedule::new(0.0, 1.0, 0.25, vec![1.0]).unwrap().past(), 4).unwrap() && even == alone);
     }
 
     #[test]

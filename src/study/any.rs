@@ -1,9 +1,9 @@
-use super::kind::Kind;
+use super::kind::{Kind, Running};
 use super::runner::{self, Begin};
 use super::{EquidistributionStudy, Header, MovingLine, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
 use crate::error::{Act, Error, Failure, Result, Unfit};
 use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing};
-use crate::simulation::Observer;
+use crate::simulation::{Observer, Schedule};
 use schemars::generate::SchemaSettings;
 use serde::Deserialize;
 use serde_json::json;
@@ -108,17 +108,29 @@ impl Study {
     /// How far the run of this very study in a directory came.
     ///
     /// # Errors
-    /// [`Error::Checkpoint`] where it is complete, but of other settings.
+    /// [`Error::Checkpoint`] where it is complete, but of other settings than how far it goes.
     pub fn standing(&self, directory: &Path) -> Result<Standing> {
         let standing = RunDirectory::standing(directory);
-        if standing == Standing::Complete {
-            let path = directory.join("study.toml");
-            let text = std::fs::read_to_string(&path)
-                .map_err(|error| Error::Unreadable { path: path.clone(), reason: error.to_string() })?;
-            let checkpoints = Checkpoints::new(directory, CheckpointsAt::default(), &self.to_toml())?;
-            checkpoints.check_study(&text).map_err(|unfit| Error::Checkpoint { refused: vec![(path, unfit)] })?;
+        if standing != Standing::Complete {
+            return Ok(standing);
         }
-        Ok(standing)
+        let path = directory.join("study.toml");
+        let text = std::fs::read_to_string(&path)
+            .map_err(|error| Error::Unreadable { path: path.clone(), reason: error.to_string() })?;
+        let checkpoints = Checkpoints::new(directory, CheckpointsAt::default(), &self.to_toml())?;
+        let refused = |(file, unfit): (&str, Unfit)| Error::Checkpoint { refused: vec![(directory.join(file), unfit)] };
+        match checkpoints.behind(&text).map_err(refused)? {
+            None => Ok(Standing::Complete),
+            Some(behind) => {
+                let followed = behind.followed_by(self.schedule()?.as_mut());
+                followed.map(|_| Standing::Shorter).map_err(|unfit| refused(("study.toml", unfit)))
+            }
+        }
+    }
+
+    /// The times of its steps, where it has some.
+    fn schedule(&self) -> Result<Option<Schedule>> {
+        each!(self, study => study.begin().map(|mut run| run.schedule().cloned()))
     }
 
     /// The step of a checkpoint of this study, from the bytes behind its checksum: whatever they are, what a run could

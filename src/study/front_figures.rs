@@ -157,6 +157,19 @@ impl Tables {
         Ok(Self { history: history?, fronts: fronts? })
     }
 
+    /// Every front so far, behind its time.
+    pub fn fronts(directory: &Path) -> Result<Vec<Vec<f64>>, Unfit> {
+        let file = Self::NAMES[1];
+        let beside = |reason: String| Unfit::Beside { file: file.into(), reason };
+        let mut rows = csv::Reader::from_path(directory.join(file)).map_err(|error| beside(error.to_string()))?;
+        let row = |row: csv::Result<csv::StringRecord>| -> Result<Vec<f64>, Unfit> {
+            let row = row.map_err(|error| beside(error.to_string()))?;
+            let number = |entry: &str| entry.parse().map_err(|_| beside(format!("{entry:?} is no number")));
+            row.iter().map(number).collect()
+        };
+        rows.records().map(row).collect()
+    }
+
     pub fn keep(&mut self, kept: &mut Kept) -> Result<()> {
         for (name, table) in Self::NAMES.into_iter().zip([&mut self.history, &mut self.fronts]) {
             kept.put(name, &table.sync()?);

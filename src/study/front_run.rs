@@ -139,10 +139,17 @@ impl FrontRun {
         )
     }
 
+    /// The share of the run that is done at a time.
+    fn share(&self, t: f64) -> f64 {
+        (t - self.schedule.start()) / (self.schedule.end() - self.schedule.start())
+    }
+
     /// Keeps some of the fronts, evenly over the run.
-    fn collect(&mut self, share: f64) {
-        if self.course.fronts.is_empty() || share >= self.course.fronts.len() as f64 / CURVES as f64 - 1e-9 {
-            self.course.fronts.push((self.course.state.t, self.course.state.front.clone()));
+    fn collect(&mut self, t: f64, front: impl FnOnce(&Self) -> Vec<f64>) {
+        let kept = self.course.fronts.len();
+        if kept == 0 || self.share(t) >= kept as f64 / CURVES as f64 - 1e-9 {
+            let front = front(self);
+            self.course.fronts.push((t, front));
         }
     }
 
@@ -159,25 +166,25 @@ impl FrontRun {
     fn show(&mut self, event: Event, dt: f64, stage: &mut Stage<'_>, mut tables: Option<&mut Tables>) -> Result<()> {
         let (mesh, seconds) = (self.mesh()?, stage.wall());
         let quality = quality(&mesh, &vec![1.0; mesh.x().len()])?;
-        let (t, [start, end]) = (self.course.state.t, [self.schedule.start(), self.schedule.end()]);
-        let share = (t - start) / (end - start);
+        let t = self.course.state.t;
+        let report = FrontReport::of(&self.front, &self.given, &self.course.state);
         if matches!(event, Event::Started | Event::Stepped) {
-            let report = FrontReport::of(&self.front, &self.given, &self.course.state);
             if let Some(tables) = &mut tables {
                 let newton_iterations = self.course.work.work.newton_iterations;
                 tables.write(Row::of(&report, dt, quality, newton_iterations, seconds), &self.course.state.front)?;
             }
-            if self.schedule.reports_at(t) {
-                self.course.reports.push(report);
-            }
-            self.collect(share);
+            self.collect(t, |run| run.course.state.front.clone());
+        }
+        // an earlier run that ended here may have made no report
+        if self.schedule.reports_at(t) && self.course.reports.last().is_none_or(|report| report.t != t) {
+            self.course.reports.push(report);
         }
         let snapshot = Snapshot {
             t,
             step: self.course.state.step,
             dt,
             steps: self.schedule.steps(),
-            share,
+            share: self.share(t),
             smallest: quality.min_scaled_jacobian,
             seconds,
             nodes: mesh.x(),
@@ -248,6 +255,20 @@ impl Running for FrontRun {
         let (seconds, kept) = (self.course.seconds, std::mem::take(&mut self.course.kept));
         self.tables = directory.map(|to| Tables::resume(to, &kept)).transpose()?;
         Ok((seconds, kept))
+    }
+
+    fn schedule(&mut self) -> Option<&mut Schedule> {
+        Some(&mut self.schedule)
+    }
+
+    /// Chooses the fronts of the picture from all of them, as a run to this end would have.
+    fn lengthen(&mut self, directory: &Path) -> Result<(), Unfit> {
+        let fronts = Tables::fronts(directory)?;
+        let heights: Vec<[f64; 1]> = fronts.iter().flatten().map(|height| [*height]).collect();
+        check_nodal("front.csv", &heights, fronts.len() * (self.front.columns.x().len() + 1))?;
+        self.course.fronts.clear();
+        fronts.iter().for_each(|row| self.collect(row[0], |_| row[1..].to_vec()));
+        Ok(())
     }
 
     fn frames(&self) -> (FramesAt, [usize; 2]) {

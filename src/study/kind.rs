@@ -5,7 +5,7 @@ use super::{Begin, Header, Output, Source, StudyKind};
 use crate::error::{Act, Error, Failure, Result, Unfit};
 use crate::kept::Kept;
 use crate::output::{Figures, FramesAt, RunDirectory, Spent, Summary, moment};
-use crate::simulation::{Observer, Scene};
+use crate::simulation::{Observer, Scene, Schedule};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
@@ -124,6 +124,20 @@ pub trait Running: Sized {
     /// # Errors
     /// [`Unfit`] where it cannot be one of this study, or where the tables are not there.
     fn resume(&mut self, found: Self::Checkpoint, directory: Option<&Path>) -> Result<(SpentBy<Self>, Kept), Unfit>;
+
+    /// The times of its steps; none where it has no steps in time.
+    fn schedule(&mut self) -> Option<&mut Schedule> {
+        None
+    }
+
+    /// Turns from a run that was complete into one that goes on to a later end: takes back what is there only because
+    /// it was at its end. Called after [`resume`](Self::resume).
+    ///
+    /// # Errors
+    /// [`Unfit`] where what it needs for that is not in the directory.
+    fn lengthen(&mut self, _directory: &Path) -> Result<(), Unfit> {
+        Ok(())
+    }
 
     /// When frames are written, and into how many subdomains along each axis a mesh in two dimensions is divided.
     fn frames(&self) -> (FramesAt, [usize; 2]) {

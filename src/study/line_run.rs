@@ -227,6 +227,24 @@ impl Running for LineRun {
         Ok((seconds, kept))
     }
 
+    fn schedule(&mut self) -> Option<&mut Schedule> {
+        self.schedule.as_mut()
+    }
+
+    /// The last mesh is kept whether a frame is due or not.
+    fn lengthen(&mut self, _directory: &Path) -> Result<(), Unfit> {
+        let done = self.evolution.done;
+        let [before, t] = [done.saturating_sub(1), done].map(|step| self.time(step));
+        let due = self.study.output.frames.as_ref().is_none_or(|frames| frames.due(done, t, t - before));
+        let Evolution { times, meshes, kept, .. } = &mut self.evolution;
+        if !due && done > 0 && kept.last() == Some(&done) {
+            times.pop();
+            meshes.pop();
+            kept.pop();
+        }
+        Ok(())
+    }
+
     fn frames(&self) -> (FramesAt, [usize; 2]) {
         (self.study.output.frames.clone().unwrap_or(FramesAt::Every(1)), [1, 1])
     }

@@ -12,8 +12,8 @@ use crate::output::{
     Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Spent, Summary, final_arrays, moment,
 };
 use crate::simulation::{
-    Checkpoint, Course, Event, Keeper, Observer, Record, Report, Retries, Scene, Seconds, Simulation, Snapshot, State,
-    Values, WorkTotal,
+    Checkpoint, Course, Event, Keeper, Observer, Record, Report, Retries, Scene, Schedule, Seconds, Simulation,
+    Snapshot, State, Values, WorkTotal,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -76,14 +76,11 @@ where
 
     /// Takes the steps that are left.
     fn steps(&mut self, state: &mut State<D>, stage: &mut Stage<'_>) -> Result<()> {
-        let compares = self.study.compare.is_some();
-        let (watching, mut checkpoints) = stage.parts();
+        let (watching, checkpoints) = stage.parts();
         let mut observers: Vec<&mut dyn Observer> = Vec::new();
         self.history.iter_mut().for_each(|history| observers.push(history));
         observers.push(&mut self.meshes);
         observers.extend(watching);
-        // much is left to do after the last step, too
-        checkpoints.iter_mut().for_each(|checkpoints| checkpoints.at_the_end = compares);
         let keeper = checkpoints.map(|checkpoints| checkpoints as &mut dyn Keeper<D>);
         self.simulation.run_on(state, &mut self.record, &mut observers, keeper, self.course.take())
     }
@@ -183,6 +180,10 @@ where
         Mesh::take_up(self, found, directory)
     }
 
+    fn schedule(&mut self) -> Option<&mut Schedule> {
+        Some(&mut self.simulation.schedule)
+    }
+
     fn frames(&self) -> (FramesAt, [usize; 2]) {
         (self.study.frames(), self.study.mesh.generator.subdomains())
     }
@@ -262,8 +263,9 @@ where
 impl<const D: usize> Observer for Meshes<D> {
     fn observe(&mut self, event: Event, snapshot: &Snapshot<'_>) -> Result<()> {
         if let Some(state) = snapshot.state::<D>()
-            && matches!(event, Event::Started | Event::Stepped)
+            && event != Event::Finished
             && self.at.contains(&state.t)
+            && self.found.last().is_none_or(|(t, _)| *t != state.t)
         {
             self.found.push((state.t, state.mesh.clone()));
         }

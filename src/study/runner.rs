@@ -3,7 +3,7 @@
 use super::kind::{Kind, Running, SpentBy};
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::Kept;
-use crate::output::{Checkpoints, Frames, RunDirectory, Spent, Summary, draw, final_arrays};
+use crate::output::{Behind, Checkpoints, Frames, RunDirectory, Spent, Summary, draw, final_arrays};
 use crate::parallel::join;
 use crate::report;
 use crate::simulation::{Event, Observer, Scene, Snapshot};
@@ -18,6 +18,7 @@ pub enum Begin {
     /// At its start.
     Anew,
     /// At the newest checkpoint, and on to the bits of a run that nothing disturbed; at its start where there is none.
+    /// A complete run goes on behind its last step where the study ends later now.
     Resumed,
 }
 
@@ -73,9 +74,9 @@ impl<'a> Stage<'a> {
         (observers, self.checkpoints.as_mut())
     }
 
-    /// Shows an event to all observers. Unless it is the end of the run, a checkpoint is written where one is due,
-    /// which `keep` makes of the seconds up to now and of what observers carry, and the run ends where an observer asks
-    /// for that.
+    /// Shows an event to all observers. A checkpoint is written where one is due, and at the end of the run, which
+    /// `keep` makes of the seconds up to now and of what observers carry, and the run ends where an observer asks for
+    /// that.
     ///
     /// # Errors
     /// What an observer returned; [`Error::Unwritable`]; [`Error::Interrupted`].
@@ -88,15 +89,20 @@ impl<'a> Stage<'a> {
     ) -> Result<()> {
         let spent = self.spent(parts);
         let (mut observers, checkpoints) = self.parts();
-        observers.iter_mut().try_for_each(|observer| observer.observe(event, snapshot))?;
+        let mut kept = Kept::default();
         if event == Event::Finished {
-            return Ok(());
+            // before the last frame, which a run that goes on to a later end may not have
+            if let Some(checkpoints) = checkpoints {
+                observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
+                checkpoints.write_last(snapshot.step, &keep(spent, kept)?)?;
+            }
+            return observers.iter_mut().try_for_each(|observer| observer.observe(event, snapshot));
         }
+        observers.iter_mut().try_for_each(|observer| observer.observe(event, snapshot))?;
         let ends = observers.iter().any(|observer| observer.interrupts());
         if let Some(checkpoints) = checkpoints
             && (ends || checkpoints.is_due(snapshot.step))
         {
-            let mut kept = Kept::default();
             observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
             checkpoints.write(snapshot.step, &keep(spent, kept)?)?;
         }
@@ -161,7 +167,7 @@ pub(super) fn run<K: Kind>(
     let mut checkpoints = Checkpoints::new(path, output.checkpoint, &study.to_toml())?;
     let resumed = match begin {
         Begin::Anew => None,
-        Begin::Resumed => checkpoints.resume(|found| take_up(&study, path, found))?,
+        Begin::Resumed => checkpoints.resume(|found, behind| take_up(&study, path, found, behind))?,
     };
     let mut stage = Stage::bare();
     match resumed {
@@ -179,6 +185,7 @@ pub(super) fn run<K: Kind>(
             (stage.clock, stage.frames) = (clock, Some(Frames::create(path, at, subdomains)));
         }
     }
+    checkpoints.past = run.schedule().map(|schedule| schedule.past());
     stage.directory = Some(&directory);
     stage.checkpoints = Some(checkpoints);
     watchers.iter_mut().for_each(|watcher| stage.watchers.push(*watcher));
@@ -193,9 +200,18 @@ pub(super) fn run<K: Kind>(
 type TakenUp<R> = (R, Frames, SpentBy<R>);
 
 /// Takes up a checkpoint, and takes the files of the directory back to what they were then.
-fn take_up<K: Kind>(study: &K, path: &Path, found: <K::Run as Running>::Checkpoint) -> Result<TakenUp<K::Run>, Unfit> {
+fn take_up<K: Kind>(
+    study: &K,
+    path: &Path,
+    found: <K::Run as Running>::Checkpoint,
+    behind: &Behind,
+) -> Result<TakenUp<K::Run>, Unfit> {
     let mut run = begun(study)?;
+    let later = behind.followed_by(run.schedule())?;
     let (before, kept) = run.resume(found, Some(path))?;
+    if later {
+        run.lengthen(path)?;
+    }
     let (at, subdomains) = run.frames();
     Ok((run, Frames::resume(path, at, subdomains, &kept)?, before))
 }
@@ -207,9 +223,11 @@ fn begun<K: Kind>(study: &K) -> Result<K::Run, Unfit> {
 /// See [`Study::decode`](super::Study::decode).
 pub(super) fn decode<K: Kind>(study: &K, bytes: &[u8]) -> Result<usize, Unfit> {
     let checkpoints = Checkpoints::new(Path::new(""), study.common().1.checkpoint, &study.to_toml());
-    let (step, found) = checkpoints.map_err(|error| Unfit::Damaged(error.to_string()))?.read(bytes)?;
-    begun(study)?.resume(found, None)?;
-    Ok(step)
+    let (behind, found) = checkpoints.map_err(|error| Unfit::Damaged(error.to_string()))?.read(bytes)?;
+    let mut run = begun(study)?;
+    behind.followed_by(run.schedule())?;
+    run.resume(found, None)?;
+    Ok(behind.step)
 }
 
 /// Ends a run: writes what is left of it, its summary, then the report and what else is drawn, then the summary again

@@ -52,18 +52,21 @@ impl Source {
         if path.is_dir() {
             return Err(unreadable("it is a directory, not a study file".into()));
         }
-        let mut bytes = Vec::new();
-        let read = std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
-        read.map_err(|error| unreadable(error.to_string()))?;
-        if bytes.len() as u64 > MAX_BYTES {
-            return Err(unreadable(format!("it has more than {MAX_BYTES} bytes, which no study has")));
+        let file = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
+        Ok(Self::new(path.display().to_string(), text_of(file).map_err(unreadable)?))
+    }
+
+    /// Reads a study to its end; `origin` names in messages where it comes from, such as `standard input`.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] where nothing comes, or no UTF-8.
+    pub fn from_reader(origin: &str, reader: impl Read) -> Result<Self> {
+        let unreadable = |reason: String| Error::Unreadable { path: origin.into(), reason };
+        let text = text_of(reader).map_err(unreadable)?;
+        if text.trim().is_empty() {
+            return Err(unreadable("it is empty, where the text of a study must come".into()));
         }
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let at = error.utf8_error().valid_up_to();
-            let line = error.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
-            unreadable(format!("it is not UTF-8 text (byte {at}, line {line}); save it as UTF-8"))
-        })?;
-        Ok(Self::new(path.display().to_string(), text))
+        Ok(Self::new(origin, text))
     }
 
     /// A study from text; `origin` is its name in messages.
@@ -311,6 +314,20 @@ impl Source {
             help,
         }))
     }
+}
+
+/// The text of a study.
+fn text_of(reader: impl Read) -> Result<String, String> {
+    let mut bytes = Vec::new();
+    reader.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(format!("it has more than {MAX_BYTES} bytes, which no study has"));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let line = error.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
+        format!("it is not UTF-8 text (byte {at}, line {line}); save it as UTF-8")
+    })
 }
 
 /// A control character, a tab too, would move what is printed after it.

@@ -225,8 +225,19 @@ impl Physics for ShallowWater {
         Field::nodal(mesh.x().iter().map(|x| [depth(x), 0.0, 0.0]).collect())
     }
 
-    fn conserved(&self, mesh: &Mesh<2>, u: &Field) -> f64 {
-        sum(DualCells::new(mesh).areas().iter().zip(u.component(0)).map(|(area, h)| area * h))
+    fn areas(&self, mesh: &Mesh<2>) -> Vec<f64> {
+        DualCells::new(mesh).areas().to_vec()
+    }
+
+    /// Of the water, and of its momentum along both axes.
+    fn integrals(&self, mesh: &Mesh<2>, w: &Field) -> Vec<f64> {
+        let areas = self.areas(mesh);
+        let momentum = |c: usize| {
+            let moving = w.component(0).zip(w.component(c));
+            sum(areas.iter().zip(moving).map(|(area, (h, u))| area * h * u))
+        };
+        let water = sum(areas.iter().zip(w.component(0)).map(|(area, h)| area * h));
+        vec![water, momentum(1), momentum(2)]
     }
 
     fn step(&mut self, motion: Motion<'_>, u: &Field) -> Result<(Field, Work), Failure> {
