@@ -21,21 +21,21 @@ pub(super) struct Bounds<const D: usize, const B: usize> {
 const STATES: [f64; 3] = [-1.0, 0.0, 1.0];
 
 impl<const D: usize, const B: usize> Bounds<D, B> {
-    /// `flows` are the fluxes of each unknown, `sources` their sources, formulas of D coordinates, the unknowns and t.
+    /// `flows` are the fluxes of each unknown, formulas of D coordinates, the unknowns and t, and `reactions` the sources
+    /// of those that have one: the others are conserved, which bounds of their own would change.
     pub fn new(
         names: &[String],
         given: &[[Option<Formula>; 2]],
         flows: [Vec<&Formula>; B],
-        sources: [&Formula; B],
+        reactions: [Option<&Formula>; B],
     ) -> Self {
         let compiled = |c: usize, end: usize| given[c][end].as_ref().map(|formula| Program::new([formula]));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
             given: std::array::from_fn(|c| [0, 1].map(|end| compiled(c, end))),
-            kept: std::array::from_fn(|c| match sources[c].text() {
-                // what is only carried and diffused is conserved, which bounds would change
-                "0" => Vec::new(),
-                _ => STATES.into_iter().filter(|state| keeps::<D>(c, *state, &flows[c], sources[c])).collect(),
+            kept: std::array::from_fn(|c| match reactions[c] {
+                None => Vec::new(),
+                Some(source) => STATES.into_iter().filter(|state| keeps::<D>(c, *state, &flows[c], source)).collect(),
             }),
         }
     }

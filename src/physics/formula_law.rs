@@ -1,18 +1,19 @@
 //! A user's equation as a conservation law.
 
+mod kinds;
+mod stepped;
+
 use super::bounds::Bounds;
 use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Limited, Point, Sloped, Steep, Stepper, Stored};
-use super::formula_pde::{Formulas, Scheme};
+use super::formula_pde::Formulas;
 use super::prescribed::evaluate;
 use super::sides::Open;
 use super::terms::Terms;
-use super::{Motion, Physics, nodal};
 use crate::error::{Failure, Result};
 use crate::formula::Program;
-use crate::geometry::{Cells, DualCells, Field, Mesh, dot, length, strides};
-use crate::numerics::linear::{RobustLine, RobustTransport};
+use crate::geometry::{Cells, DualCells, Mesh, dot, length, strides};
 use crate::parallel;
-use crate::work::Work;
+use kinds::Kinds;
 
 /// B unknowns in D dimensions. P = D + B is the number of values that the formulas take at a node, K = (D + 2) B (B +
 /// 1) that of the values they give.
@@ -26,7 +27,7 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     /// The exact solution, for the unknowns that have one.
     exact: Vec<(usize, Program<D, 1>)>,
     has_source: bool,
-    /// The unknowns that diffuse, in Cartesian coordinates: cells along a radius have another mass.
+    /// Whether neighbours have a share in the mass of a node.
     shares: [bool; B],
     stepper: Stepper,
     limited: Limited<B>,
@@ -50,53 +51,19 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Formulas { names, nodal, initial, sides, exact, scheme, terms, bounds } = formulas;
-        let is_zero = |quantity: usize, c: usize| nodal[quantity * B + c].text() == "0";
-        let limited = std::array::from_fn(|c| match scheme {
-            None => is_zero(Self::DIFFUSIVITY, c) && !terms.has_flux(c) && !terms.has_storage(c),
-            Some(scheme) => scheme == Scheme::Limited,
-        });
-        let changed = |c: usize| {
-            let plain = is_zero(Self::DIFFUSIVITY, c) && is_zero(Self::SOURCE, c);
-            !plain || terms.has_flux(c) || terms.has_source(c)
-        };
-        let by_others = |c: usize| (0..D).any(|d| (0..B).any(|e| !limited[e] && nodal[d * B + c].depends_on(D + e)));
-        let limited = Limited {
-            unknowns: limited,
-            implicit: (0..B).any(|c| !limited[c] || changed(c)),
-            coupled: (0..B).any(|c| limited[c] && (changed(c) || by_others(c))),
-        };
-        let flows = |&(d, end): &(usize, usize)| {
-            sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
-        };
-        let changed_by_terms = |c: usize| terms.has_flux(c) || terms.has_source(c) || terms.has_storage(c);
-        let keeps_range = std::array::from_fn(|c| {
-            let fluxes = || (0..D).map(|d| &nodal[d * B + c]);
-            let flows = fluxes().any(|flux| flux.text() != "0");
-            // of the unknown alone, so that no place draws it together; else where the flux ends it would pile up
-            let own = fluxes().all(|flux| (0..P).all(|v| v == D + c || !flux.depends_on(v)));
-            let ends = |end: &Open| match end {
-                Open::Value(_) | Open::Outflow => true,
-                Open::Closed => !flows,
-                Open::Flux(_) => false,
-            };
-            let source = nodal[Self::SOURCE * B + c].text() != "0";
-            !source && own && !changed_by_terms(c) && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
-        });
-        let open = (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(flows).collect();
+        let Kinds { limited, shares, keeps_range, reacts, open } = Kinds::of(&formulas, cartesian);
+        let Formulas { names, nodal, initial, sides, exact, terms, bounds, .. } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
-            shares: std::array::from_fn(|c| {
-                cartesian && !is_zero(Self::DIFFUSIVITY, c) && !limited.unknowns[c] && !terms.has_storage(c)
-            }),
+            shares,
             terms: Terms::new(&terms, &names),
             limited,
             bounds: Bounds::new(
                 &names,
                 &bounds,
                 std::array::from_fn(|c| (0..D).map(|d| &nodal[d * B + c]).collect()),
-                std::array::from_fn(|c| &nodal[Self::SOURCE * B + c]),
+                std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| reacts[c])),
             ),
             has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
@@ -370,94 +337,6 @@ fn crossing<const B: usize, N>(
         by_above: by(above),
     }
 }
-
-impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> Physics<D>
-    for FormulaLaw<D, B, P, K, Solver>
-where
-    Solver: Default + Send + Sync,
-    Self: Stepped<D, B>,
-    Mesh<D>: Cells<D>,
-{
-    fn unknowns(&self) -> Vec<String> {
-        self.names.to_vec()
-    }
-
-    fn initial(&self, t: f64, mesh: &Mesh<D>) -> Field {
-        Field::nodal(evaluate(&self.initial, t, mesh))
-    }
-
-    fn side_values(&self, t: f64, x: [f64; D], beyond: [[bool; 2]; D]) -> Vec<Option<f64>> {
-        self.given(t, x, beyond).to_vec()
-    }
-
-    fn check(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Result<(), Failure> {
-        let values = u.values().as_chunks::<B>().0;
-        if let Some(place) = u.values().iter().position(|u| !u.is_finite()) {
-            let (k, c) = (place / B, place % B);
-            return Err(self.failure(format!("`pde.initial.{}`", self.names[c]), values[k][c], mesh, k, None));
-        }
-        self.check_sides(t, mesh)?;
-        self.check_exact(t, mesh)?;
-        for (k, node) in self.nodes(t, &mesh.images(), values).iter().enumerate() {
-            if let Some(worst) = node.iter().position(|v| !v.is_finite()) {
-                return Err(self.failure(self.what(worst), node[worst], mesh, k, Some(&values[k])));
-            }
-        }
-        Ok(())
-    }
-
-    fn exact(&self, t: f64, mesh: &Mesh<D>) -> Option<Field> {
-        let unknown = |exact| evaluate(exact, t, mesh).into_flattened();
-        let known: Vec<Vec<f64>> = self.exact.iter().map(|(_, exact)| unknown(exact)).collect();
-        (!known.is_empty()).then(|| Field::joined(&known).expect("each has one value a node"))
-    }
-
-    fn keeps_range(&self) -> Vec<bool> {
-        self.keeps_range.to_vec()
-    }
-
-    fn known(&self) -> Vec<usize> {
-        self.exact.iter().map(|(c, _)| *c).collect()
-    }
-
-    fn areas(&self, mesh: &Mesh<D>) -> Vec<f64> {
-        (self.cells)(mesh).areas().to_vec()
-    }
-
-    fn step(&mut self, motion: Motion<'_, D>, u: &Field) -> Result<(Field, Work), Failure> {
-        let start = nodal::<D, B>(motion, u)?;
-        let end = motion.t + motion.dt;
-        self.check_sides(end, motion.new)?;
-        let (values, work) = self.advanced(motion, start)?;
-        self.check_exact(end, motion.new)?;
-        Ok((Field::nodal(values), work))
-    }
-}
-
-/// A step of finite volumes, whose stencils differ between the line and the plane.
-trait Stepped<const D: usize, const B: usize> {
-    fn advanced(&mut self, motion: Motion<'_, D>, start: &[[f64; B]]) -> Result<(Vec<[f64; B]>, Work), Failure>;
-}
-
-macro_rules! stepped {
-    ($D:literal, $Solver:ty) => {
-        impl<const B: usize, const P: usize, const K: usize> Stepped<$D, B> for FormulaLaw<$D, B, P, K, $Solver> {
-            fn advanced(
-                &mut self,
-                motion: Motion<'_, $D>,
-                start: &[[f64; B]],
-            ) -> Result<(Vec<[f64; B]>, Work), Failure> {
-                let mut volumes = std::mem::take(&mut self.volumes);
-                let stepped = volumes.step(self, motion, start);
-                self.volumes = volumes;
-                stepped
-            }
-        }
-    };
-}
-
-stepped!(1, RobustLine);
-stepped!(2, RobustTransport<B>);
 
 #[cfg(test)]
 mod tests;

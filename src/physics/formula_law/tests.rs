@@ -3,7 +3,8 @@
 use super::super::finite_volumes::tests::order_of_newton;
 use super::*;
 use crate::geometry::Lattice;
-use crate::physics::{Burgers, BurgersFlux, Convection, FormulaPde};
+use crate::numerics::linear::RobustTransport;
+use crate::physics::{Burgers, BurgersFlux, Convection, FormulaPde, Motion, Physics};
 
 /// Burgers' equation solved as well as a formula is.
 struct Tight(Burgers);
@@ -43,6 +44,35 @@ fn newton_converges_quadratically() {
         flux = { u = ["u^2/2", "u*v"], v = ["u*v", "0.3*v^2"] }
         diffusivity = { u = "0.05*(1 + u*v)", v = "0.04*(1 + v^2 + 0.2*x)" }
         source = { u = "u*(1 - v) + sin(x + t)", v = "u*v - v^2" }
+        initial = { u = "1 + 0.3*sin(2*x)*cos(y)", v = "0.5 + 0.2*cos(x - y)" }
+        boundary = { u = "1", v = "no-flux" }
+        "#,
+    )
+    .unwrap();
+    let law: FormulaLaw<2, 2, 4, 24, RobustTransport<2>> =
+        FormulaLaw::new(pde.read().unwrap(), DualCells::new, Stepper::Trapezoid, true);
+    let square = Mesh::uniform(Lattice::bounded([9, 8]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
+    let mesh = |t: f64| {
+        let bent = |x: f64, y: f64| x + 0.07 * (std::f64::consts::TAU * x).sin() * (5.0 * y + 3.0 * t).cos();
+        square.moved(square.x().iter().map(|&[x, y]| [bent(x, y), bent(y, x)]).collect()).unwrap()
+    };
+    let [old, new] = [0.0, 0.1].map(mesh);
+    let u = law.initial(0.0, &old);
+    let motion = Motion { t: 0.0, dt: 0.1, old: &old, new: &new };
+    let order = order_of_newton(&law, motion, u.values().as_chunks::<2>().0);
+    assert!((order - 2.0).abs() < 0.1, "order {order:.3}");
+}
+
+/// The same with a tensor, cross diffusion, gradients in a flux and in a source, and storage.
+#[test]
+fn newton_converges_quadratically_with_gradients() {
+    let pde: FormulaPde = toml::from_str(
+        r#"
+        unknowns = ["u", "v"]
+        flux = { u = ["u*v_x", "u*v_y*x"] }
+        diffusivity = { u = [["1 + u^2", "0.3"], ["0.2*v", "0.5"]], v = { v = "1 + u_x^2", u = "0.3*u" } }
+        source = { u = "u_x*v_y + sin(x + t)", v = "u*v - v_x^2" }
+        storage = { u = "u + u^3", v = "v + 0.3*u*v" }
         initial = { u = "1 + 0.3*sin(2*x)*cos(y)", v = "0.5 + 0.2*cos(x - y)" }
         boundary = { u = "1", v = "no-flux" }
         "#,

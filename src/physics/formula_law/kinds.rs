@@ -1,0 +1,61 @@
+//! What each equation of a study is, as its formulas tell.
+
+use crate::physics::finite_volumes::Limited;
+use crate::physics::formula_pde::{Formulas, Scheme};
+use crate::physics::sides::Open;
+
+/// What the unknowns of some equations are.
+pub(super) struct Kinds<const B: usize> {
+    pub limited: Limited<B>,
+    /// Those that diffuse alike in all directions, in Cartesian coordinates: cells along a radius have another mass.
+    pub shares: [bool; B],
+    /// Those that are only carried and diffused.
+    pub keeps_range: [bool; B],
+    /// Those that have a source, and no term that takes gradients.
+    pub reacts: [bool; B],
+    /// The sides through which something flows that is not given there.
+    pub open: Vec<(usize, usize)>,
+}
+
+impl<const B: usize> Kinds<B> {
+    pub fn of<const D: usize>(formulas: &Formulas<D>, cartesian: bool) -> Self {
+        let Formulas { nodal, sides, scheme, terms, .. } = formulas;
+        let is_zero = |quantity: usize, c: usize| nodal[quantity * B + c].text() == "0";
+        // fluxes come first
+        let (diffuses, has_source) = (|c: usize| !is_zero(D, c), |c: usize| !is_zero(D + 1, c));
+        let by_gradients = |c: usize| terms.has_flux(c) || terms.has_source(c);
+        let is_plain = |c: usize| !by_gradients(c) && !terms.has_storage(c);
+        let limited: [bool; B] = std::array::from_fn(|c| match scheme {
+            None => !diffuses(c) && !terms.has_flux(c) && !terms.has_storage(c),
+            Some(scheme) => *scheme == Scheme::Limited,
+        });
+        let changed = |c: usize| diffuses(c) || has_source(c) || by_gradients(c);
+        let by_others = |c: usize| (0..D).any(|d| (0..B).any(|e| !limited[e] && nodal[d * B + c].depends_on(D + e)));
+        let keeps_range = |c: usize| {
+            let fluxes = || (0..D).map(|d| &nodal[d * B + c]);
+            let flows = fluxes().any(|flux| flux.text() != "0");
+            // of the unknown alone, so that no place draws it together; else where the flux ends it would pile up
+            let own = fluxes().all(|flux| (0..D + B).all(|v| v == D + c || !flux.depends_on(v)));
+            let ends = |end: &Open| match end {
+                Open::Value(_) | Open::Outflow => true,
+                Open::Closed => !flows,
+                Open::Flux(_) => false,
+            };
+            !has_source(c) && own && is_plain(c) && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
+        };
+        let opens = |&(d, end): &(usize, usize)| {
+            sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
+        };
+        Self {
+            limited: Limited {
+                unknowns: limited,
+                implicit: (0..B).any(|c| !limited[c] || changed(c)),
+                coupled: (0..B).any(|c| limited[c] && (changed(c) || by_others(c))),
+            },
+            shares: std::array::from_fn(|c| cartesian && diffuses(c) && !limited[c] && !terms.has_storage(c)),
+            keeps_range: std::array::from_fn(keeps_range),
+            reacts: std::array::from_fn(|c| has_source(c) && is_plain(c)),
+            open: (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(opens).collect(),
+        }
+    }
+}
