@@ -22,7 +22,7 @@ pub(super) fn need_by_bends(share: f64) -> f64 {
 }
 
 /// Rises from 0 to 1 between two values, with a slope that is 0 at both.
-fn between([low, high]: [f64; 2], value: f64) -> f64 {
+pub(super) fn between([low, high]: [f64; 2], value: f64) -> f64 {
     let s = ((value - low) / (high - low)).clamp(0.0, 1.0);
     s * s * (3.0 - 2.0 * s)
 }

@@ -1,4 +1,4 @@
-use super::need::{bends, need as need_of, need_by_bends};
+use super::need::{bends, between, need as need_of, need_by_bends};
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
 use crate::geometry::{Cells, Field, Lattice, Mesh, check_length, strides};
@@ -22,7 +22,7 @@ use std::borrow::Cow;
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
 /// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
 /// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. The largest ρ over the
-/// smallest is at most 10⁶.
+/// smallest is at most 10⁶, and 5·10³ around jumps.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
@@ -34,6 +34,10 @@ pub struct RootGradient {}
 const BETA: f64 = 4.0;
 /// The largest ρ over the smallest, before it is smoothed.
 const CONTRAST: f64 = 1e6;
+/// The same around a jump, which no mesh resolves: cells of about a thousandth of a uniform one.
+const CONTRAST_OF_JUMPS: f64 = 5e3;
+/// Shares of the range on an edge of the mesh from which it begins to be a jump, and is one.
+const JUMPS: [f64; 2] = [0.25, 0.5];
 /// Passes of the filter on 41 × 41 nodes.
 const PASSES: f64 = 8.0;
 /// So many layers on a line are smoothed as one is. Were two of them smoothed less, on periodic axes or where a front
@@ -73,35 +77,7 @@ impl RootGradient {
     {
         let lattice = mesh.lattice();
         let even = || Ok(vec![1.0; lattice.len()]);
-        let longest = lattice.cells().into_iter().max().unwrap_or(1) as f64;
-        let ends = unknowns
-            .iter()
-            .map(|u| u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]));
-        let ends: Vec<[f64; 2]> = ends.collect();
-        let sizes = ends.iter().map(|[low, high]| high.max(-low));
-        let largest = sizes.clone().fold(0.0, f64::max);
-        let (mut slopes, mut need) = (Vec::new(), 0.0);
-        for ((u, [low, high]), size) in unknowns.iter().zip(&ends).zip(sizes) {
-            let range = high - low;
-            if range <= OF_ROUNDING * largest {
-                continue;
-            }
-            // with room for one a node, too
-            let mut own = Vec::with_capacity(lattice.cells().map(|n| n + 1).iter().product());
-            own.extend(mesh.slopes(u, range).map(|(slope, _)| slope));
-            let steepest = own.iter().copied().fold(0.0, larger);
-            if steepest * range * longest <= ROUNDING * size {
-                continue;
-            }
-            need = f64::max(need, need_of(steepest));
-            if need < 1.0 {
-                need = need.max(need_by_bends(bends(mesh, u) / range));
-            }
-            match slopes.is_empty() {
-                true => slopes = own,
-                false => slopes.iter_mut().zip(own).for_each(|(slope, own)| *slope = larger(*slope, own)),
-            }
-        }
+        let Followed { slopes, need, step } = Followed::of(mesh, unknowns);
         if slopes.is_empty() {
             return even();
         }
@@ -114,7 +90,8 @@ impl RootGradient {
             return even();
         }
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
-        let mean = mean.max(BETA * (steepest.sqrt() - background) / CONTRAST);
+        let contrast = CONTRAST * (CONTRAST_OF_JUMPS / CONTRAST).powf(between(JUMPS, step));
+        let mean = mean.max(BETA * (steepest.sqrt() - background) / contrast);
         roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
         let mut rho = roots;
         let (cells, layers) = (lattice.cells(), layers(lattice, &rho));
@@ -133,6 +110,69 @@ impl RootGradient {
             }
         }
     }
+}
+
+/// What the mesh follows.
+struct Followed {
+    /// The largest |∇u| in each cell; empty where all unknowns are constant.
+    slopes: Vec<f64>,
+    /// The largest need.
+    need: f64,
+    /// The largest change over an edge of the mesh, as a share of the range.
+    step: f64,
+}
+
+impl Followed {
+    fn of<const D: usize>(mesh: &Mesh<D>, unknowns: &[Cow<[f64]>]) -> Self
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let lattice = mesh.lattice();
+        let longest = lattice.cells().into_iter().max().unwrap_or(1) as f64;
+        let ends = unknowns
+            .iter()
+            .map(|u| u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]));
+        let ends: Vec<[f64; 2]> = ends.collect();
+        let sizes = ends.iter().map(|[low, high]| high.max(-low));
+        let largest = sizes.clone().fold(0.0, f64::max);
+        let (mut slopes, mut need, mut step) = (Vec::new(), 0.0, 0.0);
+        for ((u, [low, high]), size) in unknowns.iter().zip(&ends).zip(sizes) {
+            let range = high - low;
+            if range <= OF_ROUNDING * largest {
+                continue;
+            }
+            // with room for one a node, too
+            let mut own = Vec::with_capacity(lattice.cells().map(|n| n + 1).iter().product());
+            own.extend(mesh.slopes(u, range).map(|(slope, _)| slope));
+            let steepest = own.iter().copied().fold(0.0, larger);
+            if steepest * range * longest <= ROUNDING * size {
+                continue;
+            }
+            step = larger(step, largest_step(lattice, u) / range);
+            need = f64::max(need, need_of(steepest));
+            if need < 1.0 {
+                need = need.max(need_by_bends(bends(mesh, u) / range));
+            }
+            match slopes.is_empty() {
+                true => slopes = own,
+                false => slopes.iter_mut().zip(own).for_each(|(slope, own)| *slope = larger(*slope, own)),
+            }
+        }
+        Self { slopes, need, step }
+    }
+}
+
+/// The largest difference between neighbouring nodes.
+fn largest_step<const D: usize>(lattice: &Lattice<D>, u: &[f64]) -> f64 {
+    let (nodes, wraps, steps) = (lattice.nodes(), lattice.periodic(), lattice.strides());
+    (0..D).fold(0.0, |most, axis| {
+        let (n, s) = (nodes[axis], steps[axis]);
+        u.chunks_exact(n * s).fold(most, |most, block| {
+            let inner = block.iter().zip(&block[s..]).fold(most, |most, (a, b)| larger(most, b - a));
+            let over = block[..s].iter().zip(&block[(n - 1) * s..]).map(|(a, b)| b - a);
+            if wraps[axis] { over.fold(inner, larger) } else { inner }
+        })
+    })
 }
 
 /// √|∇u| of the cells of a mesh.

@@ -1,6 +1,9 @@
 //! What stands on both sides of a face, and how fast it is carried through.
 
-use super::Block;
+use super::transport::{Stage, Transport};
+use super::{Block, Law};
+use crate::geometry::{Cells, Mesh};
+use crate::parallel;
 
 /// How far the values at the faces below and above a node differ from its own, along one axis: by the differences to
 /// the nodes below and above, and the distances to these
@@ -9,21 +12,113 @@ use super::Block;
 /// Δ₊ = min(½ h₊ |2 g₊ + g₋| / 3, |d₋|, |d₊|),   g = d/h
 /// ```
 ///
-/// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ. A smooth profile has two thirds of
+/// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ, but for [smooth](is_smooth) extrema,
+/// which have Δ₊ without bounds. A smooth profile has two thirds of
 /// the slope on its own side and one third of the other, which is of the third order on equal cells; the bounds keep
 /// what stands at a face between the nodes.
 ///
 /// # Source
 /// Koren, *A robust upwind discretization method for advection, diffusion and source terms* (1993).
 #[inline(always)]
-pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2]) -> [f64; 2] {
-    if below * above <= 0.0 {
-        return [0.0; 2];
+pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2], smooth: bool) -> [f64; 2] {
+    let [g, k] = [below / h_below, above / h_above];
+    let towards = |h: f64, own: f64, other: f64| h * (2.0 * own + other) / 6.0;
+    let free = [towards(h_below, g, k), towards(h_above, k, g)];
+    if below * above > 0.0 {
+        let most = below.abs().min(above.abs());
+        return free.map(|step| step.abs().min(most).copysign(above));
     }
-    let most = below.abs().min(above.abs());
-    let [g, k] = [below.abs() / h_below, above.abs() / h_above];
-    let towards = |h: f64, own: f64, other: f64| (h * (2.0 * own + other) / 6.0).min(most).copysign(above);
-    [towards(h_below, g, k), towards(h_above, k, g)]
+    if smooth { free } else { [0.0; 2] }
+}
+
+/// Whether second derivatives at three nodes in a row are those of a smooth extremum: of one sign, and the smallest at
+/// least half of the largest. Where a limiter would cut off its peak, it is left as it is.
+#[inline(always)]
+pub(super) fn is_smooth(seconds: [f64; 3]) -> bool {
+    let [least, most] = seconds.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, m], s| [l.min(*s), m.max(*s)]);
+    least > 0.0 && 2.0 * least >= most || most < 0.0 && 2.0 * most <= least
+}
+
+impl<const B: usize, const D: usize, L: Law<B, D>> Transport<'_, B, D, L>
+where
+    Mesh<D>: Cells<D>,
+{
+    /// By how much values at the faces below and above each node differ from its own along each axis.
+    pub(super) fn increments(&self, stage: &Stage<B, D>, u: &[[f64; B]]) -> Vec<[[[f64; B]; 2]; D]> {
+        let patch = *stage.cells.patch();
+        let (strides, limited) = (patch.padded_strides(), self.limited.unknowns);
+        let seconds = self.seconds(stage, u);
+        let mut steps = vec![[[[0.0; B]; 2]; D]; u.len()];
+        let row = patch.pencil_len() + 2;
+        parallel::for_each_row(&mut steps, row, |q, steps| {
+            if patch.pencil_in_row(q).is_none() {
+                return;
+            }
+            for (k, steps) in (q * row..).zip(steps).skip(1).take(row - 2) {
+                for (d, s) in strides.into_iter().enumerate() {
+                    let h = [stage.distance(k - s, k), stage.distance(k, k + s)];
+                    for c in (0..B).filter(|&c| limited[c]) {
+                        let differences = [u[k][c] - u[k - s][c], u[k + s][c] - u[k][c]];
+                        let smooth = is_smooth([k - s, k, k + s].map(|k| seconds[k][d][c]));
+                        let [below, above] = increments(differences, h, smooth);
+                        (steps[d][0][c], steps[d][1][c]) = (below, above);
+                    }
+                }
+            }
+        });
+        self.go_on_beyond(stage, u, &mut steps);
+        patch.wrap(&mut steps);
+        steps
+    }
+
+    /// Second derivatives of limited unknowns along the lattice lines.
+    fn seconds(&self, stage: &Stage<B, D>, u: &[[f64; B]]) -> Vec<[[f64; B]; D]> {
+        let patch = *stage.cells.patch();
+        let (strides, limited) = (patch.padded_strides(), self.limited.unknowns);
+        let mut seconds = vec![[[0.0; B]; D]; u.len()];
+        let row = patch.pencil_len() + 2;
+        parallel::for_each_row(&mut seconds, row, |q, seconds| {
+            if patch.pencil_in_row(q).is_none() {
+                return;
+            }
+            for (k, seconds) in (q * row..).zip(seconds).skip(1).take(row - 2) {
+                for (d, s) in strides.into_iter().enumerate() {
+                    let [below, above] = [stage.distance(k - s, k), stage.distance(k, k + s)];
+                    // beyond a bounded side there is nothing
+                    if below == 0.0 || above == 0.0 {
+                        continue;
+                    }
+                    for c in (0..B).filter(|&c| limited[c]) {
+                        let slopes = [(u[k][c] - u[k - s][c]) / below, (u[k + s][c] - u[k][c]) / above];
+                        seconds[d][c] = 2.0 * (slopes[1] - slopes[0]) / (below + above);
+                    }
+                }
+            }
+        });
+        patch.wrap(&mut seconds);
+        seconds
+    }
+
+    /// Where a value is given the profile goes on beyond the side as before it.
+    fn go_on_beyond(&self, stage: &Stage<B, D>, u: &[[f64; B]], steps: &mut [[[[f64; B]; 2]; D]]) {
+        let (lattice, strides) = (stage.mesh.lattice(), stage.cells.patch().padded_strides());
+        for side in &stage.sides {
+            for (d, ends) in lattice.beyond(side.i).into_iter().enumerate() {
+                let inner = match ends {
+                    [true, false] => side.k + strides[d],
+                    [false, true] => side.k - strides[d],
+                    _ => continue,
+                };
+                for c in (0..B).filter(|&c| self.limited.unknowns[c] && side.given[c].is_some()) {
+                    let half = 0.5 * (u[inner][c] - u[side.k][c]);
+                    steps[side.k][d] = steps[side.k][d].map(|mut step| {
+                        step[c] = if ends[0] { half } else { -half };
+                        step
+                    });
+                }
+            }
+        }
+    }
 }
 
 /// A bound for the largest absolute eigenvalue of the rows and columns of `matrix` that are `taken`: of J,
@@ -62,13 +157,24 @@ mod tests {
     #[test]
     fn linear_profiles_are_kept() {
         for [h, k] in [[1.0, 1.0], [0.3, 0.5], [2.0, 1.2]] {
-            let [below, above] = increments([3.0 * h, 3.0 * k], [h, k]);
+            let [below, above] = increments([3.0 * h, 3.0 * k], [h, k], false);
             assert!((below - 1.5 * h).abs() < 1e-14 && (above - 1.5 * k).abs() < 1e-14);
         }
-        assert_eq!(increments([1.0, -1.0], [1.0, 1.0]), [0.0; 2]);
-        assert_eq!(increments([0.0, 1.0], [1.0, 1.0]), [0.0; 2]);
+        assert_eq!(increments([1.0, -1.0], [1.0, 1.0], false), [0.0; 2]);
+        assert_eq!(increments([0.0, 1.0], [1.0, 1.0], false), [0.0; 2]);
         // beside a jump by a hundred
-        assert_eq!(increments([-1.0, -100.0], [1.0, 1.0]), [-1.0, -1.0]);
+        assert_eq!(increments([-1.0, -100.0], [1.0, 1.0], false), [-1.0, -1.0]);
+    }
+
+    /// A parabola has a smooth peak, a hat, a step and a plateau have none.
+    #[test]
+    fn smooth_peaks_are_told_from_others() {
+        assert!(is_smooth([-2.0, -2.0, -2.0]) && is_smooth([1.0, 1.9, 1.5]));
+        for sharp in [[0.0, -2.0, 0.0], [1.0, -1.0, 0.0], [0.0; 3], [-1.0, -3.0, -1.0]] {
+            assert!(!is_smooth(sharp), "{sharp:?}");
+        }
+        let [below, above] = increments([1.0, -1.0], [1.0, 1.0], true);
+        assert_eq!((below, above), (1.0 / 6.0, -1.0 / 6.0));
     }
 
     /// Eigenvalues of matrices that are known: the Euler equations' u − c, u, u + c; a rotation; nothing.

@@ -1,11 +1,10 @@
 //! Explicit steps that carry unknowns with limited fluxes.
 
-use super::reconstruction::{increments, spectral_radius};
+use super::reconstruction::spectral_radius;
 use super::{Around, Block, Half, Law, Limited, Side, inside, sides};
 use crate::error::Failure;
-use crate::geometry::{Cells, DualCells, Mesh, diagonal, dot, length, padded};
+use crate::geometry::{Cells, DualCells, Mesh, diagonal, length, padded};
 use crate::numerics::larger;
-use crate::parallel;
 use crate::physics::Motion;
 
 /// What is carried into and out of dual cells in a step, by fluxes and by the motion of the mesh, without new extrema
@@ -26,7 +25,7 @@ use crate::physics::Motion;
 /// stability-preserving high-order time discretization methods* (2001), for the method of Heun.
 pub(super) struct Transport<'a, const B: usize, const D: usize, L> {
     law: &'a L,
-    limited: Limited<B>,
+    pub(super) limited: Limited<B>,
     motion: Motion<'a, D>,
     /// All unknowns at both ends of the step, padded; of limited ones the end is not used.
     ends: [&'a [[f64; B]]; 2],
@@ -35,13 +34,21 @@ pub(super) struct Transport<'a, const B: usize, const D: usize, L> {
 }
 
 /// The mesh at a share of the step.
-struct Stage<const B: usize, const D: usize> {
+pub(super) struct Stage<const B: usize, const D: usize> {
     share: f64,
     t: f64,
-    mesh: Mesh<D>,
-    cells: DualCells<D>,
+    pub mesh: Mesh<D>,
+    pub cells: DualCells<D>,
     x: Vec<[f64; D]>,
-    sides: Vec<Side<B>>,
+    pub sides: Vec<Side<B>>,
+}
+
+impl<const B: usize, const D: usize> Stage<B, D> {
+    /// Between two nodes.
+    pub fn distance(&self, i: usize, k: usize) -> f64 {
+        let way: [f64; D] = std::array::from_fn(|d| self.x[k][d] - self.x[i][d]);
+        length(way)
+    }
 }
 
 /// What passes through faces, each stored with the node below it, and half of the sum of a around each node as a share
@@ -284,52 +291,6 @@ where
             carried - 0.5 * speed * (right[c] - left[c])
         });
         (flux, largest)
-    }
-
-    /// By how much values at the faces below and above each node differ from its own along each axis.
-    fn increments(&self, stage: &Stage<B, D>, u: &[[f64; B]]) -> Vec<[[[f64; B]; 2]; D]> {
-        let patch = *stage.cells.patch();
-        let strides = patch.padded_strides();
-        let mut steps = vec![[[[0.0; B]; 2]; D]; u.len()];
-        let distance = |i: usize, k: usize| -> f64 {
-            let way: [f64; D] = std::array::from_fn(|d| stage.x[k][d] - stage.x[i][d]);
-            dot(way, way).sqrt()
-        };
-        let row = patch.pencil_len() + 2;
-        parallel::for_each_row(&mut steps, row, |q, steps| {
-            if patch.pencil_in_row(q).is_none() {
-                return;
-            }
-            for (k, steps) in (q * row..).zip(steps).skip(1).take(row - 2) {
-                for (d, s) in strides.into_iter().enumerate() {
-                    let h = [distance(k - s, k), distance(k, k + s)];
-                    for c in (0..B).filter(|&c| self.limited.unknowns[c]) {
-                        let differences = [u[k][c] - u[k - s][c], u[k + s][c] - u[k][c]];
-                        let [below, above] = increments(differences, h);
-                        (steps[d][0][c], steps[d][1][c]) = (below, above);
-                    }
-                }
-            }
-        });
-        // where a value is given the profile goes on beyond the side as before it
-        let lattice = stage.mesh.lattice();
-        for side in &stage.sides {
-            for (d, ends) in lattice.beyond(side.i).into_iter().enumerate() {
-                let inner = match ends {
-                    [true, false] => side.k + strides[d],
-                    [false, true] => side.k - strides[d],
-                    _ => continue,
-                };
-                for c in (0..B).filter(|&c| self.limited.unknowns[c] && side.given[c].is_some()) {
-                    let half = 0.5 * (u[inner][c] - u[side.k][c]);
-                    let half = if ends[0] { half } else { -half };
-                    steps[side.k][d][0][c] = half;
-                    steps[side.k][d][1][c] = half;
-                }
-            }
-        }
-        patch.wrap(&mut steps);
-        steps
     }
 
     /// What leaves through open sides.
