@@ -148,7 +148,7 @@ fn a_smooth_wave_is_second_order() {
             kind = "given"
             of = "1 + 0.5*sin(2*pi*x)*cos(2*pi*(y - t))"
             [mesh]
-            relaxation = {{ time = 0.05 }}
+            relaxation = 0.05
             "#,
             0.4 / cells as f64
         ));

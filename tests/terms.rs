@@ -33,7 +33,7 @@ fn order(pde: &str) -> f64 {
             kind = "given"
             of = "1 + 0.5*sin(2*pi*x)*cos(pi*(y - t))"
             [mesh]
-            relaxation = {{ time = 0.05 }}
+            relaxation = 0.05
             [pde]
             kind = "formula"
             {pde}

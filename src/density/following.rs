@@ -12,7 +12,7 @@ pub(super) struct Following<const D: usize> {
 }
 
 /// x, y, t and as many unknowns as any equation has.
-const PLACES: usize = 7;
+const PLACES: usize = 12;
 
 impl<const D: usize> Following<D> {
     pub fn new(monitor: Box<dyn Monitor<D>>, of: &str, unknowns: &[String]) -> Result<Self> {

@@ -97,7 +97,7 @@ impl MonitorKind {
         }
     }
 
-    /// The unknown, or the formula of them, that the mesh follows, where it is not the first.
+    /// The unknown, or the formula of them, that the mesh follows, where that is said.
     pub fn of(&self) -> Option<&str> {
         match self {
             Self::RootGradientTable(root) => root.of.as_deref(),
@@ -114,7 +114,10 @@ impl MonitorKind {
     where
         Mesh<D>: Cells<D>,
     {
-        let of = self.of().filter(|of| Some(*of) != unknowns.first().map(String::as_str)).map(String::from);
+        // the first unknown is what all but the default follow without a word
+        let of_all = matches!(self, Self::RootGradientTable(_)) && unknowns.len() > 1;
+        let is_first = |of: &str| Some(of) == unknowns.first().map(String::as_str);
+        let of = self.of().filter(|of| of_all || !is_first(of)).map(String::from);
         let monitor: Box<dyn Monitor<D>> = match self {
             Self::RootGradientTable(_) => Box::new(RootGradient::default()),
             Self::ArclengthTable(arclength) => Box::new(arclength.density()),

@@ -65,9 +65,15 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn shares_mass(&self) -> [bool; B] {
         [true; B]
     }
-    /// Between which values each unknown stays at each node at time t, in a step that starts with the padded `u`; empty
-    /// where no unknown has bounds.
-    fn bounds(&self, _t: f64, _mesh: &Mesh<D>, _u: &[[f64; B]]) -> Result<Vec<[[f64; 2]; B]>, Failure> {
+    /// Between which values each unknown stays at each node at time t, in a step that starts with the padded `u` and
+    /// ends with these values on `sides`; `x` are the places of padded vectors. Empty where no unknown has bounds.
+    fn bounds(
+        &self,
+        _at: (f64, &[[f64; D]]),
+        _mesh: &Mesh<D>,
+        _u: &[[f64; B]],
+        _sides: &[Side<B>],
+    ) -> Result<Vec<[[f64; 2]; B]>, Failure> {
         Ok(Vec::new())
     }
     /// Whether there are fluxes by gradients of unknowns.
@@ -235,10 +241,10 @@ impl<const B: usize> Face<B> {
 }
 
 /// A node on a bounded side: its index, its place in padded vectors, and the values given there.
-struct Side<const B: usize> {
+pub(super) struct Side<const B: usize> {
     i: usize,
     k: usize,
-    given: [Option<f64>; B],
+    pub given: [Option<f64>; B],
 }
 
 /// One of the two meshes of a time step, with its half of the fluxes.

@@ -4,7 +4,9 @@ mod kinds;
 mod stepped;
 
 use super::bounds::Bounds;
-use super::finite_volumes::{Block, Crossing, FiniteVolumes, Law, Limited, Point, Sloped, Steep, Stepper, Stored};
+use super::finite_volumes::{
+    Block, Crossing, FiniteVolumes, Law, Limited, Point, Side, Sloped, Steep, Stepper, Stored,
+};
 use super::formula_pde::Formulas;
 use super::prescribed::evaluate;
 use super::sides::Open;
@@ -167,6 +169,20 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
     }
 }
 
+impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> FormulaLaw<D, B, P, K, Solver>
+where
+    Solver: Default + Sync,
+{
+    /// Whether unknown c stays at a value: it has no source there at any place, and one flux everywhere.
+    fn is_kept(&self, t: f64, x: &[[f64; D]], u: &[[f64; B]], (c, state): (usize, f64)) -> bool {
+        let there: Vec<[f64; B]> =
+            (u.iter()).map(|u| std::array::from_fn(|e| if e == c { state } else { u[e] })).collect();
+        let nodes = self.nodes(t, x, &there);
+        let flux = |node: &[f64; K]| -> [f64; D] { std::array::from_fn(|d| Self::value(node, d, c)) };
+        nodes.iter().all(|node| Self::value(node, Self::SOURCE, c) == 0.0 && flux(node) == flux(&nodes[0]))
+    }
+}
+
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> Law<B, D>
     for FormulaLaw<D, B, P, K, Solver>
 where
@@ -275,8 +291,26 @@ where
         self.shares
     }
 
-    fn bounds(&self, t: f64, mesh: &Mesh<D>, u: &[[f64; B]]) -> Result<Vec<[[f64; 2]; B]>, Failure> {
-        self.bounds.at(t, mesh, u)
+    fn bounds(
+        &self,
+        (t, x): (f64, &[[f64; D]]),
+        mesh: &Mesh<D>,
+        u: &[[f64; B]],
+        sides: &[Side<B>],
+    ) -> Result<Vec<[[f64; 2]; B]>, Failure> {
+        let mut own = [[f64::NEG_INFINITY, f64::INFINITY]; B];
+        for c in 0..B {
+            let given = sides.iter().filter_map(|side| side.given[c]);
+            let values = u.iter().map(|u| u[c]).chain(given);
+            let [least, most] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)]);
+            for &state in &self.bounds.states[c] {
+                if (state <= least || state >= most) && self.is_kept(t, x, u, (c, state)) {
+                    let end = usize::from(state >= most);
+                    own[c][end] = state;
+                }
+            }
+        }
+        self.bounds.at(t, mesh, own)
     }
 
     fn limited(&self) -> Limited<B> {

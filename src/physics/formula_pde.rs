@@ -88,7 +88,7 @@ pub struct FormulaPde<const D: usize = 2> {
     pub boundary: BTreeMap<String, Conditions>,
     /// The lower and the upper bound of an unknown, formulas of x, y and t, or ±∞ for none: an obstacle, or what is
     /// known of a solution. Where an unknown lies on its bound, its equation holds but for what it takes not to leave
-    /// it. Without bounds, an unknown with a source keeps to −1, 0 and 1 where its equation does.
+    /// it. Without bounds, an unknown with a source keeps to −1, 0 and 1 where its equation does and pushes away.
     #[serde(default, skip_serializing_if = "no_flux")]
     pub bounds: Fluxes<2>,
     /// `"central"` fluxes, of the second order and without limits; or `"limited"` ones, of the second order where the

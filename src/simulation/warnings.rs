@@ -13,6 +13,8 @@ const RESTLESS: &str = "the mesh hardly follows its density any more";
 const NOISY: &str = "interface values are noisy";
 /// How far beyond its data an unknown may be, as a share of their range, before that is said.
 const BEYOND: f64 = 0.05;
+/// What is smaller beside the size of an unknown is of rounding and of Newton's method.
+const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
@@ -72,7 +74,8 @@ where
             let [low, high] = record.data[c];
             let off = |u: f64| (low - u).max(u - high);
             let worst = state.u.component(c).enumerate().max_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-            let Some((k, u)) = worst.filter(|(_, u)| off(*u) > BEYOND * (high - low)) else { continue };
+            let rounding = OF_ROUNDING * f64::max(low.abs(), high.abs());
+            let Some((k, u)) = worst.filter(|(_, u)| off(*u) > rounding + BEYOND * (high - low)) else { continue };
             let said = format!("`{name}` {LEAVES}");
             if !record.warnings.iter().any(|warning| warning.starts_with(&said)) {
                 record.warnings.push(format!(

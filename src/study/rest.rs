@@ -47,7 +47,7 @@ where
         spread
             if spread < FLAT
                 && matches!(study.monitor(), MonitorKind::RootGradientTable(_))
-                && varies(simulation, state)? =>
+                && varies(study, simulation, state)? =>
         {
             return Ok(None);
         }
@@ -66,14 +66,19 @@ fn spread(values: &[f64]) -> f64 {
     ends.1 / ends.0
 }
 
-/// True where what the mesh follows is not constant.
-fn varies<const D: usize>(simulation: &Simulation<D>, state: &State<D>) -> Result<bool>
+/// True where what the mesh follows is not constant: of all unknowns where the density is made of all.
+fn varies<const D: usize>(study: &MovingStudy<D>, simulation: &Simulation<D>, state: &State<D>) -> Result<bool>
 where
     Mesh<D>: Studied<D>,
 {
+    let varies = |values: &mut dyn Iterator<Item = f64>| {
+        let ends = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        ends.1 - ends.0 > 1e-12 * ends.0.abs().max(ends.1.abs())
+    };
     let followed = simulation.monitor.followed(state.t, &state.mesh, &state.u)?;
-    let ends = followed.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-    Ok(ends.1 - ends.0 > 1e-12 * ends.0.abs().max(ends.1.abs()))
+    let of_all = matches!(study.monitor(), MonitorKind::RootGradientTable(_)) && study.monitor().of().is_none();
+    let others = if of_all { 1..state.u.components() } else { 0..0 };
+    Ok(varies(&mut followed.into_iter()) || others.into_iter().any(|c| varies(&mut state.u.component(c))))
 }
 
 fn held_back<const D: usize>(study: &MovingStudy<D>, record: &Record) -> String
@@ -128,8 +133,12 @@ where
     if none {
         return Ok("its density is constant: `monitor.strength` is 0".into());
     }
-    if !varies(simulation, state)? {
-        let followed = study.monitor().of().unwrap_or("the first unknown").to_string();
+    if !varies(study, simulation, state)? {
+        let by_default = match study.monitor() {
+            MonitorKind::RootGradientTable(_) => "all unknowns",
+            _ => "the first unknown",
+        };
+        let followed = study.monitor().of().unwrap_or(by_default).to_string();
         return Ok(format!(
             "its density is constant, since what it follows is: {followed}; name another in `monitor.of`"
         ));

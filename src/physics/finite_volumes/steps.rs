@@ -289,7 +289,8 @@ fn bounds<const B: usize, const D: usize, const S: usize, L: Law<B, D>>(
     sides: &[Side<B>],
     start: &[[f64; B]],
 ) -> Result<Vec<[[f64; 2]; B]>, Failure> {
-    let mut bounds = law.bounds(level.t, level.mesh, start)?;
+    let at = (level.t, &*inside(level.mesh, &level.x));
+    let mut bounds = law.bounds(at, level.mesh, start, sides)?;
     if !bounds.is_empty() {
         for side in sides {
             for c in (0..B).filter(|&c| side.given[c].is_some()) {

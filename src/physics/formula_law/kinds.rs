@@ -11,7 +11,7 @@ pub(super) struct Kinds<const B: usize> {
     pub shares: [bool; B],
     /// Those that are only carried and diffused.
     pub keeps_range: [bool; B],
-    /// Those that have a source, and no term that takes gradients.
+    /// Those that have a source, no term that takes gradients, and no flux that is given on a side.
     pub reacts: [bool; B],
     /// The sides through which something flows that is not given there.
     pub open: Vec<(usize, usize)>,
@@ -43,6 +43,7 @@ impl<const B: usize> Kinds<B> {
             };
             !has_source(c) && own && is_plain(c) && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
         };
+        let is_fed = |c: usize| sides[c].as_flattened().iter().any(|end| matches!(end, Open::Flux(_)));
         let opens = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
         };
@@ -54,7 +55,7 @@ impl<const B: usize> Kinds<B> {
             },
             shares: std::array::from_fn(|c| cartesian && diffuses(c) && !limited[c] && !terms.has_storage(c)),
             keeps_range: std::array::from_fn(keeps_range),
-            reacts: std::array::from_fn(|c| has_source(c) && is_plain(c)),
+            reacts: std::array::from_fn(|c| has_source(c) && is_plain(c) && !is_fed(c)),
             open: (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(opens).collect(),
         }
     }
