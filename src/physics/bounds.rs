@@ -37,7 +37,7 @@ impl<const D: usize, const B: usize> Bounds<D, B> {
             given: std::array::from_fn(|c| [0, 1].map(|end| compiled(c, end))),
             states: std::array::from_fn(|c| match reactions[c] {
                 None => Vec::new(),
-                Some(source) => STATES.into_iter().filter(|state| keeps::<D>(c, *state, &flows[c], source)).collect(),
+                Some(source) => states::<D>(c, &flows[c], source),
             }),
         }
     }
