@@ -9,7 +9,7 @@ use crate::parallel;
 /// the nodes below and above, and the distances to these
 ///
 /// ```text
-/// Δ₊ = min(½ h₊ |2 g₊ + g₋| / 3, |d₋|, |d₊|),   g = d/h
+/// Δ₊ = min(½ h₊ |2 g₊ + g₋| / 3, 2 |d₋|, |d₊|),   g = d/h
 /// ```
 ///
 /// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ, but for [smooth](is_smooth) extrema,
@@ -25,8 +25,8 @@ pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2],
     let towards = |h: f64, own: f64, other: f64| h * (2.0 * own + other) / 6.0;
     let free = [towards(h_below, g, k), towards(h_above, k, g)];
     if below * above > 0.0 {
-        let most = below.abs().min(above.abs());
-        return free.map(|step| step.abs().min(most).copysign(above));
+        let within = |step: f64, own: f64, other: f64| step.abs().min(own.abs()).min(2.0 * other.abs()).copysign(own);
+        return [within(free[0], below, above), within(free[1], above, below)];
     }
     if smooth { free } else { [0.0; 2] }
 }
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(increments([1.0, -1.0], [1.0, 1.0], false), [0.0; 2]);
         assert_eq!(increments([0.0, 1.0], [1.0, 1.0], false), [0.0; 2]);
         // beside a jump by a hundred
-        assert_eq!(increments([-1.0, -100.0], [1.0, 1.0], false), [-1.0, -1.0]);
+        assert_eq!(increments([-1.0, -100.0], [1.0, 1.0], false), [-1.0, -2.0]);
     }
 
     /// A parabola has a smooth peak, a hat, a step and a plateau have none.

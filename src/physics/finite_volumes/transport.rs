@@ -60,8 +60,9 @@ struct Passing<const B: usize, const D: usize> {
     fastest: f64,
 }
 
-/// Where the courant number is larger, an explicit step is divided.
-const LARGEST_COURANT: f64 = 0.4;
+/// Where the courant number is larger, an explicit step is divided: what leaves a cell brings in at most twice the
+/// difference to the node behind, so that a third of the cell may leave in a step.
+const LARGEST_COURANT: f64 = 0.3;
 /// Explicit steps that may be left in a step.
 const MOST_SUBSTEPS: f64 = 2e4;
 
@@ -99,7 +100,7 @@ where
                 let part = to - stage.share;
                 next = part * LARGEST_COURANT / courant.max(f64::MIN_POSITIVE);
                 // with some room, since the fluxes of the first half decide
-                if courant > 1.25 * LARGEST_COURANT {
+                if courant > 1.1 * LARGEST_COURANT {
                     continue;
                 }
                 (stage, u, count) = (later, values, count + 1);
@@ -156,7 +157,7 @@ where
         let areas: Vec<f64> = from.cells.areas().iter().zip(to.cells.areas()).map(|(a, b)| a.min(*b)).collect();
         let first = self.passing(from, &way, u, &areas)?;
         let there = self.updated::<S>([from, to], u, &[&first.faces]);
-        if first.courant > 1.25 * LARGEST_COURANT {
+        if first.courant > 1.1 * LARGEST_COURANT {
             return Ok((there, first.courant));
         }
         let second = self.passing(to, &way, &there, &areas)?;
