@@ -162,6 +162,42 @@ fn an_elliptic_unknown_is_second_order() {
     assert!(off < 1e-3, "{off}");
 }
 
+/// A diffusivity that jumps from 1 to 100 in a cell or at a node: −(D u')' = 1 at rest has u = x (c − x/2) up to the jump
+/// at a, and u = (1 − x)(x + 1 − 2c)/200 from there; c follows from the jump. Order 2 either way.
+#[test]
+fn a_jump_of_the_diffusivity_is_second_order() {
+    for (a, cells) in [(0.5, [20, 40]), (0.4137, [20, 40])] {
+        // (1 − a)(a + 1 − 2c)/200 = a (c − a/2)
+        let c = ((1.0 - a * a) / 200.0 + 0.5 * a * a) / (a + (1.0 - a) / 100.0);
+        let exact = |x: f64| if x < a { x * (c - 0.5 * x) } else { (1.0 - x) * (x + 1.0 - 2.0 * c) / 200.0 };
+        let errors = cells.map(|cells| {
+            let run = line(&format!(
+                r#"
+                [grid]
+                cells = [{cells}]
+                [time]
+                start = 0.0
+                end = 5.0
+                [pde]
+                kind = "formula"
+                unknowns = ["u"]
+                diffusivity = {{ u = "if(x < {a}, 1, 100)" }}
+                source = {{ u = "1" }}
+                initial = {{ u = "0" }}
+                boundary = {{ u = 0 }}
+                [mesh]
+                generator = {{ kind = "fixed" }}
+                "#
+            ));
+            let state = run.state.unwrap();
+            let off = state.mesh.x().iter().zip(state.u.component(0)).map(|([x], u)| (u - exact(*x)).abs());
+            off.fold(0.0, f64::max)
+        });
+        println!("{a}: {errors:?}");
+        assert!(errors[1] < 1e-3 && errors[1] < 0.5 * errors[0].max(1e-6), "{a}: {errors:?}");
+    }
+}
+
 /// What cannot be is told by its key.
 #[test]
 fn terms_that_make_no_sense_are_refused() {

@@ -38,6 +38,14 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn convection(&self, below: &Self::Node, above: &Self::Node, normal: [f64; D]) -> Crossing<B>;
     /// D at a face.
     fn diffusivity(&self, below: &Self::Node, above: &Self::Node) -> Crossing<B>;
+    /// Whether D of some unknown is a function of place alone, which may be thinner than cells, or jump.
+    fn has_layers(&self) -> bool {
+        false
+    }
+    /// The mean resistances' inverse, 1/⟨1/D⟩ along the edges between some pairs of places, of such unknowns.
+    fn through_layers(&self, _t: f64, _mesh: &Mesh<D>, _edges: &[[[f64; D]; 2]]) -> Vec<[Option<f64>; B]> {
+        Vec::new()
+    }
     /// S at a node and its derivative; none for an equation without a source.
     fn source(&self, _node: &Self::Node) -> Option<([f64; B], Block<B>)> {
         None
@@ -278,10 +286,12 @@ impl<N, const B: usize, const D: usize> View<N, B, D> {
     }
 }
 
-/// What the faces are made of: nodes, fluxes by gradients for each axis, and what is stored. The last two may be empty.
+/// What the faces are made of: nodes, fluxes by gradients and diffusivities of place for each axis, and what is stored.
+/// The last three may be empty.
 struct Made<'a, N, const B: usize, const D: usize> {
     nodes: &'a [N],
     steep: &'a [Vec<Steep<B, D>>; D],
+    layers: &'a [Vec<[Option<f64>; B]>; D],
     stored: &'a [Stored<B>],
 }
 

@@ -1,6 +1,7 @@
 //! A user's equation as a conservation law.
 
 mod kinds;
+mod layers;
 mod stepped;
 
 use super::bounds::Bounds;
@@ -16,6 +17,7 @@ use crate::formula::Program;
 use crate::geometry::{Cells, DualCells, Mesh, dot, length, strides};
 use crate::parallel;
 use kinds::Kinds;
+use layers::Layers;
 
 /// B unknowns in D dimensions. P = D + B is the number of values that the formulas take at a node, K = (D + 2) B (B +
 /// 1) that of the values they give.
@@ -35,6 +37,7 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     limited: Limited<B>,
     bounds: Bounds<D, B>,
     terms: Terms<D, B>,
+    layers: Layers<P, B>,
     /// The unknowns that are only carried and diffused.
     keeps_range: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
@@ -60,6 +63,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
             names: std::array::from_fn(|c| names[c].clone()),
             shares,
             terms: Terms::new(&terms, &names),
+            layers: Layers::new(std::array::from_fn(|c| &nodal[Self::DIFFUSIVITY * B + c])),
             limited,
             bounds: Bounds::new(
                 &names,
@@ -315,6 +319,14 @@ where
 
     fn limited(&self) -> Limited<B> {
         self.limited
+    }
+
+    fn has_layers(&self) -> bool {
+        self.layers.are_some()
+    }
+
+    fn through_layers(&self, t: f64, mesh: &Mesh<D>, edges: &[[[f64; D]; 2]]) -> Vec<[Option<f64>; B]> {
+        self.layers.through(t, mesh, edges)
     }
 
     fn has_steep(&self) -> bool {

@@ -33,7 +33,8 @@ impl<const D: usize> Half<'_, D> {
                 law.sloped((self.t, &points), self.mesh)?
             }
         };
-        let made = Made { nodes: &nodes, steep: &steep, stored: &stored };
+        let layers = self.layers(law);
+        let made = Made { nodes: &nodes, steep: &steep, layers: &layers, stored: &stored };
         let faces = Around::<D, S>::faces(self, law, &made, u);
         Ok(View { nodes, faces, sloped, stored })
     }
@@ -75,6 +76,20 @@ impl<const D: usize> Half<'_, D> {
             *steep = law.steep((self.t, &points), self.mesh)?;
         }
         Ok(all)
+    }
+
+    /// D of the faces above all places along each axis, where it is a function of place; empty where none is.
+    fn layers<const B: usize, L: Law<B, D>>(&self, law: &L) -> [Vec<[Option<f64>; B]>; D] {
+        let mut all = [const { Vec::new() }; D];
+        if law.has_layers() {
+            let patch = self.cells.patch();
+            for (axis, (layers, s)) in all.iter_mut().zip(patch.padded_strides()).enumerate() {
+                let edge = |k: usize| [self.x[k], self.x[if patch.has_face(k, axis) { k + s } else { k }]];
+                let edges: Vec<[[f64; D]; 2]> = (0..self.x.len()).map(edge).collect();
+                *layers = law.through_layers(self.t, self.mesh, &edges);
+            }
+        }
+        all
     }
 
     /// The vectors by which ∇u at a face is u_k − u_i times the first and u_b − u_a times the second.
@@ -260,7 +275,13 @@ impl<const D: usize> Half<'_, D> {
         let scale = half / dot(self.way(i, k), normal);
         let (across, along) = (scale * dot(normal, normal), 0.25 * scale * turned);
         let passing = law.convection(&made.nodes[i], &made.nodes[k], normal);
-        let spread = law.diffusivity(&made.nodes[i], &made.nodes[k]);
+        let mut spread = law.diffusivity(&made.nodes[i], &made.nodes[k]);
+        if let Some(layers) = made.layers[axis].get(i) {
+            for c in 0..B {
+                // of place alone, so that its derivatives are 0
+                spread.value[c] = layers[c].unwrap_or(spread.value[c]);
+            }
+        }
         let (shares, limited) = (law.shares_mass(), law.limited().unknowns);
         let bent = self.stretched.get(i).map_or(0.0, |stretched| stretched[axis] / 24.0);
         let mut face = Face { crossing: passing, tangent: [[0.0; B]; B] };
