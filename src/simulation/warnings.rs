@@ -16,6 +16,7 @@ const BEYOND: f64 = 0.05;
 /// What is smaller beside the size of an unknown is of rounding and of Newton's method.
 const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
+const WIDE: &str = "changes within cells that are too wide for central fluxes";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
 impl<const D: usize> Simulation<D>
@@ -87,6 +88,22 @@ where
                 ));
             }
         }
+    }
+
+    /// Says once in a run that a front is thinner than cells that are too wide for its flux.
+    pub(super) fn warn_of_wide_cells(&self, state: &State<D>, record: &mut Record) {
+        if record.warnings.iter().any(|said| said.contains(WIDE)) {
+            return;
+        }
+        let State { t, mesh, u, .. } = state;
+        let Some((c, k, peclet)) = self.physics.unresolved_flux(*t, mesh, u) else { return };
+        let name = &self.physics.unknowns()[c];
+        record.warnings.push(format!(
+            "`{name}` {WIDE}: at t = {t}, {}, the flux outweighs diffusion {peclet:.0} times over a cell, and a front \
+             there may be at the wrong place; set `pde.scheme` = \"limited\", refine `grid.cells`, or raise \
+             `pde.diffusivity`",
+            named(mesh.image(mesh.x()[k]))
+        ));
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.

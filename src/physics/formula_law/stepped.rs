@@ -2,12 +2,17 @@
 
 use super::FormulaLaw;
 use crate::error::Failure;
-use crate::geometry::{Cells, Field, Mesh};
+use crate::geometry::{Cells, Field, Mesh, dot};
 use crate::numerics::linear::{RobustLine, RobustTransport};
 use crate::physics::finite_volumes::Law;
 use crate::physics::prescribed::evaluate;
 use crate::physics::{Motion, Physics, nodal};
 use crate::work::Work;
+
+/// A flux that outweighs diffusion by this over an edge, and a change over it, as a share of the range, from which a
+/// front is not resolved.
+const WIDE: f64 = 10.0;
+const CHANGES: f64 = 0.3;
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> Physics<D>
     for FormulaLaw<D, B, P, K, Solver>
@@ -52,6 +57,31 @@ where
 
     fn keeps_range(&self) -> Vec<bool> {
         self.keeps_range.to_vec()
+    }
+
+    fn unresolved_flux(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Option<(usize, usize, f64)> {
+        let (lattice, values) = (mesh.lattice(), u.values().as_chunks::<B>().0);
+        let nodes = self.nodes(t, &mesh.images(), values);
+        let limited = self.limited().unknowns;
+        let mut worst: Option<(usize, usize, f64)> = None;
+        for c in (0..B).filter(|&c| !limited[c]) {
+            let [low, high] = u.component(c).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)]);
+            for (axis, s) in lattice.strides().into_iter().enumerate() {
+                let inside = |k: &usize| lattice.node(*k)[axis] + 1 < lattice.nodes()[axis];
+                for k in (0..lattice.len()).filter(inside) {
+                    let change = (values[k + s][c] - values[k][c]).abs();
+                    let way: [f64; D] = std::array::from_fn(|d| mesh.x()[k + s][d] - mesh.x()[k][d]);
+                    let along = |k: usize| dot(std::array::from_fn(|d| Self::slope(&nodes[k], d, c, c)), way).abs();
+                    let spread = |k: usize| Self::value(&nodes[k], Self::DIFFUSIVITY, c);
+                    let peclet = along(k).max(along(k + s)) / spread(k).max(spread(k + s));
+                    let wide = spread(k) > 0.0 && peclet > WIDE && change > CHANGES * (high - low);
+                    if wide && worst.is_none_or(|(_, _, most)| peclet > most) {
+                        worst = Some((c, k, peclet));
+                    }
+                }
+            }
+        }
+        worst
     }
 
     fn known(&self) -> Vec<usize> {
