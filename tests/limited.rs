@@ -65,7 +65,8 @@ fn what_only_sits_there_is_left_as_it_is() {
                 unknowns = ["u", "w"]
                 diffusivity = {{ u = "8" }}
                 source = {{ u = "(u - u^3)/0.0361 + 10" }}
-                initial = {{ u = "0.227759606941801 - 0.918899713971633*tanh(1.20907857101531*(x - 16))", w = "{shape}" }}
+                initial.u = "0.227759606941801 - 0.918899713971633*tanh(1.20907857101531*(x - 16))"
+                initial.w = "{shape}"
                 boundary = {{ u = "no-flux", w = "no-flux" }}
                 [mesh]
                 generator = {{ kind = "{generator}" }}

@@ -162,8 +162,8 @@ fn an_elliptic_unknown_is_second_order() {
     assert!(off < 1e-3, "{off}");
 }
 
-/// A diffusivity that jumps from 1 to 100 in a cell or at a node: −(D u')' = 1 at rest has u = x (c − x/2) up to the jump
-/// at a, and u = (1 − x)(x + 1 − 2c)/200 from there; c follows from the jump. Order 2 either way.
+/// A diffusivity that jumps from 1 to 100 in a cell or at a node: −(D u')' = 1 at rest has u = x (c − x/2) up to the
+/// jump at a, and u = (1 − x)(x + 1 − 2c)/200 from there; c follows from the jump. Order 2 either way.
 #[test]
 fn a_jump_of_the_diffusivity_is_second_order() {
     for (a, cells) in [(0.5, [20, 40]), (0.4137, [20, 40])] {

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RootGradientTable {
-    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; where nothing is said all unknowns,
-    /// each in units of its range.
+    /// The unknown, or a formula of the unknowns, x, y and t, that the mesh follows; where nothing is said all
+    /// unknowns, each in units of its range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
 }

@@ -22,9 +22,9 @@ pub(super) struct Bounds<const D: usize, const B: usize> {
 const STATES: [f64; 3] = [-1.0, 0.0, 1.0];
 
 impl<const D: usize, const B: usize> Bounds<D, B> {
-    /// `flows` are the fluxes of each unknown, formulas of D coordinates, the unknowns and t, and `reactions` the sources
-    /// of those that have one and nothing else that changes them at their sides: what is only carried and diffused is
-    /// conserved, which bounds would change.
+    /// `flows` are the fluxes of each unknown, formulas of D coordinates, the unknowns and t, and `reactions` the
+    /// sources of those that have one and nothing else that changes them at their sides: what is only carried and
+    /// diffused is conserved, which bounds would change.
     pub fn new(
         names: &[String],
         given: &[[Option<Formula>; 2]],
@@ -100,7 +100,8 @@ pub(super) fn read<const D: usize>(name: &str, texts: &BoundTexts) -> Result<[Op
 
 /// The values at which unknown c stays where it has them, whatever the others are: no source there, and a flux that is
 /// the same everywhere. Only if it is pushed away from one of them; else rounding heals by itself, and what one unknown
-/// loses and another gains is better left in balance. Formulas are asked at some places, times and values of the others.
+/// loses and another gains is better left in balance. Formulas are asked at some places, times and values of the
+/// others.
 fn states<const D: usize>(c: usize, flows: &[&Formula], source: &Formula) -> Vec<f64> {
     let number = source.variables().len();
     // numbers without a pattern, of either sign, of all sizes up to ten

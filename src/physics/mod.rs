@@ -72,9 +72,9 @@ pub trait Physics<const D: usize = 2>: Send {
         Vec::new()
     }
 
-    /// The unknown, the node below an edge, and the cell Péclet number there, |F′| h/D, of an edge on which central fluxes
-    /// outweigh diffusion by much and an unknown changes by much of its range, if there is one: a front there may be at
-    /// the wrong place.
+    /// The unknown, the node below an edge, and the cell Péclet number there, |F′| h/D, of an edge on which central
+    /// fluxes outweigh diffusion by much and an unknown changes by much of its range, if there is one: a front there
+    /// may be at the wrong place.
     fn unresolved_flux(&self, _t: f64, _mesh: &Mesh<D>, _u: &Field) -> Option<(usize, usize, f64)> {
         None
     }

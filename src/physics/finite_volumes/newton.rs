@@ -91,8 +91,8 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
     }
 }
 
-/// Replaces the residuals of values that lie on their bounds by the way to these, and returns which these are, as (node,
-/// unknown).
+/// Replaces the residuals of values that lie on their bounds by the way to these, and returns which these are, as
+/// (node, unknown).
 fn hold<const B: usize, const D: usize>(
     bounds: &[[[f64; 2]; B]],
     u: &[[f64; B]],

@@ -14,11 +14,11 @@ use crate::physics::Motion;
 /// G = Δt (F(u₋) + F(u₊))·N/2 − s (u₋ + u₊)/2 − a (u₊ − u₋)/2
 /// ```
 ///
-/// u₋ and u₊ are the values on both sides of a face that [`increments`] gives, N is the normal of the face, F is taken at
-/// its middle, so that flows without divergence keep constants, s is the area that it sweeps, a the largest absolute eigenvalue of Δt F′·N − s, and R what diffusion and sources
-/// bring. A time step is divided into explicit ones so short that no node becomes a new extremum of itself and its
-/// neighbours by F(u) and by the motion, and second order in time. Nodes move along straight lines; unknowns that are
-/// not limited change linearly at each.
+/// u₋ and u₊ are the values on both sides of a face that [`increments`] gives, N is the normal of the face, F is taken
+/// at its middle, so that flows without divergence keep constants, s is the area that it sweeps, a the largest absolute
+/// eigenvalue of Δt F′·N − s, and R what diffusion and sources bring. A time step is divided into explicit ones so
+/// short that no node becomes a new extremum of itself and its neighbours by F(u) and by the motion, and second order
+/// in time. Nodes move along straight lines; unknowns that are not limited change linearly at each.
 ///
 /// # Source
 /// van Leer, *Towards the ultimate conservative difference scheme V* (1979); Gottlieb, Shu and Tadmor, *Strong

@@ -133,7 +133,8 @@ impl<const D: usize> FormulaPde<D> {
         self.flux.get(name).map_or("0", |along| &along[axis])
     }
 
-    /// A formula of x, y, the unknowns, their derivatives and t: of one unknown after the other, u_x, u_y, v_x and so on.
+    /// A formula of x, y, the unknowns, their derivatives and t: of one unknown after the other, u_x, u_y, v_x and so
+    /// on.
     fn term(&self, key: &str, text: &str) -> Result<Formula> {
         let slopes = self.unknowns.iter().flat_map(|name| AXES[..D].iter().map(move |axis| format!("{name}_{axis}")));
         let slopes: Vec<String> = slopes.collect();
