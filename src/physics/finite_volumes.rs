@@ -215,10 +215,10 @@ pub(super) struct Crossing<const B: usize> {
 /// x_k − x_i, J = d·N, s is the area that the face sweeps between the meshes, and u_a and u_b are the means of the four
 /// nodes around its ends. On a line there is no t. What leaves a cell enters its neighbour, and a constant stays
 /// constant on any moving mesh. That is the trapezoid in time ([`Stepper`]), solved by Newton's method with the exact
-/// Jacobian. Where neighbours have a share in the mass ([`Law::shares_mass`]), A u and A S are M u and M S, and s (u_i
-/// + u_k)/2 is the mean of the product along the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition. For unknowns that
-/// are [`Limited`], F·N and s are in the explicit steps of [`Transport`](transport::Transport), and what these bring to
-/// a dual cell is known here.
+/// Jacobian. Where neighbours have a share in the mass ([`Law::shares_mass`]), A u and A S are M u and M S, and
+/// s (u_i + u_k)/2 is the mean of the product along the edge, with (d_k − d_i)·N (u_k − u_i)/12 in addition. For
+/// unknowns that are [`Limited`], F·N and s are in the explicit steps of [`Transport`](transport::Transport), and what
+/// these bring to a dual cell is known here.
 #[derive(Debug, Clone)]
 pub(super) struct FiniteVolumes<const B: usize, const D: usize = 2, Solver = RobustTransport<B>> {
     solver: Solver,

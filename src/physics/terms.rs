@@ -213,10 +213,10 @@ fn push<To>(terms: &mut Vec<Term<To>>, to: To, formula: &Formula, what: &str) {
 /// Adds the derivative of a formula by a variable, if it depends on it. That it can be taken was seen when the formula
 /// was read.
 fn derived<To>(terms: &mut Vec<Term<To>>, to: To, formula: &Formula, variable: usize, what: &str) {
-    if formula.depends_on(variable) {
-        if let Ok(derivative) = formula.derivative(variable) {
-            push(terms, to, &derivative, &format!("the derivative of {what} by {}", formula.variables()[variable]));
-        }
+    if formula.depends_on(variable)
+        && let Ok(derivative) = formula.derivative(variable)
+    {
+        push(terms, to, &derivative, &format!("the derivative of {what} by {}", formula.variables()[variable]));
     }
 }
 

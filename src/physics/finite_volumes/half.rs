@@ -277,9 +277,9 @@ impl<const D: usize> Half<'_, D> {
         let passing = law.convection(&made.nodes[i], &made.nodes[k], normal);
         let mut spread = law.diffusivity(&made.nodes[i], &made.nodes[k]);
         if let Some(layers) = made.layers[axis].get(i) {
-            for c in 0..B {
-                // of place alone, so that its derivatives are 0
-                spread.value[c] = layers[c].unwrap_or(spread.value[c]);
+            // of place alone, so that their derivatives are 0
+            for (value, layer) in spread.value.iter_mut().zip(layers) {
+                *value = layer.unwrap_or(*value);
             }
         }
         let (shares, limited) = (law.shares_mass(), law.limited().unknowns);

@@ -33,6 +33,9 @@ pub(super) struct Transport<'a, const B: usize, const D: usize, L> {
     brought: &'a [[f64; B]],
 }
 
+/// For some shares of a step what is carried into each dual cell up to there, and the number of explicit steps.
+type Carried<const B: usize> = (Vec<Vec<[f64; B]>>, usize);
+
 /// The mesh at a share of the step.
 pub(super) struct Stage<const B: usize, const D: usize> {
     share: f64,
@@ -77,7 +80,7 @@ where
     /// What is carried into each dual cell up to each of some shares of the step, which grow to 1; and the number of
     /// explicit steps.
     #[allow(private_bounds)] // what lies around a face is known to finite volumes alone
-    pub fn carried<const S: usize>(&self, shares: &[f64]) -> Result<(Vec<Vec<[f64; B]>>, usize), Failure>
+    pub fn carried<const S: usize>(&self, shares: &[f64]) -> Result<Carried<B>, Failure>
     where
         for<'b> Half<'b, D>: Around<D, S>,
     {
