@@ -43,7 +43,8 @@ fn distance(run: &MovingRun<1>, unknown: usize, exact: impl Fn(f64) -> f64) -> f
 /// rests, whatever its shape.
 #[test]
 fn what_only_sits_there_is_left_as_it_is() {
-    let shapes: [(&str, fn(f64) -> f64); 3] = [
+    type Shape = (&'static str, fn(f64) -> f64);
+    let shapes: [Shape; 3] = [
         ("0.5*(1 + tanh((x - 30)/4))", |x| 0.5 * (1.0 + ((x - 30.0) / 4.0).tanh())),
         ("min(max((x - 28)/4, 0), 1)", |x| ((x - 28.0) / 4.0).clamp(0.0, 1.0)),
         ("0.5*(1 + tanh(x - 30))", |x| 0.5 * (1.0 + (x - 30.0).tanh())),
