@@ -127,7 +127,7 @@ fn a_shock_tube_gains() {
 }
 
 /// Buckley and Leverett's displacement on cells that stay: central fluxes have the front at the wrong place, which is
-/// said; limited ones have it where a run on 2000 cells has it, within half a cell.
+/// said; limited ones have it where a run on 2000 cells has it, within two cells.
 #[test]
 fn a_flux_that_is_not_convex_has_its_front() {
     let run = |cells: usize, scheme: &str| {
@@ -163,7 +163,7 @@ fn a_flux_that_is_not_convex_has_its_front() {
     assert!(said(&central) && !said(&limited));
     // 0.7423 on 2000 cells
     let off = front(&limited) - 0.7423;
-    assert!(off.abs() < 0.5 / 60.0, "{off}");
+    assert!(off.abs() < 2.0 / 60.0, "{off}");
 }
 
 /// A wave that goes along with what is limited, on a mesh that is moved about: order 2 in the mean, and ∫u stays.
