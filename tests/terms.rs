@@ -202,6 +202,37 @@ fn a_jump_of_the_diffusivity_counts_where_it_is() {
     }
 }
 
+/// A source of place is integrated over cells: at rest, diffusion and source are exact at the nodes of any line.
+#[test]
+fn sources_of_place_are_integrated() {
+    let run = line(
+        r#"
+        [grid]
+        cells = [12]
+        [time]
+        start = 0.0
+        end = 100.0
+        [pde]
+        kind = "formula"
+        unknowns = ["u"]
+        diffusivity = { u = "0.05" }
+        source = { u = "0.05*200*(1 - 200*(x - 0.4)^2)*exp(-100*(x - 0.4)^2)" }
+        initial = { u = "0" }
+        boundary = { u = "exp(-100*(x - 0.4)^2)" }
+        [monitor]
+        kind = "given"
+        of = "1 + 20*exp(-200*(x - 0.5)^2)"
+        "#,
+    );
+    let state = run.state.unwrap();
+    let widths = state.mesh.x().windows(2).map(|x| x[1][0] - x[0][0]);
+    let [least, most] = widths.fold([f64::INFINITY, 0.0_f64], |[l, m], h| [l.min(h), m.max(h)]);
+    assert!(most > 4.0 * least, "{least} to {most}");
+    let exact = |x: f64| (-100.0 * (x - 0.4) * (x - 0.4)).exp();
+    let off = state.mesh.x().iter().zip(state.u.component(0)).fold(0.0_f64, |m, ([x], u)| m.max((u - exact(*x)).abs()));
+    assert!(off < 1e-3, "{off}");
+}
+
 /// What cannot be is told by its key.
 #[test]
 fn terms_that_make_no_sense_are_refused() {

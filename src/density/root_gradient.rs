@@ -21,8 +21,10 @@ use std::borrow::Cow;
 ///
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
 /// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
-/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. The largest ρ over the
-/// smallest is at most 10⁶, and 5·10³ around jumps.
+/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. Where the steepest slope is
+/// less than twice (⟨|∇u|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could be
+/// taken, and s is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and 5·10³
+/// around jumps.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
@@ -38,6 +40,8 @@ const CONTRAST: f64 = 1e6;
 const CONTRAST_OF_JUMPS: f64 = 5e3;
 /// Shares of the range on an edge of the mesh from which it begins to be a jump, and is one.
 const JUMPS: [f64; 2] = [0.25, 0.5];
+/// The steepest slope over that of the background from which there begins to be, and is, something to gain.
+const STEEPER: [f64; 2] = [2.0, 4.0];
 /// Passes of the filter on 41 × 41 nodes.
 const PASSES: f64 = 8.0;
 /// So many layers on a line are smoothed as one is. Were two of them smoothed less, on periodic axes or where a front
@@ -85,7 +89,7 @@ impl RootGradient {
         if mean <= ROUNDING * background {
             return even();
         }
-        let beta = BETA * need;
+        let beta = BETA * need * between(STEEPER, steepest / (background * background));
         if beta == 0.0 {
             return even();
         }

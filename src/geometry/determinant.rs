@@ -1,7 +1,7 @@
 //! Determinants of one to three rows.
 
 /// The determinant of up to three rows.
-pub(super) fn determinant<const D: usize>(rows: [[f64; D]; D]) -> f64 {
+pub(crate) fn determinant<const D: usize>(rows: [[f64; D]; D]) -> f64 {
     let cross = |a: usize, b: usize, c: usize, d: usize| rows[a][c] * rows[b][d] - rows[a][d] * rows[b][c];
     match D {
         1 => rows[0][0],

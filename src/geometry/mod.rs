@@ -20,7 +20,7 @@ mod vector;
 pub use cells::{
     Cells, Comparison, cell_areas, cell_jacobians, cell_qualities, compare, interpolate, node_areas, quality,
 };
-pub(crate) use determinant::cofactors;
+pub(crate) use determinant::{cofactors, determinant};
 pub use dual::{DualCells, padded};
 pub use field::Field;
 pub(crate) use field::largest;

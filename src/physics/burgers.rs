@@ -70,7 +70,8 @@ pub enum Convection {
     Conservative,
     /// u u_x + u u_y by central differences at nodes.
     Advective,
-    /// Finite volumes on dual cells: Σ A u changes only by the flux through the sides, on any moving mesh.
+    /// Finite volumes on dual cells: Σ A u changes only by the flux through the sides, on any moving mesh. Where cells
+    /// are wider than 2ν/u, the value from upstream limits what passes.
     #[default]
     Flux,
 }
@@ -221,6 +222,10 @@ impl Law<1> for Burgers {
     /// The product flux balances A u: what both are wrong by where cells grow is the same for u = x/t.
     fn shares_mass(&self) -> [bool; 1] {
         [false]
+    }
+
+    fn damped(&self) -> [bool; 1] {
+        [true]
     }
 
     fn side(&self, t: f64, x: [f64; 2], _beyond: [[bool; 2]; 2]) -> [Option<f64>; 1] {

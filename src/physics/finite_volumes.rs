@@ -1,7 +1,9 @@
 //! Conservation laws on the dual cells of a moving mesh.
 
+mod damping;
 mod half;
 mod line;
+mod loads;
 mod mass;
 mod newton;
 mod plane;
@@ -49,6 +51,15 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// S at a node and its derivative; none for an equation without a source.
     fn source(&self, _node: &Self::Node) -> Option<([f64; B], Block<B>)> {
         None
+    }
+    /// Whether some source has a part that is a function of place and time alone, which is to be integrated over cells.
+    fn has_loads(&self) -> bool {
+        false
+    }
+    /// Such sources at some places, with the unknowns u, on which they depend but for a part that is the same at all
+    /// places; 0 for others.
+    fn loads(&self, _t: f64, _mesh: &Mesh<D>, _x: &[[f64; D]], _u: [f64; B]) -> Result<Vec<[f64; B]>, Failure> {
+        Ok(Vec::new())
     }
     /// The unknowns that are given at a place on bounded sides, those at the lower or the upper ends of some axes; for
     /// the others there is a flux through the sides.
@@ -111,6 +122,10 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// The unknowns that are carried by limited fluxes ([`Transport`](transport::Transport)).
     fn limited(&self) -> Limited<B> {
         Limited { unknowns: [false; B], implicit: true, coupled: false }
+    }
+    /// The unknowns whose fluxes are limited where cells are too wide for central ones ([`Damping`](damping::Damping)).
+    fn damped(&self) -> [bool; B] {
+        [false; B]
     }
     /// How it is stepped in time.
     fn stepper(&self) -> Stepper {
@@ -238,6 +253,8 @@ impl<const B: usize, const D: usize, Solver: Default> Default for FiniteVolumes<
 struct Face<const B: usize> {
     crossing: Crossing<B>,
     tangent: Block<B>,
+    /// What u_k − u_i of each unknown counts in its own g/2 by diffusion.
+    diffusion: [f64; B],
 }
 
 impl<const B: usize> Face<B> {
@@ -245,6 +262,7 @@ impl<const B: usize> Face<B> {
     const CLOSED: Self = Self {
         crossing: Crossing { value: [0.0; B], by_below: [[0.0; B]; B], by_above: [[0.0; B]; B] },
         tangent: [[0.0; B]; B],
+        diffusion: [0.0; B],
     };
 }
 

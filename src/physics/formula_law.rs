@@ -35,9 +35,12 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     shares: [bool; B],
     stepper: Stepper,
     limited: Limited<B>,
+    damped: [bool; B],
     bounds: Bounds<D, B>,
     terms: Terms<D, B>,
     layers: Layers<P, B>,
+    /// Sources that have a part of place and time alone, in addition to one of unknowns and time.
+    loads: [Option<Program<P, 1>>; B],
     /// The unknowns that are only carried and diffused.
     keeps_range: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
@@ -56,15 +59,17 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Kinds { limited, shares, keeps_range, reacts, open } = Kinds::of(&formulas, cartesian);
+        let Kinds { limited, damped, shares, keeps_range, loaded, reacts, open } = Kinds::of(&formulas, cartesian);
         let Formulas { names, nodal, initial, sides, exact, terms, bounds, .. } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
             shares,
+            loads: std::array::from_fn(|c| loaded[c].then(|| Program::new([&nodal[Self::SOURCE * B + c]]))),
             terms: Terms::new(&terms, &names),
             layers: Layers::new(std::array::from_fn(|c| &nodal[Self::DIFFUSIVITY * B + c])),
             limited,
+            damped,
             bounds: Bounds::new(
                 &names,
                 &bounds,
@@ -317,8 +322,41 @@ where
         self.bounds.at(t, mesh, own)
     }
 
+    fn has_loads(&self) -> bool {
+        self.loads.iter().any(Option::is_some)
+    }
+
+    fn loads(&self, t: f64, mesh: &Mesh<D>, x: &[[f64; D]], u: [f64; B]) -> Result<Vec<[f64; B]>, Failure> {
+        let mut loads = vec![[0.0; B]; x.len()];
+        parallel::for_each_piece(&mut loads, |begin, loads| {
+            let points: Vec<[f64; P]> = (x[begin..].iter().take(loads.len()))
+                .map(|x| std::array::from_fn(|v| if v < D { x[v] } else { u[v - D] }))
+                .collect();
+            let mut values = vec![[0.0]; points.len()];
+            for (c, program) in self.loads.iter().enumerate() {
+                let Some(program) = program else { continue };
+                program.eval_each(&points, &[t], &mut values);
+                loads.iter_mut().zip(&values).for_each(|(load, [value])| load[c] = *value);
+            }
+        });
+        match loads.as_flattened().iter().position(|value| !value.is_finite()) {
+            None => Ok(loads),
+            Some(place) => {
+                let (p, c) = (place / B, place % B);
+                let near = |k: &usize| distance(mesh.x()[*k], x[p]);
+                let k = (0..mesh.x().len()).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap_or_default();
+                let what = format!("`pde.source.{}` near", self.names[c]);
+                Err(self.failure(what, loads[p][c], mesh, k, None))
+            }
+        }
+    }
+
     fn limited(&self) -> Limited<B> {
         self.limited
+    }
+
+    fn damped(&self) -> [bool; B] {
+        self.damped
     }
 
     fn has_layers(&self) -> bool {
@@ -366,6 +404,10 @@ where
     {
         (self.cells)(mesh)
     }
+}
+
+fn distance<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
+    length(std::array::from_fn::<f64, D, _>(|d| a[d] - b[d]))
 }
 
 /// The sum of the contributions of two nodes.

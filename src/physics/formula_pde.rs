@@ -27,8 +27,8 @@ use std::collections::BTreeMap;
 ///
 /// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and a [`Stepper`] in time, solved by
 /// Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
-/// of their values at the two nodes. Such central fluxes oscillate where the mesh does not resolve a front; [limited
-/// ones](Scheme::Limited) do not. Σ A u changes only by the flux through the sides, by S, and where `bounds` are met,
+/// of their values at the two nodes; where a cell is too wide for such central fluxes, the value from upstream limits
+/// them, and without diffusion they are [limited](Scheme::Limited) everywhere. Σ A u changes only by the flux through the sides, by S, and where `bounds` are met,
 /// on any moving mesh. A solution has one value for each node and unknown, in the order of `unknowns`.
 ///
 /// # Errors
@@ -91,9 +91,9 @@ pub struct FormulaPde<const D: usize = 2> {
     /// it. Without bounds, an unknown with a source keeps to −1, 0 and 1 where its equation does and pushes away.
     #[serde(default, skip_serializing_if = "no_flux")]
     pub bounds: Fluxes<2>,
-    /// `"central"` fluxes, of the second order and without limits; or `"limited"` ones, of the second order where the
-    /// solution is smooth and without new extrema, which are carried in explicit substeps. By default limited fluxes
-    /// for the unknowns without diffusion.
+    /// `"limited"` fluxes, of the second order where the solution is smooth and without new extrema, which are carried
+    /// in explicit substeps; or `"central"` ones, without limits. By default limited ones for the unknowns without
+    /// diffusion; and for others implicit central ones that are limited where the cell Péclet number is above 2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scheme: Option<Scheme>,
     /// Exact solution of each unknown, a formula of x, y and t, if it is known.

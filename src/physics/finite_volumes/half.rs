@@ -2,7 +2,7 @@
 
 use super::{Around, Block, Crossing, Excess, Face, Half, Law, Made, Point, Side, Sloped, Steep, View, add, inside};
 use crate::error::Failure;
-use crate::geometry::dot;
+use crate::geometry::{Cells, Mesh, dot};
 use crate::numerics::difference::scaled_gradient;
 use crate::numerics::linear::BlockMatrix;
 use crate::parallel;
@@ -137,8 +137,11 @@ impl<const D: usize> Half<'_, D> {
     ) -> Result<Vec<[f64; B]>, Failure>
     where
         Self: Around<D, S>,
+        Mesh<D>: Cells<D>,
     {
-        let view = self.view::<S, B, L>(law, u)?;
+        let loads = self.loads(law, excess, u)?;
+        let mut view = self.view::<S, B, L>(law, u)?;
+        self.damping(law, &view, u).add_to(&mut view, self.cells.patch(), u);
         let algebraic = law.algebraic();
         let mut known = vec![[0.0; B]; self.cells.patch().len()];
         self.for_each_node(&mut known, |known, i, k| {
@@ -152,6 +155,9 @@ impl<const D: usize> Half<'_, D> {
                 });
                 (0..B).for_each(|c| known[c] += more[c]);
             }
+            if let Some(load) = loads.get(i) {
+                (0..B).for_each(|c| known[c] += load[c]);
+            }
             (0..B).filter(|&c| algebraic[c]).for_each(|c| known[c] = 0.0);
         });
         Ok(known)
@@ -163,7 +169,7 @@ impl<const D: usize> Half<'_, D> {
         law: &L,
         excess: Option<&Excess<B, D, S>>,
         view: &View<L::Node, B, D>,
-        known: &[[f64; B]],
+        [known, loads]: [&[[f64; B]]; 2],
         u: &[[f64; B]],
         residual: &mut [[f64; B]],
     ) where
@@ -179,6 +185,9 @@ impl<const D: usize> Half<'_, D> {
                     std::array::from_fn(|c| u[n][c] - source[c])
                 });
                 (0..B).for_each(|c| residual[c] -= more[c] / area);
+            }
+            if let Some(load) = loads.get(i) {
+                (0..B).for_each(|c| residual[c] += load[c] / area);
             }
         });
     }
@@ -284,7 +293,7 @@ impl<const D: usize> Half<'_, D> {
         }
         let (shares, limited) = (law.shares_mass(), law.limited().unknowns);
         let bent = self.stretched.get(i).map_or(0.0, |stretched| stretched[axis] / 24.0);
-        let mut face = Face { crossing: passing, tangent: [[0.0; B]; B] };
+        let mut face = Face { crossing: passing, tangent: [[0.0; B]; B], diffusion: [0.0; B] };
         let Crossing { value, by_below, by_above } = &mut face.crossing;
         for c in 0..B {
             let slope = across * (u[k][c] - u[i][c]) + along * change(c);
@@ -298,8 +307,9 @@ impl<const D: usize> Half<'_, D> {
                 by_below[c][e] = half * by_below[c][e] - spread.by_below[c][e] * slope;
                 by_above[c][e] = half * by_above[c][e] - spread.by_above[c][e] * slope;
             }
-            by_below[c][c] += spread.value[c] * across + bent;
-            by_above[c][c] -= spread.value[c] * across + bent;
+            face.diffusion[c] = spread.value[c] * across + bent;
+            by_below[c][c] += face.diffusion[c];
+            by_above[c][c] -= face.diffusion[c];
             for (by, at) in [(&mut *by_below, i), (&mut *by_above, k)] {
                 match made.stored.get(at) {
                     None => by[c][c] -= 0.25 * swept,
@@ -324,6 +334,9 @@ impl<const D: usize> Half<'_, D> {
             for e in 0..B {
                 let by_value = 0.5 * half * dot(steep.by_value[c][e], normal);
                 let by_slope: [f64; D] = steep.by_slope[c][e].map(|by| half * dot(by, normal));
+                if c == e {
+                    face.diffusion[c] -= dot(by_slope, across);
+                }
                 by_below[c][e] += by_value - dot(by_slope, across);
                 by_above[c][e] += by_value + dot(by_slope, across);
                 face.tangent[c][e] += 0.25 * dot(by_slope, along);

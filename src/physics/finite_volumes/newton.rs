@@ -2,7 +2,7 @@
 
 use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Side};
 use crate::error::Failure;
-use crate::geometry::Patch;
+use crate::geometry::{Cells, Mesh, Patch};
 use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver};
 use crate::work::Work;
@@ -43,15 +43,20 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
     where
         Solver: LinearSolver<D, S, B, Block<B>>,
         for<'a> Half<'a, D>: Around<D, S>,
+        Mesh<D>: Cells<D>,
     {
         let patch = *half.cells.patch();
         let mut scale = Scale::of(u);
         let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
+        // by the values at first, so that Newton's method sees smooth functions
+        let mut damping = None;
+        let loads = half.loads(law, excess, u)?;
         let stalled = loop {
-            let view = half.view::<S, B, L>(law, u)?;
-            half.residual(law, excess, &view, known, u, &mut residual);
+            let mut view = half.view::<S, B, L>(law, u)?;
+            damping.get_or_insert_with(|| half.damping(law, &view, u)).add_to(&mut view, &patch, u);
+            half.residual(law, excess, &view, [known, &loads], u, &mut residual);
             for side in sides {
                 for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
                     *residual = if given.is_some() { 0.0 } else { *residual };

@@ -1,8 +1,8 @@
 //! What stands on both sides of a face, and how fast it is carried through.
 
-use super::transport::{Stage, Transport};
-use super::{Block, Law};
-use crate::geometry::{Cells, Mesh};
+use super::{Block, Side};
+use crate::geometry::{Lattice, Patch, length};
+use crate::numerics::larger;
 use crate::parallel;
 
 /// How far the values at the faces below and above a node differ from its own, along one axis: by the differences to
@@ -39,15 +39,28 @@ pub(super) fn is_smooth(seconds: [f64; 3]) -> bool {
     least > 0.0 && 2.0 * least >= most || most < 0.0 && 2.0 * most <= least
 }
 
-impl<const B: usize, const D: usize, L: Law<B, D>> Transport<'_, B, D, L>
-where
-    Mesh<D>: Cells<D>,
-{
+/// Where the values are of which those at faces are made.
+pub(super) struct Places<'a, const B: usize, const D: usize> {
+    pub lattice: &'a Lattice<D>,
+    pub patch: Patch<D>,
+    /// Positions, padded.
+    pub x: &'a [[f64; D]],
+    pub sides: &'a [Side<B>],
+    /// The unknowns whose values are wanted.
+    pub wanted: [bool; B],
+}
+
+impl<const B: usize, const D: usize> Places<'_, B, D> {
+    fn distance(&self, i: usize, k: usize) -> f64 {
+        let way: [f64; D] = std::array::from_fn(|d| self.x[k][d] - self.x[i][d]);
+        length(way)
+    }
+
     /// By how much values at the faces below and above each node differ from its own along each axis.
-    pub(super) fn increments(&self, stage: &Stage<B, D>, u: &[[f64; B]]) -> Vec<[[[f64; B]; 2]; D]> {
-        let patch = *stage.cells.patch();
-        let (strides, limited) = (patch.padded_strides(), self.limited.unknowns);
-        let seconds = self.seconds(stage, u);
+    pub fn increments(&self, u: &[[f64; B]]) -> Vec<[[[f64; B]; 2]; D]> {
+        let patch = self.patch;
+        let (strides, wanted) = (patch.padded_strides(), self.wanted);
+        let seconds = self.seconds(u);
         let mut steps = vec![[[[0.0; B]; 2]; D]; u.len()];
         let row = patch.pencil_len() + 2;
         parallel::for_each_row(&mut steps, row, |q, steps| {
@@ -56,8 +69,8 @@ where
             }
             for (k, steps) in (q * row..).zip(steps).skip(1).take(row - 2) {
                 for (d, s) in strides.into_iter().enumerate() {
-                    let h = [stage.distance(k - s, k), stage.distance(k, k + s)];
-                    for c in (0..B).filter(|&c| limited[c]) {
+                    let h = [self.distance(k - s, k), self.distance(k, k + s)];
+                    for c in (0..B).filter(|&c| wanted[c]) {
                         let differences = [u[k][c] - u[k - s][c], u[k + s][c] - u[k][c]];
                         let smooth = is_smooth([k - s, k, k + s].map(|k| seconds[k][d][c]));
                         let [below, above] = increments(differences, h, smooth);
@@ -66,15 +79,15 @@ where
                 }
             }
         });
-        self.go_on_beyond(stage, u, &mut steps);
+        self.go_on_beyond(u, &mut steps);
         patch.wrap(&mut steps);
         steps
     }
 
-    /// Second derivatives of limited unknowns along the lattice lines.
-    fn seconds(&self, stage: &Stage<B, D>, u: &[[f64; B]]) -> Vec<[[f64; B]; D]> {
-        let patch = *stage.cells.patch();
-        let (strides, limited) = (patch.padded_strides(), self.limited.unknowns);
+    /// Second derivatives along the lattice lines.
+    fn seconds(&self, u: &[[f64; B]]) -> Vec<[[f64; B]; D]> {
+        let patch = self.patch;
+        let (strides, wanted) = (patch.padded_strides(), self.wanted);
         let mut seconds = vec![[[0.0; B]; D]; u.len()];
         let row = patch.pencil_len() + 2;
         parallel::for_each_row(&mut seconds, row, |q, seconds| {
@@ -83,12 +96,12 @@ where
             }
             for (k, seconds) in (q * row..).zip(seconds).skip(1).take(row - 2) {
                 for (d, s) in strides.into_iter().enumerate() {
-                    let [below, above] = [stage.distance(k - s, k), stage.distance(k, k + s)];
+                    let [below, above] = [self.distance(k - s, k), self.distance(k, k + s)];
                     // beyond a bounded side there is nothing
                     if below == 0.0 || above == 0.0 {
                         continue;
                     }
-                    for c in (0..B).filter(|&c| limited[c]) {
+                    for c in (0..B).filter(|&c| wanted[c]) {
                         let slopes = [(u[k][c] - u[k - s][c]) / below, (u[k + s][c] - u[k][c]) / above];
                         seconds[d][c] = 2.0 * (slopes[1] - slopes[0]) / (below + above);
                     }
@@ -100,16 +113,16 @@ where
     }
 
     /// Where a value is given the profile goes on beyond the side as before it.
-    fn go_on_beyond(&self, stage: &Stage<B, D>, u: &[[f64; B]], steps: &mut [[[[f64; B]; 2]; D]]) {
-        let (lattice, strides) = (stage.mesh.lattice(), stage.cells.patch().padded_strides());
-        for side in &stage.sides {
-            for (d, ends) in lattice.beyond(side.i).into_iter().enumerate() {
+    fn go_on_beyond(&self, u: &[[f64; B]], steps: &mut [[[[f64; B]; 2]; D]]) {
+        let strides = self.patch.padded_strides();
+        for side in self.sides {
+            for (d, ends) in self.lattice.beyond(side.i).into_iter().enumerate() {
                 let inner = match ends {
                     [true, false] => side.k + strides[d],
                     [false, true] => side.k - strides[d],
                     _ => continue,
                 };
-                for c in (0..B).filter(|&c| self.limited.unknowns[c] && side.given[c].is_some()) {
+                for c in (0..B).filter(|&c| self.wanted[c] && side.given[c].is_some()) {
                     let half = 0.5 * (u[inner][c] - u[side.k][c]);
                     steps[side.k][d] = steps[side.k][d].map(|mut step| {
                         step[c] = if ends[0] { half } else { -half };
@@ -119,6 +132,23 @@ where
             }
         }
     }
+}
+
+/// The largest absolute eigenvalue that belongs to each unknown, of two matrices: those of the `taken` that are not
+/// coupled to others of these have their own, all others have one in common.
+pub(super) fn speeds<const B: usize>(matrices: &[Block<B>; 2], taken: [bool; B]) -> [f64; B] {
+    let alone =
+        |c: usize| matrices.iter().all(|j| (0..B).all(|e| e == c || !taken[e] || (j[c][e] == 0.0 && j[e][c] == 0.0)));
+    let coupled: [bool; B] = std::array::from_fn(|c| taken[c] && !alone(c));
+    let together = match coupled.contains(&true) {
+        true => matrices.iter().map(|j| spectral_radius(j, coupled)).fold(0.0, larger),
+        false => 0.0,
+    };
+    std::array::from_fn(|c| match (taken[c], coupled[c]) {
+        (false, _) => 0.0,
+        (_, true) => together,
+        _ => larger(matrices[0][c][c].abs(), matrices[1][c][c]),
+    })
 }
 
 /// A bound for the largest absolute eigenvalue of the rows and columns of `matrix` that are `taken`: of J,

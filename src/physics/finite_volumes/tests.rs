@@ -108,7 +108,7 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
     let nothing = vec![[0.0; B]; patch.len()];
     let residual = |u: &[[f64; B]]| -> Vec<[f64; B]> {
         let mut residual = nothing.clone();
-        half.residual(law, excess.as_ref(), &half.view(law, u).unwrap(), &nothing, u, &mut residual);
+        half.residual(law, excess.as_ref(), &half.view(law, u).unwrap(), [&nothing, &[]], u, &mut residual);
         residual
     };
     let mut u = padded(lattice, u, [[0.0; B]; 2]);

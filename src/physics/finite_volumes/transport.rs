@@ -1,6 +1,6 @@
 //! Explicit steps that carry unknowns with limited fluxes.
 
-use super::reconstruction::spectral_radius;
+use super::reconstruction::{Places, speeds};
 use super::{Around, Block, Half, Law, Limited, Side, inside, sides};
 use crate::error::Failure;
 use crate::geometry::{Cells, DualCells, Mesh, diagonal, length, padded};
@@ -25,7 +25,7 @@ use crate::physics::Motion;
 /// stability-preserving high-order time discretization methods* (2001), for the method of Heun.
 pub(super) struct Transport<'a, const B: usize, const D: usize, L> {
     law: &'a L,
-    pub(super) limited: Limited<B>,
+    limited: Limited<B>,
     motion: Motion<'a, D>,
     /// All unknowns at both ends of the step, padded; of limited ones the end is not used.
     ends: [&'a [[f64; B]]; 2],
@@ -37,21 +37,13 @@ pub(super) struct Transport<'a, const B: usize, const D: usize, L> {
 type Carried<const B: usize> = (Vec<Vec<[f64; B]>>, usize);
 
 /// The mesh at a share of the step.
-pub(super) struct Stage<const B: usize, const D: usize> {
+struct Stage<const B: usize, const D: usize> {
     share: f64,
     t: f64,
-    pub mesh: Mesh<D>,
-    pub cells: DualCells<D>,
+    mesh: Mesh<D>,
+    cells: DualCells<D>,
     x: Vec<[f64; D]>,
-    pub sides: Vec<Side<B>>,
-}
-
-impl<const B: usize, const D: usize> Stage<B, D> {
-    /// Between two nodes.
-    pub fn distance(&self, i: usize, k: usize) -> f64 {
-        let way: [f64; D] = std::array::from_fn(|d| self.x[k][d] - self.x[i][d]);
-        length(way)
-    }
+    sides: Vec<Side<B>>,
 }
 
 /// What passes through faces, each stored with the node below it, and half of the sum of a around each node as a share
@@ -215,7 +207,8 @@ where
     ) -> Result<Passing<B, D>, Failure> {
         let patch = *stage.cells.patch();
         let strides = patch.padded_strides();
-        let steps = self.increments(stage, u);
+        let (lattice, wanted) = (stage.mesh.lattice(), self.limited.unknowns);
+        let steps = Places { lattice, patch, x: &stage.x, sides: &stage.sides, wanted }.increments(u);
         let mut faces = vec![[[0.0; B]; D]; u.len()];
         let mut speeds = vec![[0.0; D]; u.len()];
         let seen = inside(&stage.mesh, &stage.x);
@@ -273,28 +266,15 @@ where
             std::array::from_fn(|c| std::array::from_fn(|e| 2.0 * dt * by[c][e] - if c == e { swept } else { 0.0 }))
         };
         let jacobians = [&passing.by_below, &passing.by_above].map(shifted);
-        let alone = |c: usize| {
-            jacobians.iter().all(|j| (0..B).all(|e| e == c || !limited[e] || (j[c][e] == 0.0 && j[e][c] == 0.0)))
-        };
-        let coupled: [bool; B] = std::array::from_fn(|c| limited[c] && !alone(c));
-        let together = match coupled.contains(&true) {
-            true => jacobians.iter().map(|j| spectral_radius(j, coupled)).fold(0.0, larger),
-            false => 0.0,
-        };
-        let mut largest = together;
+        let speeds = speeds(&jacobians, limited);
         let flux = std::array::from_fn(|c| {
             if !limited[c] {
                 return 0.0;
             }
-            let speed = match coupled[c] {
-                true => together,
-                false => larger(jacobians[0][c][c].abs(), jacobians[1][c][c]),
-            };
-            largest = larger(largest, speed);
             let carried = dt * passing.value[c] - 0.5 * swept * (left[c] + right[c]);
-            carried - 0.5 * speed * (right[c] - left[c])
+            carried - 0.5 * speeds[c] * (right[c] - left[c])
         });
-        (flux, largest)
+        (flux, speeds.into_iter().fold(0.0, larger))
     }
 
     /// What leaves through open sides.

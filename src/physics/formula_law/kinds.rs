@@ -1,5 +1,6 @@
 //! What each equation of a study is, as its formulas tell.
 
+use crate::formula::Formula;
 use crate::physics::finite_volumes::Limited;
 use crate::physics::formula_pde::{Formulas, Scheme};
 use crate::physics::sides::Open;
@@ -7,10 +8,14 @@ use crate::physics::sides::Open;
 /// What the unknowns of some equations are.
 pub(super) struct Kinds<const B: usize> {
     pub limited: Limited<B>,
+    /// Those whose fluxes are limited where cells are too wide for central ones.
+    pub damped: [bool; B],
     /// Those that diffuse alike in all directions, in Cartesian coordinates: cells along a radius have another mass.
     pub shares: [bool; B],
     /// Those that are only carried and diffused.
     pub keeps_range: [bool; B],
+    /// Those with a source that is the sum of a function of place and time and of one of unknowns and time.
+    pub loaded: [bool; B],
     /// Those that have a source, no term that takes gradients, and no flux that is given on a side.
     pub reacts: [bool; B],
     /// The sides through which something flows that is not given there.
@@ -43,6 +48,10 @@ impl<const B: usize> Kinds<B> {
             };
             !has_source(c) && own && is_plain(c) && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
         };
+        // derivatives by unknowns follow all quantities themselves, unknown by unknown
+        let by_unknown = |c: usize, e: usize| &nodal[((D + 2) * (1 + e) + D + 1) * B + c];
+        let on_place = |formula: &Formula| (0..D).any(|d| formula.depends_on(d));
+        let is_loaded = |c: usize| on_place(&nodal[(D + 1) * B + c]) && !(0..B).any(|e| on_place(by_unknown(c, e)));
         let is_fed = |c: usize| sides[c].as_flattened().iter().any(|end| matches!(end, Open::Flux(_)));
         let opens = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
@@ -53,8 +62,16 @@ impl<const B: usize> Kinds<B> {
                 implicit: (0..B).any(|c| !limited[c] || changed(c)),
                 coupled: (0..B).any(|c| limited[c] && (changed(c) || by_others(c))),
             },
-            shares: std::array::from_fn(|c| cartesian && diffuses(c) && !limited[c] && !terms.has_storage(c)),
+            damped: limited.map(|limited| !limited && scheme.is_none()),
+            shares: std::array::from_fn(|c| {
+                !(std::env::var("NOSHARE").is_ok() && has_source(c))
+                    && cartesian
+                    && diffuses(c)
+                    && !limited[c]
+                    && !terms.has_storage(c)
+            }),
             keeps_range: std::array::from_fn(keeps_range),
+            loaded: std::array::from_fn(|c| cartesian && is_loaded(c)),
             reacts: std::array::from_fn(|c| has_source(c) && is_plain(c) && !is_fed(c)),
             open: (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(opens).collect(),
         }

@@ -62,9 +62,9 @@ where
     fn unresolved_flux(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Option<(usize, usize, f64)> {
         let (lattice, values) = (mesh.lattice(), u.values().as_chunks::<B>().0);
         let nodes = self.nodes(t, &mesh.images(), values);
-        let limited = self.limited().unknowns;
+        let (limited, damped) = (self.limited().unknowns, self.damped);
         let mut worst: Option<(usize, usize, f64)> = None;
-        for c in (0..B).filter(|&c| !limited[c]) {
+        for c in (0..B).filter(|&c| !limited[c] && !damped[c]) {
             let [low, high] = u.component(c).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)]);
             for (axis, s) in lattice.strides().into_iter().enumerate() {
                 let inside = |k: &usize| lattice.node(*k)[axis] + 1 < lattice.nodes()[axis];
