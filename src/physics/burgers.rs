@@ -228,6 +228,10 @@ impl Law<1> for Burgers {
         [true]
     }
 
+    fn has_own_flux(&self) -> [bool; 1] {
+        [true]
+    }
+
     fn side(&self, t: f64, x: [f64; 2], _beyond: [[bool; 2]; 2]) -> [Option<f64>; 1] {
         [self.side_value(t, x)]
     }

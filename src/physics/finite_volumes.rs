@@ -127,6 +127,10 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn damped(&self) -> [bool; B] {
         [false; B]
     }
+    /// The unknowns whose flux is a function of themselves alone, and not of place.
+    fn has_own_flux(&self) -> [bool; B] {
+        [false; B]
+    }
     /// How it is stepped in time.
     fn stepper(&self) -> Stepper {
         Stepper::Trapezoid

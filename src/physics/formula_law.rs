@@ -36,6 +36,7 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     stepper: Stepper,
     limited: Limited<B>,
     damped: [bool; B],
+    has_own_flux: [bool; B],
     bounds: Bounds<D, B>,
     terms: Terms<D, B>,
     layers: Layers<P, B>,
@@ -59,7 +60,8 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Kinds { limited, damped, shares, keeps_range, loaded, reacts, open } = Kinds::of(&formulas, cartesian);
+        let Kinds { limited, damped, has_own_flux, shares, keeps_range, loaded, reacts, open } =
+            Kinds::of(&formulas, cartesian);
         let Formulas { names, nodal, initial, sides, exact, terms, bounds, .. } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
@@ -70,6 +72,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
             layers: Layers::new(std::array::from_fn(|c| &nodal[Self::DIFFUSIVITY * B + c])),
             limited,
             damped,
+            has_own_flux,
             bounds: Bounds::new(
                 &names,
                 &bounds,
@@ -357,6 +360,10 @@ where
 
     fn damped(&self) -> [bool; B] {
         self.damped
+    }
+
+    fn has_own_flux(&self) -> [bool; B] {
+        self.has_own_flux
     }
 
     fn has_layers(&self) -> bool {

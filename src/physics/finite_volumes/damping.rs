@@ -13,11 +13,11 @@ use crate::parallel;
 /// ```
 ///
 /// D (u_k − u_i) is what diffusion brings through a face in half a step, and a the largest absolute eigenvalue of
-/// ½ Δt F′·N − ½ s at both nodes and, where an unknown is alone in its flux, of the secant between them: a central flux
-/// creates no extremum where a ≤ 2 D, which is to say where the cell Péclet number is at most 2. It is at most four
-/// times the largest ½ Δt F′·N along the axis: what the mesh alone would sweep over the solution is bounded elsewhere,
-/// however short the step is. u₋ is the limited value at the face on the side of i, from where the flow comes
-/// ([`increments`](super::reconstruction::increments)), which passes where D is 0. Where the flow comes from both
+/// ½ Δt F′·N − ½ s at both nodes and, where a flux is a function of its unknown alone, of the secant between them: a
+/// central flux creates no extremum where a ≤ 2 D, which is to say where the cell Péclet number is at most 2. It is at
+/// most four times the largest ½ Δt F′·N along the axis: what the mesh alone would sweep over the solution is bounded
+/// elsewhere, however short the step is. u₋ is the limited value at the face on the side of i, from where the flow
+/// comes ([`increments`](super::reconstruction::increments)), which passes where D is 0. Where the flow comes from both
 /// sides, the larger of both θ counts.
 pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[f64; B]; D]>);
 
@@ -25,6 +25,9 @@ pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[f64; B]; D]>);
 const SWEEPS: f64 = 4.0;
 /// The least θ: less would take away more than half of the diffusion that upwind fluxes have.
 const LEAST: f64 = -0.5;
+
+/// Differences of u below this share of its size are rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// How fast an unknown is carried through a face, in units of [`Damping`].
 #[derive(Debug, Clone, Copy, Default)]
@@ -50,7 +53,7 @@ impl<const D: usize> Half<'_, D> {
     ) -> Damping<B, D> {
         let (patch, wanted) = (*self.cells.patch(), law.damped());
         if !wanted.contains(&true) {
-            return Damping(Vec::new());
+            return Damping::none();
         }
         let (strides, row) = (patch.padded_strides(), patch.pencil_len() + 2);
         let mut speeds = vec![[[Speed::default(); B]; D]; u.len()];
@@ -104,7 +107,7 @@ impl<const D: usize> Half<'_, D> {
         axis: usize,
     ) -> [Speed; B] {
         let (normal, half, swept) = (self.cells.normals()[i][axis], 0.5 * self.dt, 0.5 * self.swept[i][axis]);
-        let (wanted, area) = (law.damped(), length(normal));
+        let (wanted, has_own_flux, area) = (law.damped(), law.has_own_flux(), length(normal));
         let through = [i, k].map(|at| law.convection(&view.nodes[at], &view.nodes[at], normal));
         // relative to nodes that stay, and to those of the mesh
         let [still, moving] = [0.0, swept].map(|swept| {
@@ -123,11 +126,15 @@ impl<const D: usize> Half<'_, D> {
         let passing = law.convection(&view.nodes[i], &view.nodes[k], normal);
         std::array::from_fn(|c| {
             let change = u[k][c] - u[i][c];
-            let slope = |more: f64| if change == 0.0 { 0.0 } else { half * more / change };
+            let counts = change.abs() > ROUNDING * (u[i][c].abs() + u[k][c].abs());
+            let slope = |more: f64| if counts { half * more / change } else { 0.0 };
             let own = slope(0.5 * (through[0].value[c] + through[1].value[c]) - passing.value[c]);
-            let alone = still.iter().all(|j| (0..B).all(|e| e == c || j[c][e] == 0.0));
-            if !alone || !view.stored.is_empty() {
-                return Speed { flow: largest[0][c] / area, relative: largest[1][c], own, from: [true; 2] };
+            if !has_own_flux[c] || !view.stored.is_empty() {
+                let carried: [f64; 2] = std::array::from_fn(|end| moving[end][c][c]);
+                let alone = moving.iter().all(|j| (0..B).all(|e| e == c || (j[c][e] == 0.0 && j[e][c] == 0.0)));
+                let comes = |sign: f64| !alone || carried.iter().any(|speed| sign * speed > 0.0);
+                let from = [comes(1.0), comes(-1.0)];
+                return Speed { flow: largest[0][c] / area, relative: largest[1][c], own, from };
             }
             let secant = slope(through[1].value[c] - through[0].value[c]);
             let relative = [moving[0][c][c], moving[1][c][c], secant - swept];
@@ -152,6 +159,10 @@ impl Speed {
 }
 
 impl<const B: usize, const D: usize> Damping<B, D> {
+    pub fn none() -> Self {
+        Self(Vec::new())
+    }
+
     /// Adds what it takes away from fluxes with values at all places.
     pub fn add_to<N>(&self, view: &mut View<N, B, D>, patch: &Patch<D>, u: &[[f64; B]]) {
         let strides = patch.padded_strides();

@@ -139,7 +139,7 @@ impl<const D: usize> Half<'_, D> {
         Self: Around<D, S>,
         Mesh<D>: Cells<D>,
     {
-        let loads = self.loads(law, excess, u)?;
+        let loads = self.loads(law, u)?;
         let mut view = self.view::<S, B, L>(law, u)?;
         self.damping(law, &view, u).add_to(&mut view, self.cells.patch(), u);
         let algebraic = law.algebraic();

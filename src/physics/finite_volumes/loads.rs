@@ -1,34 +1,37 @@
 //! Sources of place, integrated over cells.
 
-use super::{Excess, Half, Law};
+use super::mass::shares;
+use super::{Half, Law};
 use crate::error::Failure;
-use crate::geometry::{Cells, Mesh, determinant, padded, strides};
+use crate::geometry::{Cells, Mesh, determinant, strides};
 
 /// Gauss points along each axis of a cell, on (0, 1), and their weights.
 const POINTS: [(f64, f64); 3] = [(0.1127016653792583, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.8872983346207417, 5.0 / 18.0)];
+
+/// Where σ is less, cells are equal but for rounding.
+const EQUAL: f64 = 1e-9;
 
 impl<const D: usize> Half<'_, D>
 where
     Mesh<D>: Cells<D>,
 {
-    /// ½ Δt of what a source of place f brings to each node beyond A f and its share of [`Excess`]; empty where a law
-    /// has none
+    /// ½ Δt of what a source of place f brings to each node beyond M f; empty where a law has none
     ///
     /// ```text
-    /// ∫ (f − I f) φ_i + (C₀ f)_i − (C f)_i
+    /// Σ_cells σ ∫ (f − I f) φ_i,   σ = the largest 1 − (h_min/h)² of both axes
     /// ```
     ///
-    /// I f is linear between nodes along the axes, φ_i the hat function of node i, and C₀ is [`Excess`] with h_min = 0:
-    /// with A f this is ∫ f φ_i where nodes stand in the middle of their dual cells. A f alone adds up to the trapezoid
-    /// rule, which is accurate for smooth f on equal cells but not where cells grow, so that what sources and fluxes
-    /// should balance would not. On a line, diffusion with this load is exact at the nodes.
+    /// I f is linear between nodes along the axes, φ_i the hat function of node i, and h_min the smallest cell of a
+    /// lattice line, as in [`Excess`]. M f adds up to the trapezoid rule, which is accurate for smooth f on equal cells,
+    /// but not where cells grow: what sources and fluxes should balance would not. With σ = 1 this and M f are ∫ f φ_i,
+    /// for which diffusion is exact at the nodes of a line; with σ = 0 nothing is added, since on equal cells time
+    /// derivatives are taken at the nodes, too, and both errors cancel.
     ///
     /// # Source
     /// Strang and Fix, *An Analysis of the Finite Element Method* (1973), 1.6.
-    pub(super) fn loads<const S: usize, const B: usize, L: Law<B, D>>(
+    pub(super) fn loads<const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
-        excess: Option<&Excess<B, D, S>>,
         u: &[[f64; B]],
     ) -> Result<Vec<[f64; B]>, Failure> {
         let patch = self.cells.patch();
@@ -36,45 +39,32 @@ where
         let Some(first) = patch.places().next().filter(|_| law.has_loads()) else { return Ok(Vec::new()) };
         let lattice = self.mesh.lattice();
         let at = |x: &[[f64; D]]| law.loads(self.t, self.mesh, x, u[first]);
-        let nodal = at(&self.mesh.images())?;
         let (cells, closed) = (lattice.cells(), self.mesh.closed());
         let corners =
             Corners { cells: strides(cells), nodes: lattice.strides(), closed: strides(cells.map(|n| n + 1)) };
         let corner = |cell: usize, corner: usize| corners.of(cell, corner, cells, lattice.nodes());
-        let inner: Vec<Gauss<D>> = (0..cells.iter().product::<usize>())
-            .flat_map(|cell| {
+        let stretched = shares(self.mesh).into_iter().map(|shares| 6.0 * shares.into_iter().fold(0.0, f64::max));
+        let stretched: Vec<(usize, f64)> = stretched.enumerate().filter(|(_, sigma)| *sigma > EQUAL).collect();
+        let count = POINTS.len().pow(D as u32);
+        let inner: Vec<Gauss<D>> = stretched
+            .iter()
+            .flat_map(|&(cell, _)| {
                 let x: [[f64; D]; 8] = std::array::from_fn(|n| closed[corner(cell, n % (1 << D))[1]]);
-                (0..POINTS.len().pow(D as u32)).map(move |n| Gauss::of(&x, n))
+                (0..count).map(move |n| Gauss::of(&x, n))
             })
             .collect();
         let x: Vec<[f64; D]> = inner.iter().map(|gauss| self.mesh.image(gauss.x)).collect();
-        let values = at(&x)?;
-        let (half, count) = (0.5 * self.dt, POINTS.len().pow(D as u32));
+        let (nodal, values) = (at(&self.mesh.images())?, at(&x)?);
         let mut loads = vec![[0.0; B]; nodal.len()];
-        for (cell, volume) in self.mesh.volumes().enumerate() {
+        for ((&(cell, sigma), inner), values) in stretched.iter().zip(inner.chunks(count)).zip(values.chunks(count)) {
             let places: [usize; 8] = std::array::from_fn(|n| corner(cell, n % (1 << D))[0]);
             let places = &places[..1 << D];
-            for (from, &node) in places.iter().enumerate() {
-                for (to, &other) in places.iter().enumerate() {
-                    let apart = (from ^ to).count_ones() as i32;
-                    let mass = (1.0_f64 / 6.0).powi(apart) * (1.0_f64 / 3.0).powi(D as i32 - apart);
-                    let lumped = if from == to { 0.5_f64.powi(D as i32) } else { 0.0 };
-                    (0..B).for_each(|c| loads[node][c] += half * volume * (mass - lumped) * nodal[other][c]);
-                }
-            }
-            for (gauss, value) in inner.iter().zip(&values).skip(cell * count).take(count) {
+            for (gauss, value) in inner.iter().zip(values) {
                 for c in 0..B {
                     let linear: f64 = places.iter().zip(gauss.shapes).map(|(n, shape)| shape * nodal[*n][c]).sum();
-                    let beyond = half * gauss.weight * (value[c] - linear);
+                    let beyond = 0.5 * self.dt * sigma * gauss.weight * (value[c] - linear);
                     places.iter().zip(gauss.shapes).for_each(|(n, shape)| loads[*n][c] += shape * beyond);
                 }
-            }
-        }
-        if let Some(excess) = excess {
-            let padded = padded(lattice, &nodal, [[0.0; B]; D]);
-            for ((i, k), load) in patch.places().enumerate().zip(&mut loads) {
-                let known = excess.product(i, k, |n| padded[n]);
-                (0..B).for_each(|c| load[c] -= half * known[c]);
             }
         }
         Ok(loads)

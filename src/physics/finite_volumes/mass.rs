@@ -124,7 +124,7 @@ pub(super) fn stretched<const D: usize>([old, new]: [&DualCells<D>; 2], [from, t
 }
 
 /// w/h of each cell along each axis: at most a sixth, so that A + C is positive definite.
-fn shares<const D: usize>(mesh: &Mesh<D>) -> Vec<[f64; D]> {
+pub(super) fn shares<const D: usize>(mesh: &Mesh<D>) -> Vec<[f64; D]> {
     let (cells, x) = (mesh.lattice().cells(), mesh.closed());
     let (cell_strides, corner_strides) = (strides(cells), strides(cells.map(|n| n + 1)));
     let count: usize = cells.iter().product();

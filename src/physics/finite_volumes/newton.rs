@@ -1,5 +1,6 @@
 //! Newton's method for the implicit part of a step.
 
+use super::damping::Damping;
 use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Side};
 use crate::error::Failure;
 use crate::geometry::{Cells, Mesh, Patch};
@@ -9,6 +10,8 @@ use crate::work::Work;
 
 /// Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
+/// Newton steps up to which the damping is that of the newest values.
+const DAMPED_ANEW: usize = 1;
 /// Newton's method is given up once residuals are larger than this multiple of those at its start.
 const DIVERGED: f64 = 10.0;
 /// Residuals below so many roundings of the largest terms are rounding.
@@ -50,12 +53,15 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
         let mut work = Work::default();
-        // by the values at first, so that Newton's method sees smooth functions
-        let mut damping = None;
-        let loads = half.loads(law, excess, u)?;
+        // that of the first values would make a step of the first order; later it stays, so that Newton's method ends
+        let mut damping = Damping::none();
+        let loads = half.loads(law, u)?;
         let stalled = loop {
             let mut view = half.view::<S, B, L>(law, u)?;
-            damping.get_or_insert_with(|| half.damping(law, &view, u)).add_to(&mut view, &patch, u);
+            if work.newton_iterations <= DAMPED_ANEW {
+                damping = half.damping(law, &view, u);
+            }
+            damping.add_to(&mut view, &patch, u);
             half.residual(law, excess, &view, [known, &loads], u, &mut residual);
             for side in sides {
                 for (residual, given) in residual[side.i].iter_mut().zip(side.given) {

@@ -83,7 +83,12 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let Motion { t, dt, old, new } = motion;
         let known = self.newest.take().filter(|(mesh, _)| mesh == old).map(|(_, cells)| cells);
         let (old, new) = (Level::new(law, t, old, known), Level::new(law, t + dt, new, None));
-        let u = padded(old.mesh.lattice(), start, [[0.0; B]; D]);
+        let mut u = padded(old.mesh.lattice(), start, [[0.0; B]; D]);
+        // initial values may contradict those given on sides, which hold from the first moment on
+        for side in sides(law, t, old.mesh) {
+            (0..B).for_each(|c| u[side.k][c] = side.given[c].unwrap_or(u[side.k][c]));
+        }
+        <Half<'_, D> as Around<D, S>>::repeat_sides(old.cells.patch(), &mut u);
         let (values, work) = match law.limited().unknowns.contains(&true) {
             true => self.carried(law, motion, [&old, &new], u),
             false => self.solved(law, [&old, &new], u, &[]),

@@ -10,12 +10,14 @@ pub(super) struct Kinds<const B: usize> {
     pub limited: Limited<B>,
     /// Those whose fluxes are limited where cells are too wide for central ones.
     pub damped: [bool; B],
+    /// Those whose flux is a function of themselves alone.
+    pub has_own_flux: [bool; B],
     /// Those that diffuse alike in all directions, in Cartesian coordinates: cells along a radius have another mass.
     pub shares: [bool; B],
+    /// Those of these with a source that is the sum of a function of place and time and of one of unknowns and time.
+    pub loaded: [bool; B],
     /// Those that are only carried and diffused.
     pub keeps_range: [bool; B],
-    /// Those with a source that is the sum of a function of place and time and of one of unknowns and time.
-    pub loaded: [bool; B],
     /// Those that have a source, no term that takes gradients, and no flux that is given on a side.
     pub reacts: [bool; B],
     /// The sides through which something flows that is not given there.
@@ -36,22 +38,29 @@ impl<const B: usize> Kinds<B> {
         });
         let changed = |c: usize| diffuses(c) || has_source(c) || by_gradients(c);
         let by_others = |c: usize| (0..D).any(|d| (0..B).any(|e| !limited[e] && nodal[d * B + c].depends_on(D + e)));
+        let flux_is_own = |c: usize| {
+            let mut fluxes = (0..D).map(|d| &nodal[d * B + c]);
+            fluxes.all(|flux| (0..D + B).all(|v| v == D + c || !flux.depends_on(v)))
+        };
         let keeps_range = |c: usize| {
-            let fluxes = || (0..D).map(|d| &nodal[d * B + c]);
-            let flows = fluxes().any(|flux| flux.text() != "0");
-            // of the unknown alone, so that no place draws it together; else where the flux ends it would pile up
-            let own = fluxes().all(|flux| (0..D + B).all(|v| v == D + c || !flux.depends_on(v)));
+            let flows = (0..D).any(|d| nodal[d * B + c].text() != "0");
             let ends = |end: &Open| match end {
                 Open::Value(_) | Open::Outflow => true,
                 Open::Closed => !flows,
                 Open::Flux(_) => false,
             };
-            !has_source(c) && own && is_plain(c) && (cartesian || !flows) && sides[c].as_flattened().iter().all(ends)
+            // of the unknown alone, so that no place draws it together; else where the flux ends it would pile up
+            !has_source(c)
+                && flux_is_own(c)
+                && is_plain(c)
+                && (cartesian || !flows)
+                && sides[c].as_flattened().iter().all(ends)
         };
         // derivatives by unknowns follow all quantities themselves, unknown by unknown
         let by_unknown = |c: usize, e: usize| &nodal[((D + 2) * (1 + e) + D + 1) * B + c];
         let on_place = |formula: &Formula| (0..D).any(|d| formula.depends_on(d));
         let is_loaded = |c: usize| on_place(&nodal[(D + 1) * B + c]) && !(0..B).any(|e| on_place(by_unknown(c, e)));
+        let shares = |c: usize| cartesian && diffuses(c) && !limited[c] && !terms.has_storage(c);
         let is_fed = |c: usize| sides[c].as_flattened().iter().any(|end| matches!(end, Open::Flux(_)));
         let opens = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
@@ -63,15 +72,10 @@ impl<const B: usize> Kinds<B> {
                 coupled: (0..B).any(|c| limited[c] && (changed(c) || by_others(c))),
             },
             damped: limited.map(|limited| !limited && scheme.is_none()),
-            shares: std::array::from_fn(|c| {
-                !(std::env::var("NOSHARE").is_ok() && has_source(c))
-                    && cartesian
-                    && diffuses(c)
-                    && !limited[c]
-                    && !terms.has_storage(c)
-            }),
+            has_own_flux: std::array::from_fn(flux_is_own),
+            shares: std::array::from_fn(shares),
             keeps_range: std::array::from_fn(keeps_range),
-            loaded: std::array::from_fn(|c| cartesian && is_loaded(c)),
+            loaded: std::array::from_fn(|c| shares(c) && is_loaded(c)),
             reacts: std::array::from_fn(|c| has_source(c) && is_plain(c) && !is_fed(c)),
             open: (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(opens).collect(),
         }

@@ -29,6 +29,14 @@ impl Law<1> for Tight {
         Law::diffusivity(&self.0, a, b)
     }
 
+    fn damped(&self) -> [bool; 1] {
+        self.0.damped()
+    }
+
+    fn has_own_flux(&self) -> [bool; 1] {
+        self.0.has_own_flux()
+    }
+
     fn side(&self, t: f64, x: [f64; 2], beyond: [[bool; 2]; 2]) -> [Option<f64>; 1] {
         self.0.side(t, x, beyond)
     }
