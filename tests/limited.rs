@@ -1,22 +1,9 @@
 //! Limited fluxes: no new extrema, whatever the mesh does; and bounds.
 
-use driftmesh::study::{Kind, MovingLine, MovingMesh, MovingRun, Source};
+mod runs;
 
-const HEAD: &str = "[study]\nname = \"limited\"\nkind = \"moving-mesh\"\n";
-
-fn line(text: &str) -> MovingRun<1> {
-    let study = MovingLine::from_source(&Source::new("line.toml", format!("{HEAD}{text}"))).unwrap();
-    let (run, failure) = study.compute().unwrap();
-    assert!(failure.is_none(), "{failure:?}");
-    run
-}
-
-fn plane(text: &str) -> MovingRun {
-    let study = MovingMesh::from_source(&Source::new("plane.toml", format!("{HEAD}{text}"))).unwrap();
-    let (run, failure) = study.compute().unwrap();
-    assert!(failure.is_none(), "{failure:?}");
-    run
-}
+use driftmesh::study::{Kind, MovingLine, MovingRun, Source};
+use runs::{HEAD, line, plane};
 
 /// The least and the largest value of an unknown.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -1,23 +1,10 @@
 //! Conditions by side for equations given by formulas.
 
+mod runs;
+
 use driftmesh::error::Error;
-use driftmesh::study::{Kind, MovingLine, MovingMesh, Source};
-
-const HEAD: &str = "[study]\nname = \"sides\"\nkind = \"moving-mesh\"\n";
-
-fn line(text: &str) -> driftmesh::study::MovingRun<1> {
-    let study = MovingLine::from_source(&Source::new("line.toml", format!("{HEAD}{text}"))).unwrap();
-    let (run, failure) = study.compute().unwrap();
-    assert!(failure.is_none(), "{failure:?}");
-    run
-}
-
-fn plane(text: &str) -> driftmesh::study::MovingRun {
-    let study = MovingMesh::from_source(&Source::new("plane.toml", format!("{HEAD}{text}"))).unwrap();
-    let (run, failure) = study.compute().unwrap();
-    assert!(failure.is_none(), "{failure:?}");
-    run
-}
+use driftmesh::study::{Kind, MovingMesh, Source};
+use runs::{HEAD, line, plane};
 
 /// A reactor with Danckwerts' inlet and a closed outlet, u_t + 5 u_x = u_xx − 2u with 5u − u_x = 5 at x = 0 and 0 at
 /// x = 1: at rest u = A e^{px} + B e^{qx}, p and q = (5 ± √33)/2. The error is of order 2.

@@ -1,22 +1,9 @@
 //! Tensors, cross diffusion, gradients in fluxes, diffusivities and sources, storage: against exact solutions.
 
-use driftmesh::study::{Kind, MovingLine, MovingMesh, MovingRun, Source};
+mod runs;
 
-const HEAD: &str = "[study]\nname = \"terms\"\nkind = \"moving-mesh\"\n";
-
-fn line(text: &str) -> MovingRun<1> {
-    let study = MovingLine::from_source(&Source::new("line.toml", format!("{HEAD}{text}"))).unwrap();
-    let (run, failure) = study.compute().unwrap();
-    assert!(failure.is_none(), "{failure:?}");
-    run
-}
-
-fn plane(text: &str) -> MovingRun {
-    let study = MovingMesh::from_source(&Source::new("plane.toml", format!("{HEAD}{text}"))).unwrap();
-    let (run, failure) = study.compute().unwrap();
-    assert!(failure.is_none(), "{failure:?}");
-    run
-}
+use driftmesh::study::{Kind, MovingMesh, Source};
+use runs::{HEAD, line, plane};
 
 /// The order of the largest error from n to 2n cells and half the step, of a mesh that is moved about.
 fn order(pde: &str) -> f64 {
