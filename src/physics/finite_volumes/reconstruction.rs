@@ -12,7 +12,7 @@ use crate::parallel;
 /// Δ₊ = min(½ h₊ |2 g₊ + g₋| / 3, 2 |d₋|, |d₊|),   g = d/h
 /// ```
 ///
-/// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ, but for [smooth](is_smooth) extrema,
+/// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ, but for [smooth](smoothness) extrema,
 /// which have Δ₊ without bounds. A smooth profile has two thirds of
 /// the slope on its own side and one third of the other, which is of the third order on equal cells; the bounds keep
 /// what stands at a face between the nodes.
@@ -20,7 +20,7 @@ use crate::parallel;
 /// # Source
 /// Koren, *A robust upwind discretization method for advection, diffusion and source terms* (1993).
 #[inline(always)]
-pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2], smooth: bool) -> [f64; 2] {
+pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2], smooth: f64) -> [f64; 2] {
     let [g, k] = [below / h_below, above / h_above];
     let towards = |h: f64, own: f64, other: f64| h * (2.0 * own + other) / 6.0;
     let free = [towards(h_below, g, k), towards(h_above, k, g)];
@@ -28,15 +28,23 @@ pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2],
         let within = |step: f64, own: f64, other: f64| step.abs().min(own.abs()).min(2.0 * other.abs()).copysign(own);
         return [within(free[0], below, above), within(free[1], above, below)];
     }
-    if smooth { free } else { [0.0; 2] }
+    free.map(|free| smooth * free)
 }
 
-/// Whether second derivatives at three nodes in a row are those of a smooth extremum: of one sign, and the smallest at
-/// least half of the largest. Where a limiter would cut off its peak, it is left as it is.
+/// How much second derivatives at three nodes in a row are those of a smooth extremum: wholly where they have one sign
+/// and the smallest is at least half of the largest, and not at all where it is less than a third. Where a limiter
+/// would cut off its peak, it is left as it is.
 #[inline(always)]
-pub(super) fn is_smooth(seconds: [f64; 3]) -> bool {
+pub(super) fn smoothness(seconds: [f64; 3]) -> f64 {
     let [least, most] = seconds.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, m], s| [l.min(*s), m.max(*s)]);
-    least > 0.0 && 2.0 * least >= most || most < 0.0 && 2.0 * most <= least
+    let ratio = if least > 0.0 {
+        least / most
+    } else if most < 0.0 {
+        most / least
+    } else {
+        0.0
+    };
+    (6.0 * ratio - 2.0).clamp(0.0, 1.0)
 }
 
 /// Where the values are of which those at faces are made.
@@ -72,7 +80,7 @@ impl<const B: usize, const D: usize> Places<'_, B, D> {
                     let h = [self.distance(k - s, k), self.distance(k, k + s)];
                     for c in (0..B).filter(|&c| wanted[c]) {
                         let differences = [u[k][c] - u[k - s][c], u[k + s][c] - u[k][c]];
-                        let smooth = is_smooth([k - s, k, k + s].map(|k| seconds[k][d][c]));
+                        let smooth = smoothness([k - s, k, k + s].map(|k| seconds[k][d][c]));
                         let [below, above] = increments(differences, h, smooth);
                         (steps[d][0][c], steps[d][1][c]) = (below, above);
                     }
@@ -187,23 +195,23 @@ mod tests {
     #[test]
     fn linear_profiles_are_kept() {
         for [h, k] in [[1.0, 1.0], [0.3, 0.5], [2.0, 1.2]] {
-            let [below, above] = increments([3.0 * h, 3.0 * k], [h, k], false);
+            let [below, above] = increments([3.0 * h, 3.0 * k], [h, k], 0.0);
             assert!((below - 1.5 * h).abs() < 1e-14 && (above - 1.5 * k).abs() < 1e-14);
         }
-        assert_eq!(increments([1.0, -1.0], [1.0, 1.0], false), [0.0; 2]);
-        assert_eq!(increments([0.0, 1.0], [1.0, 1.0], false), [0.0; 2]);
+        assert_eq!(increments([1.0, -1.0], [1.0, 1.0], 0.0), [0.0; 2]);
+        assert_eq!(increments([0.0, 1.0], [1.0, 1.0], 0.0), [0.0; 2]);
         // beside a jump by a hundred
-        assert_eq!(increments([-1.0, -100.0], [1.0, 1.0], false), [-1.0, -2.0]);
+        assert_eq!(increments([-1.0, -100.0], [1.0, 1.0], 0.0), [-1.0, -2.0]);
     }
 
     /// A parabola has a smooth peak, a hat, a step and a plateau have none.
     #[test]
     fn smooth_peaks_are_told_from_others() {
-        assert!(is_smooth([-2.0, -2.0, -2.0]) && is_smooth([1.0, 1.9, 1.5]));
+        assert_eq!([[-2.0, -2.0, -2.0], [1.0, 1.9, 1.5]].map(smoothness), [1.0; 2]);
         for sharp in [[0.0, -2.0, 0.0], [1.0, -1.0, 0.0], [0.0; 3], [-1.0, -3.0, -1.0]] {
-            assert!(!is_smooth(sharp), "{sharp:?}");
+            assert!(smoothness(sharp) < 1e-9, "{sharp:?}");
         }
-        let [below, above] = increments([1.0, -1.0], [1.0, 1.0], true);
+        let [below, above] = increments([1.0, -1.0], [1.0, 1.0], 1.0);
         assert_eq!((below, above), (1.0 / 6.0, -1.0 / 6.0));
     }
 
