@@ -102,7 +102,7 @@ impl<const D: usize> Half<'_, D> {
             }
             for (k, damping) in (q * row..).zip(damping).skip(1).take(row - 2) {
                 for (axis, stride) in strides.into_iter().enumerate().filter(|&(axis, _)| patch.has_face(k, axis)) {
-                    for c in 0..B {
+                    for c in (0..B).filter(|&c| wanted[c]) {
                         let change = u[k + stride][c] - u[k][c];
                         let (excess, a) = excess(k, axis, c, change);
                         if a > 0.0 && excess > 0.0 && change != 0.0 {

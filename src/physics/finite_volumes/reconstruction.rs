@@ -28,7 +28,8 @@ pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2],
         let within = |step: f64, own: f64, other: f64| step.abs().min(own.abs()).min(2.0 * other.abs()).copysign(own);
         return [within(free[0], below, above), within(free[1], above, below)];
     }
-    free.map(|free| smooth * free)
+    // beyond a bounded side lies nothing, and no slope
+    if smooth > 0.0 { free.map(|free| smooth * free) } else { [0.0; 2] }
 }
 
 /// How much second derivatives at three nodes in a row are those of a smooth extremum: wholly where they have one sign
