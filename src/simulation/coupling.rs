@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn the_estimate_is_the_error() {
         let formula = r#"{"unknowns": ["u", "v"], "flux": {"u": ["u^2", "u"]}, 
-            "diffusivity": {"u": "0.02", "v": "0.01"}, "source": {"v": "u*(1-v)"}, "scheme": "central",
+            "diffusivity": {"u": "0.02", "v": "0.01"}, "source": {"v": "u*(1-v)"},
             "initial": {"u": "2+sin(2*pi*x)*cos(2*pi*y)", "v": "0.2"}}"#;
         let formula: FormulaPde = serde_json::from_str(formula).unwrap();
         let water = |form| {
