@@ -1,7 +1,9 @@
 //! A user's equation as a conservation law.
 
+mod checks;
 mod kinds;
 mod layers;
+mod loads;
 mod stepped;
 
 use super::bounds::Bounds;
@@ -9,7 +11,6 @@ use super::finite_volumes::{
     Block, Crossing, FiniteVolumes, Law, Limited, Point, Side, Sloped, Steep, Stepper, Stored,
 };
 use super::formula_pde::Formulas;
-use super::prescribed::evaluate;
 use super::sides::Open;
 use super::terms::Terms;
 use crate::error::{Failure, Result};
@@ -18,6 +19,7 @@ use crate::geometry::{Cells, DualCells, Mesh, dot, length, strides};
 use crate::parallel;
 use kinds::Kinds;
 use layers::Layers;
+use loads::Loads;
 
 /// B unknowns in D dimensions. P = D + B is the number of values that the formulas take at a node, K = (D + 2) B (B +
 /// 1) that of the values they give.
@@ -40,17 +42,12 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     bounds: Bounds<D, B>,
     terms: Terms<D, B>,
     layers: Layers<P, B>,
-    /// Sources that have a part of place and time alone, in addition to one of unknowns and time.
-    loads: [Option<Program<P, 1>>; B],
+    loads: Loads<P, B>,
     /// The unknowns that are only carried and diffused.
     keeps_range: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
 }
-
-/// A diffusivity may be negative by up to this share of its largest value, as it may be where it is a function of a
-/// solution that oscillates slightly around zero.
-const WIGGLES: f64 = 1e-3;
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Default> FormulaLaw<D, B, P, K, Solver> {
     /// Indices of the quantities of an equation, in the order of [`Formulas::nodal`], in which fluxes come first.
@@ -67,7 +64,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
             shares,
-            loads: std::array::from_fn(|c| loaded[c].then(|| Program::new([&nodal[Self::SOURCE * B + c]]))),
+            loads: Loads::new(std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| loaded[c]))),
             terms: Terms::new(&terms, &names),
             layers: Layers::new(std::array::from_fn(|c| &nodal[Self::DIFFUSIVITY * B + c])),
             limited,
@@ -131,30 +128,6 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         }))
     }
 
-    /// Refuses a diffusivity that is more negative than oscillations of the solution may make it.
-    fn check_diffusivities(&self, mesh: &Mesh<D>, nodes: &[[f64; K]]) -> Result<(), Failure> {
-        for c in 0..B {
-            let values = || nodes.iter().map(|node| Self::value(node, Self::DIFFUSIVITY, c));
-            let [least, largest] = values().fold([0.0_f64; 2], |[l, h], value| [l.min(value), h.max(value.abs())]);
-            if least < -WIGGLES * largest {
-                let k = Self::node(mesh, values().position(|value| value == least).unwrap_or_default());
-                let (node, x) = mesh.told(k);
-                return Err(Failure::NotPositive { what: "the diffusivity of a formula", value: least, node, x });
-            }
-        }
-        Ok(())
-    }
-
-    fn check_exact(&self, t: f64, mesh: &Mesh<D>) -> Result<(), Failure> {
-        for (c, exact) in &self.exact {
-            let values = evaluate(exact, t, mesh);
-            if let Some(k) = values.iter().position(|[u]| !u.is_finite()) {
-                return Err(self.failure(format!("`pde.exact.{}`", self.names[*c]), values[k][0], mesh, k, None));
-            }
-        }
-        Ok(())
-    }
-
     /// The values given at a place on some sides; in a corner those of the first axis count.
     fn given(&self, t: f64, x: [f64; D], beyond: [[bool; 2]; D]) -> [Option<f64>; B] {
         let place: Vec<f64> = x.into_iter().chain([t]).collect();
@@ -165,19 +138,6 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
                 _ => None,
             })
         })
-    }
-
-    /// Refuses boundary values that are not finite.
-    fn check_sides(&self, t: f64, mesh: &Mesh<D>) -> Result<(), Failure> {
-        for k in mesh.lattice().sides() {
-            let beyond = mesh.lattice().beyond(k);
-            for (c, value) in self.given(t, mesh.image(mesh.x()[k]), beyond).into_iter().enumerate() {
-                if let Some(value) = value.filter(|value| !value.is_finite()) {
-                    return Err(self.failure(format!("`pde.boundary.{}`", self.names[c]), value, mesh, k, None));
-                }
-            }
-        }
-        Ok(())
     }
 }
 
@@ -326,22 +286,11 @@ where
     }
 
     fn has_loads(&self) -> bool {
-        self.loads.iter().any(Option::is_some)
+        self.loads.are_some()
     }
 
     fn loads(&self, t: f64, mesh: &Mesh<D>, x: &[[f64; D]], u: [f64; B]) -> Result<Vec<[f64; B]>, Failure> {
-        let mut loads = vec![[0.0; B]; x.len()];
-        parallel::for_each_piece(&mut loads, |begin, loads| {
-            let points: Vec<[f64; P]> = (x[begin..].iter().take(loads.len()))
-                .map(|x| std::array::from_fn(|v| if v < D { x[v] } else { u[v - D] }))
-                .collect();
-            let mut values = vec![[0.0]; points.len()];
-            for (c, program) in self.loads.iter().enumerate() {
-                let Some(program) = program else { continue };
-                program.eval_each(&points, &[t], &mut values);
-                loads.iter_mut().zip(&values).for_each(|(load, [value])| load[c] = *value);
-            }
-        });
+        let loads = self.loads.at(t, x, u);
         match loads.as_flattened().iter().position(|value| !value.is_finite()) {
             None => Ok(loads),
             Some(place) => {

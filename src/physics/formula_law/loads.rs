@@ -1,0 +1,36 @@
+//! Sources with a part that is a function of place and time alone.
+
+use crate::formula::{Formula, Program};
+use crate::parallel;
+
+/// Those of B unknowns, each a formula of the P values at a node: place first, then unknowns.
+pub(super) struct Loads<const P: usize, const B: usize> {
+    sources: [Option<Program<P, 1>>; B],
+}
+
+impl<const P: usize, const B: usize> Loads<P, B> {
+    pub fn new(sources: [Option<&Formula>; B]) -> Self {
+        Self { sources: sources.map(|source| source.map(|source| Program::new([source]))) }
+    }
+
+    pub fn are_some(&self) -> bool {
+        self.sources.iter().any(Option::is_some)
+    }
+
+    /// The sources at some places where the unknowns are u; 0 for those that are not of this kind.
+    pub fn at<const D: usize>(&self, t: f64, x: &[[f64; D]], u: [f64; B]) -> Vec<[f64; B]> {
+        let mut loads = vec![[0.0; B]; x.len()];
+        parallel::for_each_piece(&mut loads, |begin, loads| {
+            let points: Vec<[f64; P]> = (x[begin..].iter().take(loads.len()))
+                .map(|x| std::array::from_fn(|v| if v < D { x[v] } else { u[v - D] }))
+                .collect();
+            let mut values = vec![[0.0]; points.len()];
+            for (c, source) in self.sources.iter().enumerate() {
+                let Some(source) = source else { continue };
+                source.eval_each(&points, &[t], &mut values);
+                loads.iter_mut().zip(&values).for_each(|(load, [value])| load[c] = *value);
+            }
+        });
+        loads
+    }
+}
