@@ -266,23 +266,28 @@ mod tests {
     }
 
     /// For every stepper, on nodes that move, the estimate is the error against a hundred steps along the same paths,
-    /// and of the third order.
+    /// and of the third order. Limited fluxes have kinks where they change from one bound to another, and errors there
+    /// that no formula for smooth ones knows: a third of these is seen.
     #[test]
     fn the_estimate_is_the_error() {
-        let formula = r#"{"unknowns": ["u", "v"], "flux": {"u": ["u^2", "u"]}, 
-            "diffusivity": {"u": "0.02", "v": "0.01"}, "source": {"v": "u*(1-v)"},
-            "initial": {"u": "2+sin(2*pi*x)*cos(2*pi*y)", "v": "0.2"}}"#;
-        let formula: FormulaPde = serde_json::from_str(formula).unwrap();
+        let formula = |scheme: &str| {
+            let text = r#"{"unknowns": ["u", "v"], "flux": {"u": ["u^2", "u"]}, SCHEME
+                "diffusivity": {"u": "0.02", "v": "0.01"}, "source": {"v": "u*(1-v)"},
+                "initial": {"u": "2+sin(2*pi*x)*cos(2*pi*y)", "v": "0.2"}}"#;
+            let formula: FormulaPde = serde_json::from_str(&text.replace("SCHEME", scheme)).unwrap();
+            formula.into_physics().unwrap()
+        };
         let water = |form| {
             let shape = ShallowWater { pile: 1.0, radius: 0.2, width: 0.15, ..ShallowWater::default() };
             Box::new(ShallowWater { form, ..shape }) as Box<dyn Physics>
         };
         let burgers = |convection| Box::new(Burgers::new(0.05, convection).unwrap()) as Box<dyn Physics>;
-        let all: [(&str, bool, f64, Box<dyn Physics>); 6] = [
+        let all: [(&str, bool, f64, Box<dyn Physics>); 7] = [
             ("conservative", false, 0.01, burgers(Convection::Conservative)),
             ("advective", false, 0.02, burgers(Convection::Advective)),
             ("flux", false, 0.02, burgers(Convection::Flux)),
-            ("formula", true, 0.01, formula.into_physics().unwrap()),
+            ("formula", true, 0.01, formula(r#""scheme": "central","#)),
+            ("formula, limited", true, 0.01, formula("")),
             ("water by flux", true, 0.004, water(WaterForm::Flux)),
             ("water by advection", true, 0.004, water(WaterForm::Advective)),
         ];
@@ -307,7 +312,8 @@ mod tests {
                 }
                 let error = found.component(0).zip(fine.component(0)).fold(0.0, |m, (a, b)| larger(m, a - b));
                 let estimate = errors.unwrap()[0];
-                assert!((0.7..1.4).contains(&(estimate / error)), "{name}: {estimate:e} where it is {error:e}");
+                let least = if name.ends_with("limited") { 0.25 } else { 0.7 };
+                assert!((least..1.4).contains(&(estimate / error)), "{name}: {estimate:e} where it is {error:e}");
                 estimates.push(estimate);
             }
             let order = (estimates[0] / estimates[1]).log2();

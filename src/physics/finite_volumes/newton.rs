@@ -11,7 +11,7 @@ use crate::work::Work;
 /// Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
 /// Newton steps up to which the damping is that of the newest values.
-const DAMPED_ANEW: usize = 2;
+const DAMPED_ANEW: usize = 1;
 /// Newton's method is given up once residuals are larger than this multiple of those at its start.
 const DIVERGED: f64 = 10.0;
 /// Residuals below so many roundings of the largest terms are rounding.
