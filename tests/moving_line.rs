@@ -76,7 +76,7 @@ fn layers_form_and_merge() {
         };
         let l1: f64 = found.windows(2).map(error).sum();
         assert!(l1 < allowed, "t = {end}: {l1:e}");
-        assert!(run.record.work.work.newton_iterations <= 5000, "{:?}", run.record.work);
+        assert!(run.record.work.work.newton_iterations <= 6000, "{:?}", run.record.work);
     }
 }
 
@@ -211,7 +211,7 @@ fn a_line_is_a_strip() {
 #[test]
 fn a_line_goes_on_to_the_bit() {
     let text = LAYERS.replace("end = 1.0", "end = 0.2").replace("[0.2, 0.6, 1.0]", "[]");
-    let text = format!("{text}[output]\ncheckpoint = {{ steps = 50 }}\n");
+    let text = format!("{text}[output]\ncheckpoint = {{ steps = 20 }}\n");
     let study = study(&text).unwrap();
     let directory = tempfile::tempdir().unwrap();
     let whole = study.compute().unwrap().0;
@@ -228,7 +228,7 @@ fn a_line_goes_on_to_the_bit() {
         }
 
         fn interrupts(&self) -> bool {
-            self.0 >= 120
+            self.0 >= 50
         }
     }
     let ended = study.run(&path, Begin::Anew, &mut [&mut Ends(0)]).unwrap();

@@ -169,3 +169,39 @@ fn sides_are_refused_by_name() {
         assert!(error.contains(said), "{boundary}: {error}");
     }
 }
+
+/// Water that a clay takes up from a wet side, by Richards' equation in van Genuchten's form, whose conductivity has no
+/// value beyond saturation: where Newton's method or a long step would lead there, both go on with less. On any number
+/// of cells it completes, between the two contents, and has the front where most cells have it.
+#[test]
+fn what_a_formula_has_no_value_for_is_not_reached() {
+    let front = |cells: usize, wet: f64| {
+        let state = line(&format!(
+            r#"
+            [grid]
+            cells = [{cells}]
+            [time]
+            start = 0.0
+            end = 21600.0
+            [pde]
+            kind = "formula"
+            unknowns = ["u"]
+            flux = {{ u = ["2.89e-06*sqrt((u - 0.078)/0.352)*(1 - (1 - ((u - 0.078)/0.352)^2.785714286)^0.358974359)^2"] }}
+            diffusivity = {{ u = "4.072533369e-06*((u - 0.078)/0.352)^(-2.285714286)*((1 - ((u - 0.078)/0.352)^2.785714286)^(-0.358974359) + (1 - ((u - 0.078)/0.352)^2.785714286)^0.358974359 - 2)" }}
+            initial = {{ u = "0.24213178" }}
+            boundary = {{ u = "if(x < 0.5, {wet}, 0.24213178)" }}
+            "#
+        ))
+        .state
+        .unwrap();
+        let u: Vec<f64> = state.u.component(0).collect();
+        assert!(u.iter().all(|u| (0.24213178 - 1e-6..wet + 1e-6).contains(u)), "{cells}: {u:?}");
+        let k = u.iter().position(|u| *u < 0.3).unwrap();
+        let [a, b] = [k - 1, k].map(|k| state.mesh.x()[k][0]);
+        a + (b - a) * (u[k - 1] - 0.3) / (u[k - 1] - u[k])
+    };
+    for wet in [0.40, 0.42648] {
+        let fronts = [30, 50, 120, 240].map(|cells| front(cells, wet));
+        assert!(fronts.iter().all(|x| (x / fronts[3] - 1.0).abs() < 0.02), "{wet}: {fronts:?}");
+    }
+}

@@ -42,13 +42,16 @@ impl Cause {
 }
 
 impl Failure {
-    /// Whether a shorter step may cure it: not what is wrong with a setting or an array, and not a formula without a
-    /// value, over which a shorter step might only step.
+    /// Whether a shorter step may cure it: not what is wrong with a setting or an array, and not a formula of place and
+    /// time without a value, over which a shorter step might only step. One of the unknowns has no value where a long
+    /// step overshoots.
     pub(crate) fn is_curable(&self) -> bool {
+        if let Self::Formula { given, .. } = self {
+            return !given.is_empty();
+        }
         !matches!(
             self,
-            Self::Formula { .. }
-                | Self::NotPeriodic { .. }
+            Self::NotPeriodic { .. }
                 | Self::NotUniform { .. }
                 | Self::ManySubsteps { .. }
                 | Self::Subdomains { .. }

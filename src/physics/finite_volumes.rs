@@ -27,6 +27,9 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// Newton's method has converged once, after at least one step, every residual is below this share of the size of
     /// its unknown. It is far below the error of a time step.
     const TOLERANCE: f64 = 1e-6;
+    /// Shares of the range of an unknown on a face from which it begins to count, and does, where fluxes are limited in
+    /// wide cells ([`Damping`](damping::Damping)); none where each counts.
+    const COUNTING: Option<[f64; 2]> = None;
 
     /// Names of the unknowns, for messages.
     fn names(&self) -> [&'static str; B];

@@ -134,7 +134,8 @@ const DOUBTED: f64 = 0.5;
 const GROWS: f64 = 0.5;
 /// Share of the run that is its start.
 const AT_START: f64 = 1e-3;
-/// The first trial, as a share of the longest step, and how many there may be, each a hundredth of the one before.
+/// The first trial, as a share of the longest step, and how many there may be, each a hundredth of the one before; more
+/// where these fail.
 const TRIAL: f64 = 1e-2;
 const TRIALS: usize = 3;
 /// An unknown whose range is so small beside the largest of all is of rounding.
@@ -172,12 +173,12 @@ impl Free {
                 Ok((u, _)) => {
                     let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), ranges[0]);
                     // a trial in which too much happens says little
-                    if share <= CHANGE || number == TRIALS {
+                    if share <= CHANGE || number >= TRIALS {
                         let least = if simulation.physics.is_given() { GIVEN * longest } else { 0.0 };
                         return Ok(free((trial * CHANGE / share).clamp(least, longest), longest));
                     }
                 }
-                Err(failure) if number == TRIALS => {
+                Err(failure) if !failure.is_curable() || 0.01 * trial < SHORTEST * longest => {
                     return Err(Error::Failed { failure, moment: Some(Moment { t: state.t + trial, step: 1 }) });
                 }
                 Err(_) => {}
@@ -257,12 +258,9 @@ impl Free {
         record: &mut Record,
     ) -> Result<(), Failure> {
         // the first step is a guess, which may be far too long where a layer begins at a side
-        let first = before.step == 0;
-        self.dt *= if first { FIRST_AGAIN } else { 0.5 };
+        self.dt *= if before.step == 0 { FIRST_AGAIN } else { 0.5 };
         self.failures += 1;
-        let overshoots = first && matches!(failure, Failure::Formula { .. });
-        let curable = failure.is_curable() || overshoots;
-        if self.failures > safety.halvings || self.dt < SHORTEST * self.longest || !curable {
+        if self.failures > safety.halvings || self.dt < SHORTEST * self.longest || !failure.is_curable() {
             return Err(failure);
         }
         record.work.rejected_steps += 1;

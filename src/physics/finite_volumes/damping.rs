@@ -26,24 +26,21 @@ const SWEEPS: f64 = 4.0;
 /// The least θ: less would take away more than half of the diffusion that upwind fluxes have.
 const LEAST: f64 = -0.5;
 
-/// How far a cell is too wide for a central flux, from 0 to 1, by its Péclet number a/D and the share of the range of u
-/// that its face holds
-///
-/// What a central flux oscillates by is a share of what the face holds. The foot of a layer that the mesh resolves stands
-/// in wide cells that hold next to nothing: limited there, the front of Burgers' equation has twice the error.
-fn wide(peclet: f64, share: f64) -> f64 {
+/// How far a cell is too wide for a central flux, from 0 to 1, by its Péclet number a/D, the share of the range of u that
+/// its face holds, and the shares that [count](Law::COUNTING).
+fn wide(peclet: f64, share: f64, counting: Option<[f64; 2]>) -> f64 {
     let between = |[low, high]: [f64; 2], value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);
     let steep = if peclet > PECLET { between(STEEP, share) } else { 0.0 };
-    steep.max(between(WIDE, peclet) * between(SEEN, share))
+    let counts = counting.map_or(1.0, |shares| between(shares, share));
+    steep.max(counts * between(WIDE, peclet))
 }
 
 /// Cell Péclet number above which a central flux may create extrema.
 const PECLET: f64 = 2.0;
 /// Shares of the range on a face where fluxes begin to be limited and are, if its Péclet number is above that.
 const STEEP: [f64; 2] = [0.2, 0.4];
-/// Péclet numbers, and shares of the range, where fluxes begin to be limited and are, if both are.
-const WIDE: [f64; 2] = [4.0, 12.0];
-const SEEN: [f64; 2] = [0.01, 0.03];
+/// Péclet numbers where fluxes begin to be limited and are, however little the face holds.
+const WIDE: [f64; 2] = [3.0, 9.0];
 /// Differences of u below this share of its size are rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -94,7 +91,7 @@ impl<const D: usize> Half<'_, D> {
         let excess = |k: usize, axis: usize, c: usize, change: f64| {
             let most = fastest[axis][c] * length(self.cells.normals()[k][axis]);
             let (a, enough) = (speeds[k][axis][c].relative.min(most), view.faces[k][axis].diffusion[c]);
-            ((0.5 * a - enough) * wide(a / enough.max(0.0), change.abs() / ranges[c]), a)
+            ((0.5 * a - enough) * wide(a / enough.max(0.0), change.abs() / ranges[c], L::COUNTING), a)
         };
         let (lattice, sides) = (self.mesh.lattice(), sides(law, self.t, self.mesh));
         let steps = Places { lattice, patch, x: self.x, sides: &sides, wanted }.increments(u);

@@ -10,6 +10,8 @@ use crate::work::Work;
 
 /// Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
+/// How often a correction is halved that leads to where a formula has no value, such as a root below 0.
+const RETREATS: usize = 8;
 /// Newton steps up to which the damping is that of the newest values.
 const DAMPED_ANEW: usize = 1;
 /// Newton's method is given up once residuals are larger than this multiple of those at its start.
@@ -56,8 +58,17 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         // that of the first values would make a step of the first order; later it stays, so that Newton's method ends
         let mut damping = Damping::none();
         let loads = half.loads(law, u)?;
+        let (mut correction, mut retreats) = (Vec::new(), 0);
         let stalled = loop {
-            let mut view = half.view::<S, B, L>(law, u)?;
+            let mut view = match half.view::<S, B, L>(law, u) {
+                Err(Failure::Formula { .. }) if !correction.is_empty() && retreats < RETREATS => {
+                    go_back_half(&mut correction, u);
+                    retreats += 1;
+                    continue;
+                }
+                view => view?,
+            };
+            retreats = 0;
             if work.newton_iterations <= DAMPED_ANEW {
                 damping = half.damping(law, &view, u);
             }
@@ -89,16 +100,24 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                 matrix.rows[i][0][c][c] = 1.0;
             }
             scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
-            let mut correction = vec![[0.0; B]; patch.padded_len()];
+            correction = vec![[0.0; B]; patch.padded_len()];
             let enough = scale.enough(largest, L::TOLERANCE);
             work += self.solver.solve(&matrix, &residual, &mut correction, enough)?;
             work.newton_iterations += 1;
+            <Half<'_, D> as Around<D, S>>::repeat_sides(&patch, &mut correction);
             for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
                 *u += correction;
             }
-            <Half<'_, D> as Around<D, S>>::repeat_sides(&patch, u);
         };
         Ok(Solved { residual, work, stalled })
+    }
+}
+
+/// Takes back half of a correction that was added to values, and halves it.
+fn go_back_half<const B: usize>(correction: &mut [[f64; B]], u: &mut [[f64; B]]) {
+    for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened_mut()) {
+        *correction *= 0.5;
+        *u -= *correction;
     }
 }
 
