@@ -172,7 +172,7 @@ fn sides_are_refused_by_name() {
 
 /// Water that a clay takes up from a wet side, by Richards' equation in van Genuchten's form, whose conductivity has no
 /// value beyond saturation: where Newton's method or a long step would lead there, both go on with less. On any number
-/// of cells it completes, between the two contents, and has the front where most cells have it.
+/// of cells it completes, between the two contents to a thousandth, and has the front where most cells have it.
 #[test]
 fn what_a_formula_has_no_value_for_is_not_reached() {
     let front = |cells: usize, wet: f64| {
@@ -195,7 +195,7 @@ fn what_a_formula_has_no_value_for_is_not_reached() {
         .state
         .unwrap();
         let u: Vec<f64> = state.u.component(0).collect();
-        assert!(u.iter().all(|u| (0.24213178 - 1e-6..wet + 1e-6).contains(u)), "{cells}: {u:?}");
+        assert!(u.iter().all(|u| (0.24213178 - 2e-4..wet + 2e-4).contains(u)), "{cells}: {u:?}");
         let k = u.iter().position(|u| *u < 0.3).unwrap();
         let [a, b] = [k - 1, k].map(|k| state.mesh.x()[k][0]);
         a + (b - a) * (u[k - 1] - 0.3) / (u[k - 1] - u[k])

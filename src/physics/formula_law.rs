@@ -26,6 +26,8 @@ use loads::Loads;
 pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, const K: usize, Solver> {
     names: [String; B],
     nodal: Program<P, K>,
+    /// Whether these take unknowns.
+    of_unknowns: [bool; K],
     initial: Program<D, B>,
     /// For each unknown and the lower and the upper end of each axis.
     sides: [[[Open; 2]; D]; B],
@@ -77,6 +79,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
                 std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| reacts[c])),
             ),
             has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
+            of_unknowns: std::array::from_fn(|k| (0..B).any(|c| nodal[k].depends_on(D + c))),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
             initial: Program::new(std::array::from_fn(|c| &initial[c])),
             sides: std::array::from_fn(|c| sides[c].clone()),
@@ -200,7 +203,8 @@ where
             return Err(self.failure(format!("the unknown {}", self.names[c]), values[c], mesh, k, None));
         }
         let worst = nodes[place].iter().position(|v| !v.is_finite()).unwrap_or_default();
-        Err(self.failure(self.what(worst), nodes[place][worst], mesh, k, Some(values)))
+        let given = Some(values).filter(|_| self.of_unknowns[worst]);
+        Err(self.failure(self.what(worst), nodes[place][worst], mesh, k, given))
     }
 
     #[inline(always)]

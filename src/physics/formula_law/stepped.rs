@@ -43,7 +43,8 @@ where
         self.check_exact(t, mesh)?;
         for (k, node) in self.nodes(t, &mesh.images(), values).iter().enumerate() {
             if let Some(worst) = node.iter().position(|v| !v.is_finite()) {
-                return Err(self.failure(self.what(worst), node[worst], mesh, k, Some(&values[k])));
+                let given = Some(&values[k]).filter(|_| self.of_unknowns[worst]);
+                return Err(self.failure(self.what(worst), node[worst], mesh, k, given));
             }
         }
         Ok(())
