@@ -105,6 +105,24 @@ fn the_front_is_followed() {
     }
 }
 
+/// A front of u_t = D u_xx + k u (1 − u)(u − ¼) goes with the speed √(Dk/2)/2, however thin it is: cells that grow
+/// through it do not change it by much.
+#[test]
+fn fronts_between_stable_states_have_their_speed() {
+    let speed = 0.4;
+    for (width, cells, allowed) in [(1.0 / 120.0, 40, 2e-2), (1.0 / 400.0, 40, 4e-2), (1.0 / 400.0, 80, 1e-2)] {
+        let (d, exact) = (2.0 * speed * width, format!("1/(1+exp((x-0.3-{speed}*t)/{width:e}))"));
+        let error = l_inf(&run(&format!(
+            "[grid]\ncells = [{cells}]\n[time]\nstart = 0.0\nend = 1.0\n[pde]\nkind = \"formula\"\n\
+             unknowns = [\"u\"]\ndiffusivity = {{ u = \"{d:e}\" }}\n\
+             source = {{ u = \"{:e}*u*(1-u)*(u-0.25)\" }}\ninitial = {{ u = \"{exact}\" }}\n\
+             boundary = {{ u = \"no-flux\" }}\nexact = {{ u = \"{exact}\" }}\n",
+            2.0 * d / (width * width)
+        )));
+        assert!(error < allowed, "width {width:e}, {cells} cells: {error:e}");
+    }
+}
+
 /// Heat from a point in a ball has order 2 and keeps its content to round-off, on cells that are moved about by what
 /// the mesh is made to follow.
 #[test]

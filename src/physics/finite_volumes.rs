@@ -14,6 +14,7 @@ mod transport;
 use crate::error::Failure;
 use crate::geometry::{Cells, DualCells, Mesh, Patch, strides};
 use crate::numerics::linear::RobustTransport;
+pub(super) use mass::BISTABLE;
 use mass::{Excess, stretched};
 use std::borrow::Cow;
 
@@ -86,6 +87,10 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// others it is A u alone. Diffusion must damp what overshoots by that.
     fn shares_mass(&self) -> [bool; B] {
         [true; B]
+    }
+    /// How much of these shares counts in a step that starts at time t with nodal values `u`.
+    fn weights(&self, _t: f64, _mesh: &Mesh<D>, _u: &[[f64; B]]) -> [f64; B] {
+        self.shares_mass().map(|shares| if shares { 1.0 } else { 0.0 })
     }
     /// Between which values each unknown stays at each node at time t, in a step that starts with the padded `u` and
     /// ends with these values on `sides`; `x` are the places of padded vectors. Empty where no unknown has bounds.

@@ -8,7 +8,7 @@ mod stepped;
 
 use super::bounds::Bounds;
 use super::finite_volumes::{
-    Block, Crossing, FiniteVolumes, Law, Limited, Point, Side, Sloped, Steep, Stepper, Stored,
+    BISTABLE, Block, Crossing, FiniteVolumes, Law, Limited, Point, Side, Sloped, Steep, Stepper, Stored,
 };
 use super::formula_pde::Formulas;
 use super::sides::Open;
@@ -37,6 +37,8 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     has_source: bool,
     /// Whether neighbours have a share in the mass of a node.
     shares: [bool; B],
+    /// Those of these whose source is not linear and no function of place.
+    reacts_alike: [bool; B],
     stepper: Stepper,
     limited: Limited<B>,
     damped: [bool; B],
@@ -59,13 +61,14 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Kinds { limited, damped, has_own_flux, shares, keeps_range, loaded, reacts, open } =
+        let Kinds { limited, damped, has_own_flux, shares, reacts_alike, keeps_range, loaded, reacts, open } =
             Kinds::of(&formulas, cartesian);
         let Formulas { names, nodal, initial, sides, exact, terms, bounds, .. } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
             shares,
+            reacts_alike,
             loads: Loads::new(std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| loaded[c]))),
             terms: Terms::new(&terms, &names),
             layers: Layers::new(std::array::from_fn(|c| &nodal[Self::DIFFUSIVITY * B + c])),
@@ -265,6 +268,25 @@ where
 
     fn shares_mass(&self) -> [bool; B] {
         self.shares
+    }
+
+    /// [`BISTABLE`] where the source draws the least and the largest values back and pushes values between them away.
+    fn weights(&self, t: f64, mesh: &Mesh<D>, u: &[[f64; B]]) -> [f64; B] {
+        let mut weights = self.shares.map(|shares| if shares { 1.0 } else { 0.0 });
+        if !self.reacts_alike.contains(&true) {
+            return weights;
+        }
+        let nodes = self.nodes(t, &mesh.images(), u);
+        for c in (0..B).filter(|&c| self.reacts_alike[c]) {
+            let slope = |k: usize| Self::slope(&nodes[k], Self::SOURCE, c, c);
+            let by_value = |a: &usize, b: &usize| u[*a][c].total_cmp(&u[*b][c]);
+            let ends = [(0..u.len()).min_by(by_value), (0..u.len()).max_by(by_value)];
+            let keeps = ends.into_iter().flatten().all(|k| slope(k) < 0.0);
+            if keeps && (0..u.len()).any(|k| slope(k) > 0.0) {
+                weights[c] = BISTABLE;
+            }
+        }
+        weights
     }
 
     fn bounds(

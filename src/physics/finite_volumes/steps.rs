@@ -18,7 +18,9 @@ struct Level<'a, const B: usize, const D: usize, const S: usize> {
     cells: DualCells<D>,
     /// Positions, padded.
     x: Vec<[f64; D]>,
+    /// With the weights of all unknowns.
     excess: Option<Excess<B, D, S>>,
+    weights: [f64; B],
 }
 
 impl<'a, const B: usize, const D: usize, const S: usize> Level<'a, B, D, S>
@@ -26,14 +28,14 @@ where
     Mesh<D>: Cells<D>,
     for<'b> Half<'b, D>: Around<D, S>,
 {
-    fn new<L: Law<B, D>>(law: &L, t: f64, mesh: &'a Mesh<D>, known: Option<DualCells<D>>) -> Self {
-        let shares = law.shares_mass();
+    fn new<L: Law<B, D>>(law: &L, t: f64, mesh: &'a Mesh<D>, known: Option<DualCells<D>>, weights: [f64; B]) -> Self {
         Self {
             t,
             mesh,
             cells: known.unwrap_or_else(|| law.cells(mesh)),
             x: padded(mesh.lattice(), mesh.x(), diagonal(mesh.extent())),
-            excess: shares.contains(&true).then(|| Excess::of(mesh, shares)),
+            excess: weights.iter().any(|weight| *weight != 0.0).then(|| Excess::of(mesh, weights)),
+            weights,
         }
     }
 
@@ -82,7 +84,8 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
     {
         let Motion { t, dt, old, new } = motion;
         let known = self.newest.take().filter(|(mesh, _)| mesh == old).map(|(_, cells)| cells);
-        let (old, new) = (Level::new(law, t, old, known), Level::new(law, t + dt, new, None));
+        let weights = law.weights(t, old, start);
+        let (old, new) = (Level::new(law, t, old, known, weights), Level::new(law, t + dt, new, None, weights));
         let mut u = padded(old.mesh.lattice(), start, [[0.0; B]; D]);
         // initial values may contradict those given on sides, which hold from the first moment on
         for side in sides(law, t, old.mesh) {
@@ -221,7 +224,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let between = old.mesh.x().iter().zip(new.mesh.x());
         let between = between.map(|(a, b)| std::array::from_fn(|d| a[d] + gamma * (b[d] - a[d])));
         let mesh = old.mesh.moved(between.collect())?;
-        let middle = Level::new(law, old.t + gamma * dt, &mesh, None);
+        let middle = Level::new(law, old.t + gamma * dt, &mesh, None, old.weights);
         let (there, mut work) = self.trapezoid(law, [old, &middle], u.clone(), carried.first())?;
         let there = padded(lattice, &there, [[0.0; B]; D]);
 

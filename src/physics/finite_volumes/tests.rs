@@ -100,10 +100,10 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
     let [old_cells, cells] = [old, new].map(DualCells::new);
     let (patch, swept) = (*cells.patch(), old_cells.swept(&cells));
     let [from, x] = [old, new].map(|mesh| padded(lattice, mesh.x(), diagonal(mesh.extent())));
-    let shares = law.shares_mass();
-    let shared = shares.contains(&true);
+    let weights = law.weights(t, old, u);
+    let shared = weights.iter().any(|weight| *weight != 0.0);
     let stretched = if shared { stretched([&old_cells, &cells], [&from, &x]) } else { Vec::new() };
-    let excess = shared.then(|| Excess::of(new, shares));
+    let excess = shared.then(|| Excess::of(new, weights));
     let half = Half { dt, t: t + dt, mesh: new, cells: &cells, x: &x, swept: &swept, stretched: &stretched };
     let nothing = vec![[0.0; B]; patch.len()];
     let residual = |u: &[[f64; B]]| -> Vec<[f64; B]> {
