@@ -1,7 +1,7 @@
 //! The mover rests where its density rests, follows where it moves, and never makes things worse than equal cells.
 
 use driftmesh::density::{Monitor, RootGradient};
-use driftmesh::geometry::{Lattice, Mesh, check_unfolded};
+use driftmesh::geometry::{Lattice, Mesh, check_unfolded, node_areas};
 use driftmesh::meshing::{Form, Whole};
 use driftmesh::mover::{Ending, Followed, Gait, Mover, adapted};
 use driftmesh::simulation::Record;
@@ -528,4 +528,22 @@ fn a_mesh_rests_in_steps_of_unequal_length() {
         assert!(n < 580 || way < 1e-2, "{way} cells in step {n}");
         (mesh, gait) = (step.moved.mesh, step.gait);
     }
+}
+
+/// A circle that shrinks by its curvature, u_t = Δu + (u − u³)/ε² with ε = .005: its radius falls like √(.09 − 2t), as
+/// thin as the front is beside a uniform cell.
+#[test]
+fn a_circle_shrinks_by_its_curvature() {
+    let text = "[study]\nname = \"circle\"\nkind = \"moving-mesh\"\n[grid]\ncells = [80, 80]\n[time]\nstart = 0.0\n\
+                end = 0.03\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\ndiffusivity = { u = \"1\" }\n\
+                source = { u = \"(u - u^3)/2.5e-05\" }\n\
+                initial = { u = \"-tanh((sqrt((x-0.5)^2 + (y-0.5)^2) - 0.3)/0.007071067812)\" }\n\
+                boundary = { u = \"no-flux\" }\n";
+    let study = MovingMesh::from_source(&Source::new("circle", text)).unwrap();
+    let (MovingRun { state, .. }, failure) = study.compute().unwrap();
+    assert!(failure.is_none(), "{failure:?}");
+    let state = state.unwrap();
+    let area: f64 = node_areas(&state.mesh).iter().zip(state.u.component(0)).map(|(a, u)| 0.5 * a * (1.0 + u)).sum();
+    let radius = (area / std::f64::consts::PI).sqrt();
+    assert!((radius / 0.03_f64.sqrt() - 1.0).abs() < 0.05, "{radius}");
 }
