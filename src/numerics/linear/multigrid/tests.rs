@@ -72,7 +72,10 @@ proptest! {
         multigrid.cycle(&r, &mut z);
         a.patch.wrap(&mut z);
         let product = |u: usize, v: usize| -> f64 { a.patch.places().map(|k| r[k][u] * z[k][v]).sum() };
-        prop_assert!((product(0, 1) - product(1, 0)).abs() <= 1e-9 * (product(0, 0) * product(1, 1)).sqrt());
+        // a node that is its own neighbour draws nothing from itself, but for rounding
+        let largest = a.rows.iter().fold(0.0_f64, |m, row| m.max(row[0]));
+        let lost = if (wx && n == 1) || (wy && m == 1) { f64::EPSILON * largest } else { 0.0 };
+        prop_assert!((product(0, 1) - product(1, 0)).abs() <= (1e-9 + lost) * (product(0, 0) * product(1, 1)).sqrt());
         let mut az = vec![[0.0; 2]; len];
         a.multiply(&z, &mut az);
         for c in 0..2 {
