@@ -205,3 +205,24 @@ fn what_a_formula_has_no_value_for_is_not_reached() {
         assert!(fronts.iter().all(|x| (x / fronts[3] - 1.0).abs() < 0.02), "{wet}: {fronts:?}");
     }
 }
+
+/// Heat that enters from a side that jumps at the start, against erfc(x/√(4Dt)): within its range, and as accurate where
+/// the layer has spread as equal cells are.
+#[test]
+fn a_side_that_jumps_stays_in_range() {
+    let error = |cells: usize, generator: &str| {
+        let run = line(&format!(
+            "[grid]\ncells = [{cells}]\n[time]\nstart = 0.0\nend = 5.0\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\n\
+             diffusivity = {{ u = \"0.001\" }}\ninitial = {{ u = \"0\" }}\nboundary = {{ u = {{ left = \"1\", right = \"0\" }} }}\n\
+             exact = {{ u = \"if(x > 0, 1 - erf(x/(2*sqrt(0.001*max(t, 1e-30)))), 1)\" }}\n\
+             [mesh]\ngenerator = {{ kind = \"{generator}\" }}\n"
+        ));
+        assert!(run.record.warnings.iter().all(|warning| !warning.contains("leaves the range")), "{:?}", run.record);
+        run.record.reports.last().unwrap().error.unwrap().l2
+    };
+    for cells in [40, 80] {
+        let [ours, theirs] = ["whole", "fixed"].map(|generator| error(cells, generator));
+        println!("{cells}: {ours:e} {theirs:e}");
+        assert!(ours < 2.0 * theirs, "{cells} cells: {ours:e} against {theirs:e}");
+    }
+}
