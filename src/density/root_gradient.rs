@@ -21,10 +21,10 @@ use std::borrow::Cow;
 ///
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
 /// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
-/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. Where the steepest slope is
-/// less than twice (⟨|∇u|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could be
-/// taken, and s is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and 5·10³
-/// around jumps.
+/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. Where the steepest slope
+/// is less than twice (⟨|∇u|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could
+/// be taken, and s is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and
+/// 5·10³ around jumps.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their

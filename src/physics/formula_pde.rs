@@ -28,8 +28,9 @@ use std::collections::BTreeMap;
 /// The scheme is finite volumes on [dual cells](crate::geometry::DualCells) and a [`Stepper`] in time, solved by
 /// Newton's method with the derivatives of the formulas: second order in space and time. At a face, F and D are means
 /// of their values at the two nodes; where a cell is too wide for such central fluxes, the value from upstream limits
-/// them, and without diffusion they are [limited](Scheme::Limited) everywhere. Σ A u changes only by the flux through the sides, by S, and where `bounds` are met,
-/// on any moving mesh. A solution has one value for each node and unknown, in the order of `unknowns`.
+/// them, and without diffusion they are [limited](Scheme::Limited) everywhere. Σ A u changes only by the flux through
+/// the sides, by S, and where `bounds` are met, on any moving mesh. A solution has one value for each node and unknown,
+/// in the order of `unknowns`.
 ///
 /// # Errors
 /// A step ends with [`Failure::Formula`](crate::Failure::Formula) where a formula is not finite.

@@ -16,9 +16,9 @@ use crate::parallel;
 /// ½ Δt F′·N − ½ s at both nodes and, where a flux is a function of its unknown alone, of the secant between them: a
 /// central flux creates no extremum where a ≤ 2 D, which is to say where the cell Péclet number is at most 2. It is at
 /// most four times the largest ½ Δt F′·N along the axis: what the mesh alone would sweep over the solution is bounded
-/// elsewhere, however short the step is. w is that of [`wide`]. u₋ is the limited value at the face on the side of i, from where the flow comes
-/// ([`increments`](super::reconstruction::increments)), which passes where D is 0. Where the flow comes from both
-/// sides, the larger of both θ counts.
+/// elsewhere, however short the step is. w is that of [`wide`]. u₋ is the limited value at the face on the side of i,
+/// from where the flow comes ([`increments`](super::reconstruction::increments)), which passes where D is 0. Where the
+/// flow comes from both sides, the larger of both θ counts.
 pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[f64; B]; D]>);
 
 /// The mesh may sweep over the solution so many times as fast as this flows.
@@ -26,8 +26,8 @@ const SWEEPS: f64 = 4.0;
 /// The least θ: less would take away more than half of the diffusion that upwind fluxes have.
 const LEAST: f64 = -0.5;
 
-/// How far a cell is too wide for a central flux, from 0 to 1, by its Péclet number a/D, the share of the range of u that
-/// its face holds, and the shares that [count](Law::COUNTING).
+/// How far a cell is too wide for a central flux, from 0 to 1, by its Péclet number a/D, the share of the range of u
+/// that its face holds, and the shares that [count](Law::COUNTING).
 fn wide(peclet: f64, share: f64, counting: Option<[f64; 2]>) -> f64 {
     let between = |[low, high]: [f64; 2], value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);
     let steep = if peclet > PECLET { between(STEEP, share) } else { 0.0 };

@@ -22,10 +22,10 @@ where
     /// ```
     ///
     /// I f is linear between nodes along the axes, φ_i the hat function of node i, and h_min the smallest cell of a
-    /// lattice line, as in [`Excess`]. M f adds up to the trapezoid rule, which is accurate for smooth f on equal cells,
-    /// but not where cells grow: what sources and fluxes should balance would not. With σ = 1 this and M f are ∫ f φ_i,
-    /// for which diffusion is exact at the nodes of a line; with σ = 0 nothing is added, since on equal cells time
-    /// derivatives are taken at the nodes, too, and both errors cancel.
+    /// lattice line, as in [`Excess`]. M f adds up to the trapezoid rule, which is accurate for smooth f on equal
+    /// cells, but not where cells grow: what sources and fluxes should balance would not. With σ = 1 this and M f are ∫
+    /// f φ_i, for which diffusion is exact at the nodes of a line; with σ = 0 nothing is added, since on equal cells
+    /// time derivatives are taken at the nodes, too, and both errors cancel.
     ///
     /// # Source
     /// Strang and Fix, *An Analysis of the Finite Element Method* (1973), 1.6.

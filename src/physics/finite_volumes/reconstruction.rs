@@ -12,10 +12,9 @@ use crate::parallel;
 /// Δ₊ = min(½ h₊ |2 g₊ + g₋| / 3, 2 |d₋|, |d₊|),   g = d/h
 /// ```
 ///
-/// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ, but for [smooth](smoothness) extrema,
-/// which have Δ₊ without bounds. A smooth profile has two thirds of
-/// the slope on its own side and one third of the other, which is of the third order on equal cells; the bounds keep
-/// what stands at a face between the nodes.
+/// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ, but for [smooth](smoothness)
+/// extrema, which have Δ₊ without bounds. A smooth profile has two thirds of the slope on its own side and one third of
+/// the other, which is of the third order on equal cells; the bounds keep what stands at a face between the nodes.
 ///
 /// # Source
 /// Koren, *A robust upwind discretization method for advection, diffusion and source terms* (1993).
