@@ -3,8 +3,8 @@ mod read;
 pub(super) use read::Formulas;
 
 use super::formula_law::FormulaLaw;
-use super::sides::Conditions;
-use super::{Coordinates, Diffusivity, Physics, Stepper};
+use super::sides::{Conditions, SIDES};
+use super::{Coordinates, Diffusivity, Physics, StartAndSide, Stepper};
 use crate::error::{Error, Result};
 use crate::geometry::DualCells;
 use crate::numerics::linear::{RobustLine, RobustTransport};
@@ -179,13 +179,21 @@ impl<const D: usize> FormulaPde<D> {
             .collect()
     }
 
-    /// The initial value and the side value of each unknown, with their keys.
-    pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
-        let both = self.unknowns.iter().filter_map(|name| {
-            let (initial, boundary) = (self.initial.get(name)?, self.boundary.get(name)?.value()?);
-            Some([(format!("initial.{name}"), initial.as_str()), (format!("boundary.{name}"), boundary)])
+    /// The initial value and the side values of each unknown.
+    pub fn starts_and_sides(&self) -> Vec<StartAndSide<'_>> {
+        let given =
+            self.unknowns.iter().filter_map(|name| Some((name, self.initial.get(name)?, self.boundary.get(name)?)));
+        let all = given.flat_map(|(name, initial, conditions)| {
+            conditions.values().into_iter().map(move |(side, text)| {
+                let of_side = side.map_or(String::new(), |(axis, end)| format!(".{}", SIDES[axis][end]));
+                StartAndSide {
+                    start: (format!("initial.{name}"), initial),
+                    value: (format!("boundary.{name}{of_side}"), text),
+                    side,
+                }
+            })
         });
-        both.collect()
+        all.collect()
     }
 }
 

@@ -2,7 +2,9 @@
 
 use super::finite_volumes::{Crossing, FiniteVolumes, Law};
 use super::prescribed::evaluate;
-use super::{BurgersFlux, FormulaPde, Motion, Physics, Prescribed, Stepper, check_finite, formula, nodal};
+use super::{
+    BurgersFlux, FormulaPde, Motion, Physics, Prescribed, StartAndSide, Stepper, check_finite, formula, nodal,
+};
 use crate::elementary::exp;
 use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
@@ -88,10 +90,14 @@ impl LinePdeKind {
     }
 
     /// The initial values and the values at the ends that are both formulas of x and t, with their keys.
-    pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+    pub fn starts_and_sides(&self) -> Vec<StartAndSide<'_>> {
         match self {
             Self::LineBurgers(LineBurgers { initial: Some(initial), boundary: Some(boundary), .. }) => {
-                vec![[("initial".into(), initial), ("boundary".into(), boundary)]]
+                vec![StartAndSide {
+                    start: ("initial".into(), initial),
+                    value: ("boundary".into(), boundary),
+                    side: None,
+                }]
             }
             Self::LineFormulaPde(pde) => pde.starts_and_sides(),
             _ => vec![],

@@ -183,15 +183,30 @@ impl PdeKind {
     }
 
     /// The initial values and the side values that are both formulas of x, y and t, with their keys.
-    pub fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+    pub fn starts_and_sides(&self) -> Vec<StartAndSide<'_>> {
         match self {
             Self::Burgers(Burgers { initial: Some(initial), boundary: Some(boundary), .. }) => {
-                vec![[("initial".into(), initial), ("boundary".into(), boundary)]]
+                vec![StartAndSide {
+                    start: ("initial".into(), initial),
+                    value: ("boundary".into(), boundary),
+                    side: None,
+                }]
             }
             Self::FormulaPde(pde) => pde.starts_and_sides(),
             _ => vec![],
         }
     }
+}
+
+/// An initial value and one that is given on a side, both formulas of place and time, with their keys.
+#[derive(Debug, Clone)]
+pub struct StartAndSide<'a> {
+    /// The initial value.
+    pub start: (String, &'a str),
+    /// The value on the side.
+    pub value: (String, &'a str),
+    /// The side as (axis, end); none for all of them.
+    pub side: Option<(usize, usize)>,
 }
 
 /// Parses a formula of place, in D dimensions, and time: of x, y and t, or of x and t.

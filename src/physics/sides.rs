@@ -63,6 +63,19 @@ impl Conditions {
         }
     }
 
+    /// The values that are given, each with its side as (axis, end), or without where all sides have it.
+    pub(super) fn values(&self) -> Vec<(Option<(usize, usize)>, &str)> {
+        let Self::Each(each) = self else {
+            return self.value().map(|text| (None, text)).into_iter().collect();
+        };
+        let sides = (0..SIDES.len()).flat_map(|axis| [(axis, 0), (axis, 1)]);
+        let given = sides.filter_map(|side| match each.get(SIDES[side.0][side.1])? {
+            Condition::Value(text) => Some((Some(side), &**text)),
+            _ => None,
+        });
+        given.collect()
+    }
+
     /// Refuses sides that are not there, and sides that are left out.
     ///
     /// # Errors

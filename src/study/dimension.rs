@@ -9,7 +9,7 @@ use crate::geometry::{Lattice, Mesh};
 use crate::kept::Kept;
 use crate::meshing::{GeneratorKind, LineGeneratorKind, MeshGenerator, Movable};
 use crate::output::RunDirectory;
-use crate::physics::{self, LinePdeKind, PdeKind, Physics, UniformBurgers};
+use crate::physics::{self, LinePdeKind, PdeKind, Physics, StartAndSide, UniformBurgers};
 use crate::simulation::Scene;
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
@@ -173,7 +173,7 @@ pub trait PdeTable<const D: usize>: Settings {
     fn formulas(&self) -> Vec<(String, &str)>;
 
     /// The initial values and the side values that are both formulas of place and time, with their keys.
-    fn starts_and_sides(&self) -> Vec<[(String, &str); 2]>;
+    fn starts_and_sides(&self) -> Vec<StartAndSide<'_>>;
 
     /// How the equation is stepped where nothing is said; not at all where the solution is given.
     fn stepper(&self) -> Option<Stepper>;
@@ -295,7 +295,7 @@ impl PdeTable<2> for PdeKind {
         self.formulas()
     }
 
-    fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+    fn starts_and_sides(&self) -> Vec<StartAndSide<'_>> {
         self.starts_and_sides()
     }
 

@@ -5,7 +5,7 @@ use super::moving_mesh::{Domain, Stepper, Time};
 use crate::error::{Error, Result};
 use crate::geometry::Lattice;
 use crate::meshing::{LineGeneratorKind, MeshGenerator};
-use crate::physics::{self, Coordinates, LinePdeKind, Physics};
+use crate::physics::{self, Coordinates, LinePdeKind, Physics, StartAndSide};
 
 impl PdeTable<1> for LinePdeKind {
     fn check(&self) -> Result<()> {
@@ -74,7 +74,7 @@ impl PdeTable<1> for LinePdeKind {
         self.formulas()
     }
 
-    fn starts_and_sides(&self) -> Vec<[(String, &str); 2]> {
+    fn starts_and_sides(&self) -> Vec<StartAndSide<'_>> {
         self.starts_and_sides()
     }
 

@@ -9,7 +9,7 @@ use crate::density::{ArclengthTable, GivenTable, MonitorKind};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
 use crate::geometry::{Lattice, Mesh};
-use crate::physics::formula;
+use crate::physics::{StartAndSide, formula};
 use crate::setting::Auto;
 
 /// Memory that a run needs for each node: 2250 bytes measured at 600 × 600 cells with subdomains and a reference, and a
@@ -106,9 +106,11 @@ where
             let f = formula::<D>(&key, text).map_err(|error| error.within("pde"))?;
             warnings.extend((0..D).filter(|&d| self.domain.periodic[d]).filter_map(|d| self.jump(&key, &f, d)));
         }
-        for [(at_start, initial), (on_sides, boundary)] in self.pde.starts_and_sides() {
+        for StartAndSide { start: (at_start, initial), value: (on_sides, boundary), side } in
+            self.pde.starts_and_sides()
+        {
             let both = [formula::<D>(&at_start, initial)?, formula::<D>(&on_sides, boundary)?];
-            warnings.extend(self.gap(&at_start, &on_sides, &both));
+            warnings.extend(self.gap(&at_start, &on_sides, &both, side));
         }
         Ok(warnings)
     }
@@ -192,15 +194,22 @@ where
         })
     }
 
-    /// Says so where the values on the bounded sides are not the initial ones at the start.
-    fn gap(&self, at_start: &str, on_sides: &str, [initial, boundary]: &[Formula; 2]) -> Option<String> {
+    /// Says so where the values on the bounded sides, or on one of them, are not the initial ones at the start.
+    fn gap(
+        &self,
+        at_start: &str,
+        on_sides: &str,
+        [initial, boundary]: &[Formula; 2],
+        side: Option<(usize, usize)>,
+    ) -> Option<String> {
         let t = self.time.start;
         // of the data everywhere: what is far below that is rounding
         let all = self.places([None; D]).map(|x| at(initial, x, t).abs());
         let mut size = all.filter(|u| u.is_finite()).fold(0.0_f64, f64::max);
         let mut worst = (0.0_f64, [0.0; D]);
         for d in (0..D).filter(|&d| !self.domain.periodic[d]) {
-            for end in [self.domain.lower[d], self.domain.upper[d]] {
+            let ends = [self.domain.lower[d], self.domain.upper[d]].into_iter().enumerate();
+            for (_, end) in ends.filter(|(n, _)| side.is_none_or(|side| side == (d, *n))) {
                 for x in self.places(std::array::from_fn(|e| (e == d).then_some(end))) {
                     let [u, side] = [initial, boundary].map(|f| at(f, x, t));
                     size = size.max(u.abs()).max(side.abs());
