@@ -5,10 +5,11 @@ mod kinds;
 mod layers;
 mod loads;
 mod stepped;
+mod weights;
 
 use super::bounds::Bounds;
 use super::finite_volumes::{
-    BISTABLE, Block, Crossing, FiniteVolumes, Law, Limited, Point, Side, Sloped, Steep, Stepper, Stored,
+    Block, Crossing, FiniteVolumes, Law, Limited, Point, Side, Sloped, Steep, Stepper, Stored,
 };
 use super::formula_pde::Formulas;
 use super::sides::Open;
@@ -270,23 +271,8 @@ where
         self.shares
     }
 
-    /// [`BISTABLE`] where the source draws the least and the largest values back and pushes values between them away.
     fn weights(&self, t: f64, mesh: &Mesh<D>, u: &[[f64; B]]) -> [f64; B] {
-        let mut weights = self.shares.map(|shares| if shares { 1.0 } else { 0.0 });
-        if !self.reacts_alike.contains(&true) {
-            return weights;
-        }
-        let nodes = self.nodes(t, &mesh.images(), u);
-        for c in (0..B).filter(|&c| self.reacts_alike[c]) {
-            let slope = |k: usize| Self::slope(&nodes[k], Self::SOURCE, c, c);
-            let by_value = |a: &usize, b: &usize| u[*a][c].total_cmp(&u[*b][c]);
-            let ends = [(0..u.len()).min_by(by_value), (0..u.len()).max_by(by_value)];
-            let keeps = ends.into_iter().flatten().all(|k| slope(k) < 0.0);
-            if keeps && (0..u.len()).any(|k| slope(k) > 0.0) {
-                weights[c] = BISTABLE;
-            }
-        }
-        weights
+        self.weights_of_neighbours(|| self.nodes(t, &mesh.images(), u), u)
     }
 
     fn bounds(
