@@ -530,8 +530,8 @@ fn a_mesh_rests_in_steps_of_unequal_length() {
     }
 }
 
-/// A circle that shrinks by its curvature, u_t = Δu + (u − u³)/ε² with ε = .005: its radius falls like √(.09 − 2t), as
-/// thin as the front is beside a uniform cell.
+/// A circle that shrinks by its curvature, u_t = Δu + (u − u³)/ε² with ε = .005: its radius falls like √(.09 − 2t).
+/// The front is half as wide as a uniform cell.
 #[test]
 fn a_circle_shrinks_by_its_curvature() {
     let text = "[study]\nname = \"circle\"\nkind = \"moving-mesh\"\n[grid]\ncells = [80, 80]\n[time]\nstart = 0.0\n\
