@@ -123,6 +123,37 @@ fn fronts_between_stable_states_have_their_speed() {
     }
 }
 
+/// Fronts into a state that grows by itself, too thin for equal cells: u_t = D u_xx + k u (1 − u²) and with u (1 − u),
+/// with D constant and with D = εu, run away no more than on a mesh that stays.
+#[test]
+fn fronts_into_growing_states_do_not_run_away() {
+    let cubic = ("1e-4", "5*u*(1-u^2)", "1/(1+exp((x-0.2-0.04743416490252569*t)/0.006324555320336759))");
+    let square = ("1e-4", "10*u*(1-u)", "(1+exp((x-0.2-5/sqrt(6)*sqrt(1e-3)*t)/sqrt(6e-5)))^(-2)");
+    let degenerate = ("1e-3*u", "10*u*(1-u)", "max(1-exp(70.71067811865476*(x-0.2-0.07071067811865475*t)),0)");
+    for ((d, source, exact), cells, share) in [
+        (cubic, 50, 1.1),
+        (cubic, 100, 1.1),
+        (cubic, 200, 1.1),
+        (square, 50, 1.2),
+        (square, 100, 0.6),
+        (square, 200, 0.6),
+        (degenerate, 50, 0.5),
+        (degenerate, 100, 0.5),
+    ] {
+        let l2 = |generator: &str| {
+            let run = run(&format!(
+                "[grid]\ncells = [{cells}]\n[time]\nstart = 0.0\nend = 8.0\n[mesh]\n\
+                 generator = {{ kind = \"{generator}\" }}\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\n\
+                 diffusivity = {{ u = \"{d}\" }}\nsource = {{ u = \"{source}\" }}\n\
+                 initial = {{ u = \"{exact}\" }}\nboundary = {{ u = \"no-flux\" }}\nexact = {{ u = \"{exact}\" }}\n"
+            ));
+            run.record.reports.last().unwrap().error.unwrap().l2
+        };
+        let (moved, stayed) = (l2("whole"), l2("fixed"));
+        assert!(moved < share * stayed, "{source}, {cells} cells: {moved:e} for {stayed:e}");
+    }
+}
+
 /// Heat from a point in a ball has order 2 and keeps its content to round-off, on cells that are moved about by what
 /// the mesh is made to follow.
 #[test]

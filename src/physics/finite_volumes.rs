@@ -369,18 +369,23 @@ fn inside<'a, const D: usize>(mesh: &Mesh<D>, x: &'a [[f64; D]]) -> Cow<'a, [[f6
     }
 }
 
-/// For each unknown without a flux through the sides, adds the mean of the remaining residual to all values: sums are
-/// then conserved to round-off, whatever the tolerance of Newton's method.
+/// For each unknown without a flux through the sides, adds the integral of the remaining residual to the values, in
+/// proportion to its magnitude at each node: sums are then conserved to round-off, whatever the tolerance of Newton's
+/// method, and values stay that have no residual, such as a state that grows if anything is added to it.
 fn settle<const B: usize, const D: usize>(
     cells: &DualCells<D>,
     residual: &[[f64; B]],
     values: &mut [[f64; B]],
     closed: impl Fn(usize) -> bool,
 ) {
-    let area = crate::numerics::sum(cells.areas().iter().copied());
+    let integral = |of: &dyn Fn(&[f64; B]) -> f64| {
+        crate::numerics::sum(cells.areas().iter().zip(residual).map(|(area, residual)| area * of(residual)))
+    };
     for c in (0..B).filter(|&c| closed(c)) {
-        let left = crate::numerics::sum(cells.areas().iter().zip(residual).map(|(area, r)| area * r[c])) / area;
-        values.iter_mut().for_each(|value| value[c] += left);
+        let (left, all) = (integral(&|residual| residual[c]), integral(&|residual| residual[c].abs()));
+        if all > 0.0 {
+            values.iter_mut().zip(residual).for_each(|(value, residual)| value[c] += left / all * residual[c].abs());
+        }
     }
 }
 

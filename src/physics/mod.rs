@@ -79,6 +79,13 @@ pub trait Physics<const D: usize = 2>: Send {
         None
     }
 
+    /// At each node the width w = 2√(D/k) of the widest cell ahead of a front, where small values grow at the rate k by
+    /// their source, and infinity where they do not; empty if they do so nowhere. The front of u_t = D u_xx + k u goes
+    /// as fast as 2√(D k), and what grows by more than a factor e in the time in which it crosses w/2 outruns it.
+    fn widest_cells(&self, _t: f64, _mesh: &Mesh<D>, _u: &Field) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// Whether the solution is given for every time and place, so that nothing is carried from mesh to mesh.
     fn is_given(&self) -> bool {
         false

@@ -1,4 +1,4 @@
-use super::{Record, Schedule, Simulation, State, journey, timed};
+use super::{Record, Schedule, Simulation, State, growth, journey, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Cells, Field, Mesh, check_unfolded};
@@ -236,16 +236,21 @@ fn stepped<const D: usize>(
 }
 
 /// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that
-/// is known exactly.
+/// is known exactly, and no less than [what grows](growth::narrowed) needs.
 pub(super) fn density<const D: usize>(
     physics: &dyn Physics<D>,
     monitor: &dyn Monitor<D>,
     t: f64,
     mesh: &Mesh<D>,
     u: &Field,
-) -> Result<Vec<f64>, Failure> {
+) -> Result<Vec<f64>, Failure>
+where
+    Mesh<D>: Cells<D>,
+{
     let gradient = physics.gradient(t, mesh);
-    monitor.density_of(t, mesh, u, gradient.as_deref())
+    let rho = monitor.density_of(t, mesh, u, gradient.as_deref())?;
+    let widest = physics.widest_cells(t, mesh, u);
+    Ok(if widest.is_empty() { rho } else { growth::narrowed(mesh, rho, &widest) })
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod control;
 mod coupling;
 mod doors;
 mod doubts;
+mod growth;
 mod journey;
 mod observer;
 mod pace;

@@ -3,6 +3,7 @@
 use super::FormulaLaw;
 use crate::error::Failure;
 use crate::geometry::{Cells, Field, Mesh, dot};
+use crate::numerics::larger;
 use crate::numerics::linear::{RobustLine, RobustTransport};
 use crate::physics::finite_volumes::Law;
 use crate::physics::prescribed::evaluate;
@@ -83,6 +84,25 @@ where
             }
         }
         worst
+    }
+
+    fn widest_cells(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Vec<f64> {
+        if !self.has_source {
+            return Vec::new();
+        }
+        let nodes = self.nodes(t, &mesh.images(), u.values().as_chunks::<B>().0);
+        let spread =
+            |c: usize| nodes.iter().fold(0.0, |most, node| larger(most, Self::value(node, Self::DIFFUSIVITY, c)));
+        let spread: [f64; B] = std::array::from_fn(spread);
+        let widest = |node: &[f64; K]| {
+            let width = |c: usize| match Self::slope(node, Self::SOURCE, c, c) {
+                rate if rate > 0.0 && spread[c] > 0.0 => 2.0 * (spread[c] / rate).sqrt(),
+                _ => f64::INFINITY,
+            };
+            (0..B).map(width).fold(f64::INFINITY, f64::min)
+        };
+        let widest: Vec<f64> = nodes.iter().map(widest).collect();
+        if widest.iter().all(|w| w.is_infinite()) { Vec::new() } else { widest }
     }
 
     fn known(&self) -> Vec<usize> {
