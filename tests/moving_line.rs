@@ -147,11 +147,36 @@ fn fronts_into_growing_states_do_not_run_away() {
                  diffusivity = {{ u = \"{d}\" }}\nsource = {{ u = \"{source}\" }}\n\
                  initial = {{ u = \"{exact}\" }}\nboundary = {{ u = \"no-flux\" }}\nexact = {{ u = \"{exact}\" }}\n"
             ));
+            if cells == 50 {
+                let said = run.record.warnings.iter().any(|said| said.contains("small values grow in cells"));
+                assert!(said, "{:?}", run.record.warnings);
+            }
             run.record.reports.last().unwrap().error.unwrap().l2
         };
         let (moved, stayed) = (l2("whole"), l2("fixed"));
         assert!(moved < share * stayed, "{source}, {cells} cells: {moved:e} for {stayed:e}");
     }
+}
+
+/// A root of an unknown that is 0 has no finite slope; the error says what to write, and with that the study runs.
+#[test]
+fn a_root_at_zero_is_mended_as_its_error_says() {
+    let study = |source: &str| {
+        study(&format!(
+            "[grid]\ncells = [40]\n[time]\nstart = 0.0\nend = 0.1\n[pde]\nkind = \"formula\"\nunknowns = [\"u\"]\n\
+             diffusivity = {{ u = \"0.01\" }}\nsource = {{ u = \"{source}\" }}\n\
+             initial = {{ u = \"max(1 - 10*(x - 0.5)^2, 0)\" }}\nboundary = {{ u = \"no-flux\" }}\n"
+        ))
+        .unwrap()
+        .compute()
+    };
+    for source in ["-sqrt(u)", "-sqrt(max(u, 0))"] {
+        let error = study(source).err().unwrap();
+        assert!(error.to_string().contains("the derivative of `pde.source.u` by u is -inf"), "{error}");
+        let help = error.help().unwrap();
+        assert!(help.contains("max(…, 1e-9)") && !help.contains("time.step"), "{help}");
+    }
+    assert!(study("-sqrt(max(u, 1e-9))").ok().unwrap().1.is_none());
 }
 
 /// Heat from a point in a ball has order 2 and keeps its content to round-off, on cells that are moved about by what

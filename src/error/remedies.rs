@@ -9,6 +9,9 @@ const AUTO: &[&str] = &["\"auto\""];
 const EXACT: &[&str] = &["\"exact\""];
 /// A formula that gives what is no number or not positive.
 const MEND: &str = "mend the formula that gives it, if one does";
+/// A formula whose slope has no bound.
+const BEND: &str = "mend the formula, for instance by max(…, 1e-9) under a root or a logarithm: Newton's method needs a \
+                    finite derivative";
 
 impl Cause {
     fn remedies(self) -> Vec<Remedy> {
@@ -99,6 +102,9 @@ impl Failure {
                 Remedy::any([Lower(Setting::TimeStep), Refine(Setting::Cells), Raise(Setting::Smoothing)]).when("else"),
             ],
             Self::Formula { given, .. } if given.is_empty() => vec![Remedy::any([Say("mend the formula")])],
+            Self::Formula { what, value, .. } if value.is_infinite() && what.contains("derivative") => {
+                vec![Remedy::any([Say(BEND)])]
+            }
             Self::Formula { .. } => vec![
                 Remedy::any([Say("mend the formula, for instance by max(…, 0) under a root")]),
                 Remedy::any([Lower(Setting::TimeStep), Raise(Setting::Smoothing)]).when("where it is right,"),

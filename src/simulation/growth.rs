@@ -1,13 +1,78 @@
 //! Cells in which small values grow.
 
+use super::doubts::{ends, named};
+use super::{Record, Simulation, State};
 use crate::geometry::{Cells, Mesh, node_areas};
-use crate::numerics::sum;
+use crate::meshing::Movable;
+use crate::numerics::{larger, sum};
 
 /// Cells that are to be narrower than equal ones are at most this many times as wide as these: nodes for that are not
 /// taken from where they are needed.
 const WIDER: f64 = 1.05;
 /// Iterations of Newton's method for the mean, whose equation is piecewise linear and convex.
 const MEANS: usize = 10;
+
+/// A front changes by more than this share of the range of an unknown over the width of an equal cell.
+const FRONT: f64 = 0.18;
+/// A state is where an unknown is within this share of its range from an end of it.
+const AHEAD: f64 = 1e-3;
+const GROWS: &str = "small values grow in cells that are too wide";
+
+impl<const D: usize> Simulation<D>
+where
+    Mesh<D>: Movable<D>,
+{
+    /// Says once in a run that cells ahead of a front are wider than the front can cross before they grow.
+    pub(super) fn warn_of_growth(&self, state: &State<D>, record: &mut Record) {
+        if record.warnings.iter().any(|said| said.contains(GROWS)) {
+            return;
+        }
+        let State { t, mesh, u, .. } = state;
+        let widest = self.physics.widest_cells(*t, mesh, u);
+        if widest.is_empty() {
+            return;
+        }
+        let (lattice, equal) = (mesh.lattice(), equal_cell(mesh));
+        let edges = || {
+            (0..D).flat_map(|axis| {
+                let stride = lattice.strides()[axis];
+                let inside = move |k: &usize| lattice.node(*k)[axis] + 1 < lattice.nodes()[axis];
+                (0..lattice.len()).filter(inside).map(move |k| {
+                    let way = (0..D).map(|d| (mesh.x()[k + stride][d] - mesh.x()[k][d]).powi(2)).sum::<f64>();
+                    (k, k + stride, way.sqrt())
+                })
+            })
+        };
+        let mut worst = (1.0, None);
+        for (c, name) in self.physics.unknowns().into_iter().enumerate() {
+            let value = |k: usize| u.values()[k * u.components() + c];
+            let [low, high] = ends(u.component(c));
+            let steepest = edges().fold(0.0, |most, (a, b, way)| larger(most, (value(b) - value(a)) / way));
+            if steepest * equal <= FRONT * (high - low) {
+                continue;
+            }
+            let ahead = |k: usize| (value(k) - low).min(high - value(k)) <= AHEAD * (high - low);
+            for (a, _, way) in edges().filter(|(a, b, _)| ahead(*a) && ahead(*b)) {
+                if way > worst.0 * widest[a] {
+                    worst = (way / widest[a], Some((name.clone(), a)));
+                }
+            }
+        }
+        let (times, Some((name, k))) = worst else { return };
+        record.warnings.push(format!(
+            "`{name}`: {GROWS}: at t = {t}, {}, one is {times:.1} times as wide as a front can cross before they do, \
+             2√(D/k) for growth at the rate k, and the front may be at the wrong place; refine `grid.cells` {times:.1} \
+             times",
+            named(mesh.image(mesh.x()[k]))
+        ));
+    }
+}
+
+/// The smallest width of cells of equal size.
+fn equal_cell<const D: usize>(mesh: &Mesh<D>) -> f64 {
+    let cells = mesh.lattice().cells();
+    (0..D).map(|d| mesh.extent()[d] / cells[d] as f64).fold(f64::INFINITY, f64::min)
+}
 
 /// A density with which cells get no wider than `widest`, as far as there are nodes for that
 ///
@@ -21,8 +86,7 @@ pub(super) fn narrowed<const D: usize>(mesh: &Mesh<D>, rho: Vec<f64>, widest: &[
 where
     Mesh<D>: Cells<D>,
 {
-    let cells = mesh.lattice().cells();
-    let equal = (0..D).map(|d| mesh.extent()[d] / cells[d] as f64).fold(f64::INFINITY, f64::min);
+    let equal = equal_cell(mesh);
     let shares: Vec<f64> = widest.iter().map(|widest| (equal / widest).min(1.0 / WIDER)).collect();
     let areas = node_areas(mesh);
     let whole = sum(areas.iter().copied());

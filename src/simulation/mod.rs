@@ -237,6 +237,7 @@ where
             self.warn_of_noise(state, record);
             self.warn_of_unrest(state, dt, record);
             self.warn_of_range(state, record);
+            self.warn_of_growth(state, record);
             if self.schedule.reports_at(t) {
                 self.warn_of_wide_cells(state, record);
                 let report = self.report(state, &at_start, record.interface);
