@@ -38,7 +38,9 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     has_source: bool,
     /// Whether neighbours have a share in the mass of a node.
     shares: [bool; B],
-    /// Those of these whose source is not linear and no function of place.
+    /// Those of these whose source is not linear in it.
+    bends: [bool; B],
+    /// Those of these whose source is no function of place.
     reacts_alike: [bool; B],
     stepper: Stepper,
     limited: Limited<B>,
@@ -62,13 +64,14 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Kinds { limited, damped, has_own_flux, shares, reacts_alike, keeps_range, loaded, reacts, open } =
+        let Kinds { limited, damped, has_own_flux, shares, bends, reacts_alike, keeps_range, loaded, reacts, open } =
             Kinds::of(&formulas, cartesian);
         let Formulas { names, nodal, initial, sides, exact, terms, bounds, .. } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
             shares,
+            bends,
             reacts_alike,
             loads: Loads::new(std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| loaded[c]))),
             terms: Terms::new(&terms, &names),

@@ -79,9 +79,9 @@ pub trait Physics<const D: usize = 2>: Send {
         None
     }
 
-    /// At each node the width w = 2√(D/k) of the widest cell ahead of a front, where small values grow at the rate k by
-    /// their source, and infinity where they do not; empty if they do so nowhere. The front of u_t = D u_xx + k u goes
-    /// as fast as 2√(D k), and what grows by more than a factor e in the time in which it crosses w/2 outruns it.
+    /// At each node the width w = √(D/k) of the widest cell ahead of a front, k being the rate at which the source lets
+    /// small values grow there, and infinity where it does not; empty if it does so nowhere. The front of
+    /// u_t = D u_xx + k u goes with the speed 2√(D k), and ahead of it u falls by a factor e over w.
     fn widest_cells(&self, _t: f64, _mesh: &Mesh<D>, _u: &Field) -> Vec<f64> {
         Vec::new()
     }

@@ -14,7 +14,9 @@ pub(super) struct Kinds<const B: usize> {
     pub has_own_flux: [bool; B],
     /// Those that diffuse alike in all directions, in Cartesian coordinates: cells along a radius have another mass.
     pub shares: [bool; B],
-    /// Those of these with a source that is not linear and no function of place.
+    /// Those of these whose source is not linear in it.
+    pub bends: [bool; B],
+    /// Those of these whose source is no function of place.
     pub reacts_alike: [bool; B],
     /// Those of these with a source that is the sum of a function of place and time and of one of unknowns and time.
     pub loaded: [bool; B],
@@ -63,10 +65,8 @@ impl<const B: usize> Kinds<B> {
         let on_place = |formula: &Formula| (0..D).any(|d| formula.depends_on(d));
         let is_loaded = |c: usize| on_place(&nodal[(D + 1) * B + c]) && !(0..B).any(|e| on_place(by_unknown(c, e)));
         let shares = |c: usize| cartesian && diffuses(c) && !limited[c] && !terms.has_storage(c);
-        let reacts_alike = |c: usize| {
-            let bends = (0..B).any(|e| by_unknown(c, c).depends_on(D + e));
-            shares(c) && bends && !on_place(&nodal[(D + 1) * B + c])
-        };
+        let bends = |c: usize| shares(c) && (0..B).any(|e| by_unknown(c, c).depends_on(D + e));
+        let reacts_alike = |c: usize| bends(c) && !on_place(&nodal[(D + 1) * B + c]);
         let is_fed = |c: usize| sides[c].as_flattened().iter().any(|end| matches!(end, Open::Flux(_)));
         let opens = |&(d, end): &(usize, usize)| {
             sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
@@ -80,6 +80,7 @@ impl<const B: usize> Kinds<B> {
             damped: limited.map(|limited| !limited && scheme.is_none()),
             has_own_flux: std::array::from_fn(flux_is_own),
             shares: std::array::from_fn(shares),
+            bends: std::array::from_fn(bends),
             reacts_alike: std::array::from_fn(reacts_alike),
             keeps_range: std::array::from_fn(keeps_range),
             loaded: std::array::from_fn(|c| shares(c) && is_loaded(c)),

@@ -96,7 +96,7 @@ where
         let spread: [f64; B] = std::array::from_fn(spread);
         let widest = |node: &[f64; K]| {
             let width = |c: usize| match Self::slope(node, Self::SOURCE, c, c) {
-                rate if rate > 0.0 && spread[c] > 0.0 => 2.0 * (spread[c] / rate).sqrt(),
+                rate if rate > 0.0 && spread[c] > 0.0 => (spread[c] / rate).sqrt(),
                 _ => f64::INFINITY,
             };
             (0..B).map(width).fold(f64::INFINITY, f64::min)
