@@ -10,11 +10,13 @@ use crate::physics::finite_volumes::BISTABLE;
 const PULLED: f64 = 0.5;
 /// No mass is shared if D is below this share of the largest D in that state: nothing would damp what overshoots there.
 const DAMPS: f64 = 0.5;
+/// A state rests where the source is at most this share of the largest.
+const RESTS: f64 = 1e-3;
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Default> FormulaLaw<D, B, P, K, Solver> {
     /// The weight of each unknown: [`BISTABLE`] where the source draws the least and the largest values back and pushes
-    /// values between them away, [`PULLED`] where it pushes one of these ends away, and else 1; 0 for those that share
-    /// no mass. `nodes` gives the formulas at the nodes.
+    /// values between them away, [`PULLED`] where it pushes one of these ends away, which is a state at rest, and else
+    /// 1; 0 for those that share no mass. `nodes` gives the formulas at the nodes.
     pub(super) fn weights_of_neighbours(&self, nodes: impl FnOnce() -> Vec<[f64; K]>, u: &[[f64; B]]) -> [f64; B] {
         let mut weights = self.shares.map(|shares| if shares { 1.0 } else { 0.0 });
         if !self.bends.contains(&true) {
@@ -26,8 +28,11 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
             let by_value = |a: &usize, b: &usize| u[*a][c].total_cmp(&u[*b][c]);
             let ends = [(0..u.len()).min_by(by_value), (0..u.len()).max_by(by_value)];
             let spread = |k: usize| Self::value(&nodes[k], Self::DIFFUSIVITY, c);
-            let most = (0..u.len()).map(spread).fold(0.0, larger);
-            if let Some(unstable) = ends.into_iter().flatten().find(|k| slope(*k) > 0.0) {
+            let source = |k: usize| Self::value(&nodes[k], Self::SOURCE, c);
+            let largest = |of: &dyn Fn(usize) -> f64| (0..u.len()).map(of).fold(0.0, larger);
+            let (most, strongest) = (largest(&spread), largest(&source));
+            let grows = |k: &usize| slope(*k) > 0.0 && source(*k).abs() <= RESTS * strongest;
+            if let Some(unstable) = ends.into_iter().flatten().find(grows) {
                 weights[c] = if spread(unstable) > DAMPS * most { PULLED } else { 0.0 };
                 continue;
             }
