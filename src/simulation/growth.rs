@@ -6,8 +6,8 @@ use crate::geometry::{Cells, Mesh, node_areas};
 use crate::meshing::Movable;
 use crate::numerics::{larger, sum};
 
-/// Cells that are to be narrower than equal ones are at most this many times as wide as these: nodes for that are not
-/// taken from where they are needed.
+/// Where w is less than the width of equal cells, cells are asked to be this many times as wide as equal ones: narrower
+/// ones there would take the nodes of the front.
 const WIDER: f64 = 1.05;
 /// Iterations of Newton's method for the mean, whose equation is piecewise linear and convex.
 const MEANS: usize = 10;
@@ -80,10 +80,10 @@ fn equal_cell<const D: usize>(mesh: &Mesh<D>) -> f64 {
 /// A density with which cells get no wider than `widest`, as far as there are nodes for that
 ///
 /// A mesh that follows a front has its widest cells ahead of it. Where small values grow by themselves, a front ahead
-/// of which cells are wider than 2√(D/k) is pulled by what grows in these, and runs away. So ρ is at least
+/// of which cells are wider than 2√(D/k) is pulled by what grows in these, and runs away. So the result is at least
 ///
 /// ```text
-/// min(h/w, 1/1.05) ⟨ρ⟩,   h the width of equal cells, w that of the widest, ⟨ρ⟩ the mean of the result
+/// min(h/w, 1/1.05) ⟨ρ⟩,   h the width of equal cells, w that of `widest`, ⟨ρ⟩ the mean of the result
 /// ```
 pub(super) fn narrowed<const D: usize>(mesh: &Mesh<D>, rho: Vec<f64>, widest: &[f64]) -> Vec<f64>
 where

@@ -87,7 +87,8 @@ where
     }
 
     fn widest_cells(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Vec<f64> {
-        if !self.has_source {
+        // a source of place and time alone lets nothing grow
+        if !(0..B).any(|c| self.of_unknowns[Self::SOURCE * B + c]) {
             return Vec::new();
         }
         let nodes = self.nodes(t, &mesh.images(), u.values().as_chunks::<B>().0);
