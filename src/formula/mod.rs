@@ -126,6 +126,14 @@ impl Formula {
         self.nodes.iter().any(|node| matches!(node, Node::Variable(v) if *v as usize == variable))
     }
 
+    /// The numbers that the formula names, and those that follow from them alone.
+    pub(crate) fn constants(&self) -> impl Iterator<Item = f64> {
+        self.nodes.iter().filter_map(|node| match node {
+            Node::Constant(bits) => Some(f64::from_bits(*bits)),
+            _ => None,
+        })
+    }
+
     /// The partial derivative by a variable, given by its place in [`Formula::variables`].
     ///
     /// # Errors

@@ -103,13 +103,7 @@ pub(super) fn read<const D: usize>(name: &str, texts: &BoundTexts) -> Result<[Op
 /// loses and another gains is better left in balance. Formulas are asked at some places, times and values of the
 /// others.
 fn states<const D: usize>(c: usize, flows: &[&Formula], source: &Formula) -> Vec<f64> {
-    let number = source.variables().len();
-    // numbers without a pattern, of either sign, of all sizes up to ten
-    let number_at =
-        |sample: usize, v: usize| 10.0 * (1.7 + 3.1 * sample as f64 + 2.3 * (v * (sample + 1)) as f64).sin();
-    let values = |sample: usize, state: f64| -> Vec<f64> {
-        (0..number).map(|v| if v == D + c { state } else { number_at(sample, v) }).collect()
-    };
+    let values = |sample: usize, state: f64| sampled(source, sample, (D + c, state));
     let keeps = |state: &f64| {
         let same = |flow: &&Formula| {
             let first = flow.eval(&values(0, *state));
@@ -125,8 +119,14 @@ fn states<const D: usize>(c: usize, flows: &[&Formula], source: &Formula) -> Vec
     if kept.iter().any(pushes) { kept } else { Vec::new() }
 }
 
-/// Places at which formulas are asked.
-const SAMPLES: usize = 24;
+/// Values of the variables of a formula without a pattern, of either sign, of all sizes up to ten; but one is fixed.
+pub(super) fn sampled(formula: &Formula, sample: usize, (fixed, value): (usize, f64)) -> Vec<f64> {
+    let number_at = |v: usize| 10.0 * (1.7 + 3.1 * sample as f64 + 2.3 * (v * (sample + 1)) as f64).sin();
+    (0..formula.variables().len()).map(|v| if v == fixed { value } else { number_at(v) }).collect()
+}
+
+/// Samples for which formulas are asked.
+pub(super) const SAMPLES: usize = 24;
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,7 @@ mod mass;
 mod newton;
 mod plane;
 mod reconstruction;
+mod repair;
 mod steps;
 mod transport;
 
@@ -102,6 +103,17 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
         _sides: &[Side<B>],
     ) -> Result<Vec<[[f64; 2]; B]>, Failure> {
         Ok(Vec::new())
+    }
+    /// The unknowns whose diffusivity vanishes at some values of unknowns, so that nothing but an upwind flux keeps fronts
+    /// from oscillating where the mesh sweeps over them.
+    fn vanishing_diffusion(&self) -> [bool; B] {
+        [false; B]
+    }
+    /// The values at which the diffusivity of an unknown vanishes and which it does not leave, as a lower and an upper
+    /// end: a step that goes beyond takes what is too much from neighbours ([`repair`](repair::repair)). ±∞ for none.
+    /// The arguments are those of [`bounds`](Self::bounds).
+    fn empty(&self, _at: (f64, &[[f64; D]]), _u: &[[f64; B]], _sides: &[Side<B>]) -> [[f64; 2]; B] {
+        [[f64::NEG_INFINITY, f64::INFINITY]; B]
     }
     /// Whether there are fluxes by gradients of unknowns.
     fn has_steep(&self) -> bool {

@@ -4,6 +4,7 @@ mod checks;
 mod kinds;
 mod layers;
 mod loads;
+mod states;
 mod stepped;
 mod weights;
 
@@ -18,6 +19,7 @@ use crate::error::{Failure, Result};
 use crate::formula::Program;
 use crate::geometry::{Cells, DualCells, Mesh, dot, length, strides};
 use crate::parallel;
+use checks::{BEYOND, WIGGLES};
 use kinds::Kinds;
 use layers::Layers;
 use loads::Loads;
@@ -26,32 +28,21 @@ use loads::Loads;
 /// 1) that of the values they give.
 pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, const K: usize, Solver> {
     names: [String; B],
+    kinds: Kinds<B>,
     nodal: Program<P, K>,
     /// Whether these take unknowns.
     of_unknowns: [bool; K],
     initial: Program<D, B>,
     /// For each unknown and the lower and the upper end of each axis.
     sides: [[[Open; 2]; D]; B],
-    open: Vec<(usize, usize)>,
     /// The exact solution, for the unknowns that have one.
     exact: Vec<(usize, Program<D, 1>)>,
     has_source: bool,
-    /// Whether neighbours have a share in the mass of a node.
-    shares: [bool; B],
-    /// Those of these whose source is not linear in it.
-    bends: [bool; B],
-    /// Those of these whose source is no function of place.
-    reacts_alike: [bool; B],
     stepper: Stepper,
-    limited: Limited<B>,
-    damped: [bool; B],
-    has_own_flux: [bool; B],
     bounds: Bounds<D, B>,
     terms: Terms<D, B>,
     layers: Layers<P, B>,
     loads: Loads<P, B>,
-    /// The unknowns that are only carried and diffused.
-    keeps_range: [bool; B],
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
 }
@@ -64,37 +55,29 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     /// The equation of some formulas, integrated over dual cells.
     pub fn new(formulas: Formulas<D>, cells: fn(&Mesh<D>) -> DualCells<D>, stepper: Stepper, cartesian: bool) -> Self {
-        let Kinds { limited, damped, has_own_flux, shares, bends, reacts_alike, keeps_range, loaded, reacts, open } =
-            Kinds::of(&formulas, cartesian);
+        let kinds = Kinds::of(&formulas, cartesian);
         let Formulas { names, nodal, initial, sides, exact, terms, bounds, .. } = formulas;
         let exact = exact.iter().enumerate().filter_map(|(c, f)| Some((c, Program::new([f.as_ref()?]))));
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
-            shares,
-            bends,
-            reacts_alike,
-            loads: Loads::new(std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| loaded[c]))),
+            loads: Loads::new(std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| kinds.loaded[c]))),
             terms: Terms::new(&terms, &names),
             layers: Layers::new(std::array::from_fn(|c| &nodal[Self::DIFFUSIVITY * B + c])),
-            limited,
-            damped,
-            has_own_flux,
             bounds: Bounds::new(
                 &names,
                 &bounds,
                 std::array::from_fn(|c| (0..D).map(|d| &nodal[d * B + c]).collect()),
-                std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| reacts[c])),
+                std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| kinds.reacts[c])),
             ),
             has_source: (0..B).any(|c| nodal[Self::SOURCE * B + c].text() != "0"),
             of_unknowns: std::array::from_fn(|k| (0..B).any(|c| nodal[k].depends_on(D + c))),
             nodal: Program::new(std::array::from_fn(|k| &nodal[k])),
             initial: Program::new(std::array::from_fn(|c| &initial[c])),
             sides: std::array::from_fn(|c| sides[c].clone()),
-            open,
             exact: exact.collect(),
             cells,
             stepper,
-            keeps_range,
+            kinds,
             volumes: FiniteVolumes::default(),
         }
     }
@@ -151,20 +134,6 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
     }
 }
 
-impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> FormulaLaw<D, B, P, K, Solver>
-where
-    Solver: Default + Sync,
-{
-    /// Whether unknown c stays at a value: it has no source there at any place, and one flux everywhere.
-    fn is_kept(&self, t: f64, x: &[[f64; D]], u: &[[f64; B]], (c, state): (usize, f64)) -> bool {
-        let there: Vec<[f64; B]> =
-            (u.iter()).map(|u| std::array::from_fn(|e| if e == c { state } else { u[e] })).collect();
-        let nodes = self.nodes(t, x, &there);
-        let flux = |node: &[f64; K]| -> [f64; D] { std::array::from_fn(|d| Self::value(node, d, c)) };
-        nodes.iter().all(|node| Self::value(node, Self::SOURCE, c) == 0.0 && flux(node) == flux(&nodes[0]))
-    }
-}
-
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> Law<B, D>
     for FormulaLaw<D, B, P, K, Solver>
 where
@@ -202,7 +171,8 @@ where
 
     fn check(&self, mesh: &Mesh<D>, u: &[[f64; B]], nodes: &[[f64; K]]) -> Result<(), Failure> {
         let Some(place) = nodes.iter().position(|node| node.iter().any(|v| !v.is_finite())) else {
-            return self.check_diffusivities(mesh, nodes);
+            let least = self.kinds.vanishes.map(|vanishes| if vanishes { BEYOND } else { WIGGLES });
+            return self.check_diffusivities(mesh, nodes, least, |place| Self::node(mesh, place));
         };
         let k = Self::node(mesh, place);
         let values = &u[place];
@@ -224,8 +194,12 @@ where
 
     #[inline(always)]
     fn diffusivity(&self, below: &[f64; K], above: &[f64; K]) -> Crossing<B> {
-        let value = |node: &[f64; K], c| 0.5 * Self::value(node, Self::DIFFUSIVITY, c);
-        let slope = |node: &[f64; K], c, e| 0.5 * Self::slope(node, Self::DIFFUSIVITY, c, e);
+        // where a solution goes slightly beyond the values for which it is positive, nothing diffuses
+        let value = |node: &[f64; K], c| 0.5 * Self::value(node, Self::DIFFUSIVITY, c).max(0.0);
+        let slope = |node: &[f64; K], c, e| match Self::value(node, Self::DIFFUSIVITY, c) < 0.0 {
+            true => 0.0,
+            false => 0.5 * Self::slope(node, Self::DIFFUSIVITY, c, e),
+        };
         crossing(below, above, value, slope)
     }
 
@@ -241,7 +215,7 @@ where
     }
 
     fn open_sides(&self) -> &[(usize, usize)] {
-        &self.open
+        &self.kinds.open
     }
 
     fn leaving(
@@ -271,7 +245,7 @@ where
     }
 
     fn shares_mass(&self) -> [bool; B] {
-        self.shares
+        self.kinds.shares
     }
 
     fn weights(&self, t: f64, mesh: &Mesh<D>, u: &[[f64; B]]) -> [f64; B] {
@@ -285,19 +259,16 @@ where
         u: &[[f64; B]],
         sides: &[Side<B>],
     ) -> Result<Vec<[[f64; 2]; B]>, Failure> {
-        let mut own = [[f64::NEG_INFINITY, f64::INFINITY]; B];
-        for c in 0..B {
-            let given = sides.iter().filter_map(|side| side.given[c]);
-            let values = u.iter().map(|u| u[c]).chain(given);
-            let [least, most] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)]);
-            for &state in &self.bounds.states[c] {
-                if (state <= least || state >= most) && self.is_kept(t, x, u, (c, state)) {
-                    let end = usize::from(state >= most);
-                    own[c][end] = state;
-                }
-            }
-        }
+        let own = self.kept((t, x), u, sides, &self.bounds.states);
         self.bounds.at(t, mesh, own)
+    }
+
+    fn vanishing_diffusion(&self) -> [bool; B] {
+        self.kinds.vanishes
+    }
+
+    fn empty(&self, at: (f64, &[[f64; D]]), u: &[[f64; B]], sides: &[Side<B>]) -> [[f64; 2]; B] {
+        self.kept(at, u, sides, &self.kinds.vanishing)
     }
 
     fn has_loads(&self) -> bool {
@@ -319,15 +290,15 @@ where
     }
 
     fn limited(&self) -> Limited<B> {
-        self.limited
+        self.kinds.limited
     }
 
     fn damped(&self) -> [bool; B] {
-        self.damped
+        self.kinds.damped
     }
 
     fn has_own_flux(&self) -> [bool; B] {
-        self.has_own_flux
+        self.kinds.has_own_flux
     }
 
     fn has_layers(&self) -> bool {

@@ -16,7 +16,7 @@ use crate::parallel;
 /// ½ Δt F′·N − ½ s at both nodes and, where a flux is a function of its unknown alone, of the secant between them: a
 /// central flux creates no extremum where a ≤ 2 D, which is to say where the cell Péclet number is at most 2. It is at
 /// most four times the largest ½ Δt F′·N along the axis: what the mesh alone would sweep over the solution is bounded
-/// elsewhere, however short the step is. w is that of [`wide`]. u₋ is the limited value at the face on the side of i,
+/// elsewhere, however short the step is; but for diffusion that [vanishes](Law::vanishing_diffusion) all of it counts. w is that of [`wide`]. u₋ is the limited value at the face on the side of i,
 /// from where the flow comes ([`increments`](super::reconstruction::increments)), which passes where D is 0. Where the
 /// flow comes from both sides, the larger of both θ counts.
 pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[f64; B]; D]>);
@@ -83,7 +83,10 @@ impl<const D: usize> Half<'_, D> {
             }
         });
         let fastest = |axis: usize, c: usize| speeds.iter().fold(0.0, |m, speeds| larger(m, speeds[axis][c].flow));
-        let fastest: [[f64; B]; D] = std::array::from_fn(|axis| std::array::from_fn(|c| SWEEPS * fastest(axis, c)));
+        let vanishes = law.vanishing_diffusion();
+        let fastest: [[f64; B]; D] = std::array::from_fn(|axis| {
+            std::array::from_fn(|c| if vanishes[c] { f64::INFINITY } else { SWEEPS * fastest(axis, c) })
+        });
         let ranges: [f64; B] = std::array::from_fn(|c| {
             let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u[c]), h.max(u[c])]);
             high - low

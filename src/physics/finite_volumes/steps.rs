@@ -1,6 +1,7 @@
 //! Steps in time.
 
 use super::newton::Solved;
+use super::repair::repair;
 use super::transport::Transport;
 use super::{
     Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, inside, settle, sides, stretched,
@@ -314,6 +315,8 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let plain = law.stored((level.t, &inside(level.mesh, &level.x), &u), level.mesh)?.is_empty();
         settle(&level.cells, &residual, &mut values, |c| plain && sides.iter().all(|side| side.given[c].is_none()));
         within(&bounds, &mut values);
+        let empty = law.empty((level.t, &inside(level.mesh, &level.x)), start, &sides);
+        repair(&level.cells, &sides, &empty, &mut values);
         // of values that are not finite, that is what is wrong
         check_finite(law.names(), level.mesh, &values)?;
         stalled.map_or(Ok((values, work)), Err)

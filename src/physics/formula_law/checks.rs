@@ -7,16 +7,24 @@ use crate::physics::prescribed::evaluate;
 
 /// A diffusivity may be negative by up to this share of its largest value, as it may be where it is a function of a
 /// solution that oscillates slightly around zero.
-const WIGGLES: f64 = 1e-3;
+pub(super) const WIGGLES: f64 = 1e-3;
+/// The same after the start for those that vanish at some value of an unknown, which goes beyond it at a front.
+pub(super) const BEYOND: f64 = 0.1;
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Default> FormulaLaw<D, B, P, K, Solver> {
-    /// Refuses a diffusivity that is more negative than oscillations of the solution may make it.
-    pub(super) fn check_diffusivities(&self, mesh: &Mesh<D>, nodes: &[[f64; K]]) -> Result<(), Failure> {
-        for c in 0..B {
+    /// Refuses a diffusivity that is more negative than a share of its largest value; `node` is that of a place.
+    pub(super) fn check_diffusivities(
+        &self,
+        mesh: &Mesh<D>,
+        nodes: &[[f64; K]],
+        shares: [f64; B],
+        node: impl Fn(usize) -> usize,
+    ) -> Result<(), Failure> {
+        for (c, share) in shares.into_iter().enumerate() {
             let values = || nodes.iter().map(|node| Self::value(node, Self::DIFFUSIVITY, c));
             let [least, largest] = values().fold([0.0_f64; 2], |[l, h], value| [l.min(value), h.max(value.abs())]);
-            if least < -WIGGLES * largest {
-                let k = Self::node(mesh, values().position(|value| value == least).unwrap_or_default());
+            if least < -share * largest {
+                let k = node(values().position(|value| value == least).unwrap_or_default());
                 let (node, x) = mesh.told(k);
                 return Err(Failure::NotPositive { what: "the diffusivity of a formula", value: least, node, x });
             }

@@ -1,6 +1,7 @@
 //! What each equation of a study is, as its formulas tell.
 
 use crate::formula::Formula;
+use crate::physics::bounds::{SAMPLES, sampled};
 use crate::physics::finite_volumes::Limited;
 use crate::physics::formula_pde::{Formulas, Scheme};
 use crate::physics::sides::Open;
@@ -12,6 +13,10 @@ pub(super) struct Kinds<const B: usize> {
     pub damped: [bool; B],
     /// Those whose flux is a function of themselves alone.
     pub has_own_flux: [bool; B],
+    /// Those whose diffusivity is 0 wherever some unknown has a certain value.
+    pub vanishes: [bool; B],
+    /// The values of an unknown at which its own diffusivity is 0, where no term takes gradients or is stored.
+    pub vanishing: [Vec<f64>; B],
     /// Those that diffuse alike in all directions, in Cartesian coordinates: cells along a radius have another mass.
     pub shares: [bool; B],
     /// Those of these whose source is not linear in it.
@@ -36,6 +41,11 @@ impl<const B: usize> Kinds<B> {
         let (diffuses, has_source) = (|c: usize| !is_zero(D, c), |c: usize| !is_zero(D + 1, c));
         let by_gradients = |c: usize| terms.has_flux(c) || terms.has_source(c);
         let is_plain = |c: usize| !by_gradients(c) && !terms.has_storage(c);
+        // derivatives by unknowns follow all quantities themselves, unknown by unknown
+        let by_unknown = |c: usize, e: usize| &nodal[((D + 2) * (1 + e) + D + 1) * B + c];
+        let bends = |c: usize| (0..B).any(|e| by_unknown(c, c).depends_on(D + e));
+        let vanishing = |c: usize, e: usize| zeros(&nodal[D * B + c], D + e);
+        let vanishes: [bool; B] = std::array::from_fn(|c| diffuses(c) && (0..B).any(|e| !vanishing(c, e).is_empty()));
         let limited: [bool; B] = std::array::from_fn(|c| match scheme {
             None => !diffuses(c) && !terms.has_flux(c) && !terms.has_storage(c),
             Some(scheme) => *scheme == Scheme::Limited,
@@ -47,7 +57,7 @@ impl<const B: usize> Kinds<B> {
             fluxes.all(|flux| (0..D + B).all(|v| v == D + c || !flux.depends_on(v)))
         };
         let keeps_range = |c: usize| {
-            let flows = (0..D).any(|d| nodal[d * B + c].text() != "0");
+            let flows = (0..D).any(|d| !is_zero(d, c));
             let ends = |end: &Open| match end {
                 Open::Value(_) | Open::Outflow => true,
                 Open::Closed => !flows,
@@ -60,12 +70,12 @@ impl<const B: usize> Kinds<B> {
                 && (cartesian || !flows)
                 && sides[c].as_flattened().iter().all(ends)
         };
-        // derivatives by unknowns follow all quantities themselves, unknown by unknown
-        let by_unknown = |c: usize, e: usize| &nodal[((D + 2) * (1 + e) + D + 1) * B + c];
         let on_place = |formula: &Formula| (0..D).any(|d| formula.depends_on(d));
         let is_loaded = |c: usize| on_place(&nodal[(D + 1) * B + c]) && !(0..B).any(|e| on_place(by_unknown(c, e)));
-        let shares = |c: usize| cartesian && diffuses(c) && !limited[c] && !terms.has_storage(c);
-        let bends = |c: usize| shares(c) && (0..B).any(|e| by_unknown(c, c).depends_on(D + e));
+        // where diffusion vanishes nothing damps what overshoots; where the source bends, that is seen at each step
+        let damps = |c: usize| !vanishes[c] || bends(c);
+        let shares = |c: usize| cartesian && diffuses(c) && damps(c) && !limited[c] && !terms.has_storage(c);
+        let bends = |c: usize| shares(c) && bends(c);
         let reacts_alike = |c: usize| bends(c) && !on_place(&nodal[(D + 1) * B + c]);
         let is_fed = |c: usize| sides[c].as_flattened().iter().any(|end| matches!(end, Open::Flux(_)));
         let opens = |&(d, end): &(usize, usize)| {
@@ -79,6 +89,8 @@ impl<const B: usize> Kinds<B> {
             },
             damped: limited.map(|limited| !limited && scheme.is_none()),
             has_own_flux: std::array::from_fn(flux_is_own),
+            vanishes,
+            vanishing: std::array::from_fn(|c| if is_plain(c) { vanishing(c, c) } else { Vec::new() }),
             shares: std::array::from_fn(shares),
             bends: std::array::from_fn(bends),
             reacts_alike: std::array::from_fn(reacts_alike),
@@ -88,4 +100,16 @@ impl<const B: usize> Kinds<B> {
             open: (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(opens).collect(),
         }
     }
+}
+
+/// The values of a variable at which a diffusivity is 0 whatever the others are, of 0, the numbers that its formula
+/// names, and minus these.
+fn zeros(diffusivity: &Formula, variable: usize) -> Vec<f64> {
+    let is_zero = |value: &f64| {
+        let at = |sample: usize| diffusivity.eval(&sampled(diffusivity, sample, (variable, *value)));
+        (0..SAMPLES).all(|sample| at(sample) == 0.0)
+    };
+    let named = diffusivity.constants().flat_map(|number| [number, -number]);
+    let values = [0.0].into_iter().chain(named).filter(|_| diffusivity.depends_on(variable));
+    values.filter(is_zero).collect()
 }

@@ -1,6 +1,7 @@
 //! A user's equation as physics: where it starts, and how it is stepped.
 
 use super::FormulaLaw;
+use super::checks::WIGGLES;
 use crate::error::Failure;
 use crate::geometry::{Cells, Field, Mesh, dot};
 use crate::numerics::larger;
@@ -42,13 +43,14 @@ where
         }
         self.check_sides(t, mesh)?;
         self.check_exact(t, mesh)?;
-        for (k, node) in self.nodes(t, &mesh.images(), values).iter().enumerate() {
+        let nodes = self.nodes(t, &mesh.images(), values);
+        for (k, node) in nodes.iter().enumerate() {
             if let Some(worst) = node.iter().position(|v| !v.is_finite()) {
                 let given = Some(&values[k]).filter(|_| self.of_unknowns[worst]);
                 return Err(self.failure(self.what(worst), node[worst], mesh, k, given));
             }
         }
-        Ok(())
+        self.check_diffusivities(mesh, &nodes, [WIGGLES; B], |k| k)
     }
 
     fn exact(&self, t: f64, mesh: &Mesh<D>) -> Option<Field> {
@@ -58,13 +60,13 @@ where
     }
 
     fn keeps_range(&self) -> Vec<bool> {
-        self.keeps_range.to_vec()
+        self.kinds.keeps_range.to_vec()
     }
 
     fn unresolved_flux(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Option<(usize, usize, f64)> {
         let (lattice, values) = (mesh.lattice(), u.values().as_chunks::<B>().0);
         let nodes = self.nodes(t, &mesh.images(), values);
-        let (limited, damped) = (self.limited().unknowns, self.damped);
+        let (limited, damped) = (self.limited().unknowns, self.kinds.damped);
         let mut worst: Option<(usize, usize, f64)> = None;
         for c in (0..B).filter(|&c| !limited[c] && !damped[c]) {
             let [low, high] = u.component(c).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)]);

@@ -18,12 +18,12 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
     /// values between them away, [`PULLED`] where it pushes one of these ends away, which is a state at rest, and else
     /// 1; 0 for those that share no mass. `nodes` gives the formulas at the nodes.
     pub(super) fn weights_of_neighbours(&self, nodes: impl FnOnce() -> Vec<[f64; K]>, u: &[[f64; B]]) -> [f64; B] {
-        let mut weights = self.shares.map(|shares| if shares { 1.0 } else { 0.0 });
-        if !self.bends.contains(&true) {
+        let mut weights = self.kinds.shares.map(|shares| if shares { 1.0 } else { 0.0 });
+        if !self.kinds.bends.contains(&true) {
             return weights;
         }
         let nodes = nodes();
-        for c in (0..B).filter(|&c| self.bends[c]) {
+        for c in (0..B).filter(|&c| self.kinds.bends[c]) {
             let slope = |k: usize| Self::slope(&nodes[k], Self::SOURCE, c, c);
             let by_value = |a: &usize, b: &usize| u[*a][c].total_cmp(&u[*b][c]);
             let ends = [(0..u.len()).min_by(by_value), (0..u.len()).max_by(by_value)];
@@ -37,7 +37,7 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
                 continue;
             }
             let keeps = ends.into_iter().flatten().all(|k| slope(k) < 0.0);
-            if self.reacts_alike[c] && keeps && (0..u.len()).any(|k| slope(k) > 0.0) {
+            if self.kinds.reacts_alike[c] && keeps && (0..u.len()).any(|k| slope(k) > 0.0) {
                 weights[c] = BISTABLE;
             }
         }

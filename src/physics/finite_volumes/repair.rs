@@ -1,0 +1,121 @@
+//! What keeps values above those at which their diffusion vanishes.
+
+use super::Side;
+use crate::geometry::{DualCells, Patch, strides};
+
+/// How many nodes away there may be what a node lacks.
+const REACH: usize = 8;
+
+/// Moves values that are beyond some ends, a lower and an upper one for each unknown, onto these, and takes what that
+/// adds from the nodes around in proportion to what each has beyond the end: Σ A u stays
+///
+/// Where a front leaves a node within a step, second-order steps in time go beyond the empty state by a share of what
+/// was there, as for any function of time with a kink, and nothing diffuses back what is missing. Where the nodes around
+/// have too little, those around these are asked, too; what nobody has is left. Values that are given on sides stay.
+///
+/// # Source
+/// Kucharik, Shashkov and Wendroff, *An efficient linearity-and-bound-preserving remapping method* (2003).
+pub(super) fn repair<const B: usize, const D: usize>(
+    cells: &DualCells<D>,
+    sides: &[Side<B>],
+    ends: &[[f64; 2]; B],
+    values: &mut [[f64; B]],
+) {
+    for (c, ends) in ends.iter().enumerate() {
+        for (&end, sign) in ends.iter().zip([1.0, -1.0]).filter(|(end, _)| end.is_finite()) {
+            let room = |value: &[f64; B]| sign * (value[c] - end);
+            if values.iter().all(|value| room(value) >= 0.0) {
+                continue;
+            }
+            let mut is_given = vec![false; values.len()];
+            sides.iter().for_each(|side| is_given[side.i] = side.given[c].is_some());
+            for i in (0..values.len()).filter(|&i| !is_given[i]) {
+                let missing = -cells.areas()[i] * room(&values[i]);
+                if missing <= 0.0 {
+                    continue;
+                }
+                let has = |k: usize| if is_given[k] { 0.0 } else { cells.areas()[k] * room(&values[k]).max(0.0) };
+                let donors = |reach: usize| around(cells.patch(), i, reach).filter(|&k| has(k) > 0.0);
+                let sum = |reach: usize| donors(reach).map(has).sum::<f64>();
+                let reach = (1..REACH).find(|&reach| sum(reach) >= missing).unwrap_or(REACH);
+                let (donors, share) = (donors(reach).collect::<Vec<usize>>(), (missing / sum(reach)).min(1.0));
+                // 0 where there is nobody
+                let taken: f64 = donors.iter().map(|&k| share * has(k)).sum();
+                donors.into_iter().for_each(|k| values[k][c] -= share * sign * room(&values[k]));
+                values[i][c] += sign * taken / cells.areas()[i];
+                if share < 1.0 {
+                    values[i][c] = end;
+                }
+            }
+        }
+    }
+}
+
+/// The nodes at most `reach` away from a node along each axis, but that one.
+fn around<const D: usize>(patch: &Patch<D>, i: usize, reach: usize) -> impl Iterator<Item = usize> {
+    let (size, wraps, strides) = (patch.size, patch.wraps, strides(patch.size));
+    let along: [usize; D] = std::array::from_fn(|d| i / strides[d] % size[d]);
+    // an axis that wraps is gone round once at most
+    let [below, above]: [[usize; D]; 2] = std::array::from_fn(|end| {
+        std::array::from_fn(|d| match (wraps[d], end) {
+            (true, 0) => reach.min((size[d] - 1) / 2),
+            (true, _) => reach.min(size[d] / 2),
+            (false, 0) => reach.min(along[d]),
+            (false, _) => reach.min(size[d] - 1 - along[d]),
+        })
+    });
+    let widths: [usize; D] = std::array::from_fn(|d| below[d] + above[d] + 1);
+    (0..widths.iter().product()).filter_map(move |n| {
+        let mut rest = n;
+        let index = |d: usize| {
+            let step = rest % widths[d];
+            rest /= widths[d];
+            (along[d] + size[d] + step - below[d]) % size[d] * strides[d]
+        };
+        let k = (0..D).map(index).sum();
+        (k != i).then_some(k)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Lattice, Mesh};
+
+    /// What is beyond an end is on it, Σ A u and what is given on sides stay, and nobody falls below the end.
+    #[test]
+    fn what_is_missing_is_taken_from_around() {
+        let lattice = Lattice::new([6, 5], [false, true]).unwrap();
+        let mesh = Mesh::uniform(lattice, [0.0; 2], [1.0; 2]).unwrap();
+        let mesh = mesh.moved(mesh.x().iter().map(|[x, y]| [0.5 * x * (1.0 + x), *y]).collect()).unwrap();
+        let cells = DualCells::new(&mesh);
+        let sum = |u: &[[f64; 1]]| -> f64 { u.iter().zip(cells.areas()).map(|(u, area)| area * u[0]).sum() };
+        let places: Vec<usize> = cells.patch().places().collect();
+        let sides = [Side { i: 30, k: places[30], given: [Some(1.0)] }];
+        for sign in [1.0, -1.0] {
+            let mut u: Vec<[f64; 1]> = (0..35).map(|i| [sign * if i < 20 { 0.1 * i as f64 } else { 0.0 }]).collect();
+            u[30] = [sign];
+            u[20] = [-sign * 0.3];
+            u[28] = [-sign * 0.01];
+            let before = sum(&u);
+            let end = if sign > 0.0 { [0.0, f64::INFINITY] } else { [f64::NEG_INFINITY, 0.0] };
+            repair(&cells, &sides, &[end], &mut u);
+            assert!((sum(&u) - before).abs() < 1e-15);
+            assert!(u.iter().all(|[u]| sign * u >= 0.0) && u[30] == [sign]);
+        }
+    }
+
+    /// More than all others have stays missing; a node alone lacks what it lacks.
+    #[test]
+    fn what_nobody_has_is_left() {
+        let mesh = Mesh::uniform(Lattice::bounded([3]).unwrap(), [0.0], [1.0]).unwrap();
+        let mut u = [[0.0], [-1.0], [0.25], [0.0]];
+        let ends = [[0.0, f64::INFINITY]];
+        repair(&DualCells::new(&mesh), &[], &ends, &mut u);
+        assert!((u[1][0] + 0.75).abs() < 1e-15);
+        assert_eq!([u[0], u[2], u[3]], [[0.0]; 3]);
+        let mut alone = [[-1.0]; 4];
+        repair(&DualCells::new(&mesh), &[], &ends, &mut alone);
+        assert_eq!(alone, [[-1.0]; 4]);
+    }
+}
