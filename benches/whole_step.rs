@@ -15,8 +15,11 @@ fn main() -> driftmesh::Result<()> {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     for (name, viscosity) in [("ν = 0.2/n", None), ("ν = 5e-3", Some(5e-3))] {
         println!("\n{name}, Δt = 2 ν\n");
-        println!("| cells | ns a node and step | over that at 64² | mesh | pde | density | start, µs a node |");
-        println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+        println!(
+            "| cells | ns a node and step | over that at 64² | mesh | pde | density | start, µs a node | \
+             Newton | products |"
+        );
+        println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
         let mut first = None;
         for n in [64, 128, 256, 512, 1024] {
             let viscosity = viscosity.unwrap_or(0.2 / n as f64);
@@ -41,15 +44,18 @@ fn row(n: usize, viscosity: f64, first: &mut Option<f64>) -> driftmesh::Result<(
     simulation.run(&mut state, &mut record, &mut [])?;
     let nodes = state.mesh.x().len() as f64;
     let of = |seconds: f64| 1e9 * seconds / (nodes * record.work.steps as f64);
+    let a_step = |count: usize| count as f64 / record.work.steps as f64;
     let spent = record.seconds;
     let node = of(spent.wall - begun.wall);
     println!(
-        "| {n}² | {node:.0} | {:.2} | {:.0} | {:.0} | {:.0} | {:.0} |",
+        "| {n}² | {node:.0} | {:.2} | {:.0} | {:.0} | {:.0} | {:.0} | {:.1} | {:.1} |",
         node / *first.get_or_insert(node),
         of(spent.mesh - begun.mesh),
         of(spent.pde - begun.pde),
         of(spent.monitor - begun.monitor),
         1e6 * begun.wall / nodes,
+        a_step(record.work.work.newton_iterations),
+        a_step(record.work.work.linear_iterations),
     );
     Ok(())
 }

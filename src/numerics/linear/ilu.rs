@@ -1,24 +1,17 @@
-use super::block::invert;
-use super::{BlockMatrix, LinearSolver, krylov::Krylov, refill, solved, solved_in, stalled};
-use crate::error::Failure;
-use crate::work::Work;
+//! Incomplete elimination on the nine points of two dimensions.
 
-/// BiCGSTAB preconditioned by incomplete elimination, for B coupled unknowns a node on the nine points of two
-/// dimensions
-///
-/// ILU(0), line by line of the lattice; couplings around periodic axes are left to the iteration. For implicit steps of
-/// convection and diffusion, whose matrices are neither symmetric nor dominated by their star. The iterations counted
-/// are products with the matrix.
+use super::block::invert;
+use super::{BlockMatrix, refill};
+
+/// ILU(0), line by line of the lattice, for B coupled unknowns a node; couplings around periodic axes are left out
 ///
 /// # Source
-/// Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed. (2003), section 10.3; van der Vorst, *Bi-CGSTAB*
-/// (1992).
+/// Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed. (2003), section 10.3.
 #[derive(Debug, Clone, Default)]
-pub struct IluBicgstab<const B: usize> {
+pub(super) struct Ilu<const B: usize> {
     /// At each place of a padded vector: the inverse of the pivot, then the entries of both factors, the upper ones
     /// divided by the pivot. Zero on the ring.
     rows: Vec<[[[f64; B]; B]; 9]>,
-    krylov: Krylov<B>,
 }
 
 /// The points below a node in the order of elimination, and those above it. The neighbour along the line comes last:
@@ -50,88 +43,65 @@ const MEETS: [[Option<usize>; 4]; 4] = {
     meets
 };
 
-impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for IluBicgstab<B> {
-    fn solve(
-        &mut self,
-        a: &BlockMatrix<2, 9, B>,
-        b: &[[f64; B]],
-        x: &mut [[f64; B]],
-        tolerance: [f64; B],
-    ) -> Result<Work, Failure> {
-        let Self { rows, krylov } = self;
-        let (r, _) = krylov.prepare(a.patch.padded_len());
-        let sizes = a.residual(b, x, r);
-        if solved(sizes, tolerance) {
-            return Ok(solved_in::<B, [[f64; B]; B]>(0));
-        }
-        if !sizes.iter().all(|size| size.is_finite()) || !eliminate(a, rows) {
-            return Err(stalled(a.rows.len() * B, sizes, tolerance, 0));
-        }
-        let iterations = krylov.solve(a, b, x, tolerance, 1, |v, x| precondition(a, rows, v, x))?;
-        Ok(solved_in::<B, [[f64; B]; B]>(iterations))
-    }
-}
-
-/// Incomplete elimination; false where a pivot has no inverse.
-fn eliminate<const B: usize>(a: &BlockMatrix<2, 9, B>, factors: &mut Vec<[[[f64; B]; B]; 9]>) -> bool {
-    refill(factors, a.patch.padded_len(), [[[0.0; B]; B]; 9]);
-    let offsets = a.offsets();
-    let mut sound = true;
-    for (row, k) in a.rows.iter().zip(a.patch.places()) {
-        let mut row = *row;
-        for (l, &below) in BELOW.iter().enumerate() {
-            let other = &factors[k.wrapping_add_signed(offsets[below])];
-            let factor = row[below];
-            row[below] = product(&factor, &other[0]);
-            for (u, &above) in ABOVE.iter().enumerate() {
-                if let Some(s) = MEETS[l][u] {
-                    let filled = product(&factor, &other[above]);
-                    for (entry, filled) in row[s].as_flattened_mut().iter_mut().zip(filled.as_flattened()) {
-                        *entry -= filled;
+impl<const B: usize> Ilu<B> {
+    /// Factorises; false where a pivot has no inverse.
+    pub fn factorise(&mut self, a: &BlockMatrix<2, 9, B>) -> bool {
+        let factors = &mut self.rows;
+        refill(factors, a.patch.padded_len(), [[[0.0; B]; B]; 9]);
+        let offsets = a.offsets();
+        let mut sound = true;
+        for (row, k) in a.rows.iter().zip(a.patch.places()) {
+            let mut row = *row;
+            for (l, &below) in BELOW.iter().enumerate() {
+                let other = &factors[k.wrapping_add_signed(offsets[below])];
+                let factor = row[below];
+                row[below] = product(&factor, &other[0]);
+                for (u, &above) in ABOVE.iter().enumerate() {
+                    if let Some(s) = MEETS[l][u] {
+                        let filled = product(&factor, &other[above]);
+                        for (entry, filled) in row[s].as_flattened_mut().iter_mut().zip(filled.as_flattened()) {
+                            *entry -= filled;
+                        }
                     }
                 }
             }
-        }
-        row[0] = invert(row[0]);
-        for above in ABOVE {
-            row[above] = product(&row[0], &row[above]);
-        }
-        sound &= row[0].as_flattened().iter().all(|v| v.is_finite());
-        factors[k] = row;
-    }
-    sound
-}
-
-/// Sets x to (L U)⁻¹ v, with its ring ready for a product with the matrix.
-fn precondition<const B: usize>(
-    a: &BlockMatrix<2, 9, B>,
-    factors: &[[[[f64; B]; B]; 9]],
-    v: &[[f64; B]],
-    x: &mut [[f64; B]],
-) {
-    let (offsets, n) = (a.offsets(), a.patch.pencil_len());
-    // images of periodic axes are not solved for: they start as zero
-    x.fill([0.0; B]);
-    for start in a.patch.pencils() {
-        for k in start..start + n {
-            let mut sum = v[k];
-            for below in BELOW {
-                subtract(&factors[k][below], &x[k.wrapping_add_signed(offsets[below])], &mut sum);
-            }
-            x[k] = sum;
-        }
-    }
-    for p in (0..a.patch.pencil_count()).rev() {
-        let start = a.patch.pencil(p);
-        for k in (start..start + n).rev() {
-            let mut sum: [f64; B] = std::array::from_fn(|r| (0..B).map(|c| factors[k][0][r][c] * x[k][c]).sum());
+            row[0] = invert(row[0]);
             for above in ABOVE {
-                subtract(&factors[k][above], &x[k.wrapping_add_signed(offsets[above])], &mut sum);
+                row[above] = product(&row[0], &row[above]);
             }
-            x[k] = sum;
+            sound &= row[0].as_flattened().iter().all(|v| v.is_finite());
+            factors[k] = row;
         }
+        sound
     }
-    a.patch.wrap(x);
+
+    /// Sets x to (L U)⁻¹ v, with its ring ready for a product with the matrix.
+    pub fn solve(&self, a: &BlockMatrix<2, 9, B>, v: &[[f64; B]], x: &mut [[f64; B]]) {
+        let factors = &self.rows;
+        let (offsets, n) = (a.offsets(), a.patch.pencil_len());
+        // images of periodic axes are not solved for: they start as zero
+        x.fill([0.0; B]);
+        for start in a.patch.pencils() {
+            for k in start..start + n {
+                let mut sum = v[k];
+                for below in BELOW {
+                    subtract(&factors[k][below], &x[k.wrapping_add_signed(offsets[below])], &mut sum);
+                }
+                x[k] = sum;
+            }
+        }
+        for p in (0..a.patch.pencil_count()).rev() {
+            let start = a.patch.pencil(p);
+            for k in (start..start + n).rev() {
+                let mut sum: [f64; B] = std::array::from_fn(|r| (0..B).map(|c| factors[k][0][r][c] * x[k][c]).sum());
+                for above in ABOVE {
+                    subtract(&factors[k][above], &x[k.wrapping_add_signed(offsets[above])], &mut sum);
+                }
+                x[k] = sum;
+            }
+        }
+        a.patch.wrap(x);
+    }
 }
 
 #[inline(always)]

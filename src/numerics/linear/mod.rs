@@ -8,6 +8,7 @@ mod adi;
 mod bicgstab;
 mod block;
 mod block_line;
+mod coarse;
 mod ilu;
 mod krylov;
 mod lu;
@@ -15,16 +16,17 @@ mod multigrid;
 mod pcg;
 mod relaxation;
 mod sparse;
+mod transport;
 mod tridiagonal;
 
 pub use bicgstab::Bicgstab;
 pub use block::BlockBicgstab;
 pub use block_line::BlockElimination;
-pub use ilu::IluBicgstab;
 pub use lu::SparseLu;
 pub use pcg::Pcg;
 pub use relaxation::{Smoother, relax};
 pub use sparse::SparseSystem;
+pub use transport::TransportBicgstab;
 pub use tridiagonal::tridiagonal;
 
 use super::larger;
@@ -245,7 +247,7 @@ pub struct Fallback<First, Then>(First, Then);
 pub type Robust<const K: usize> = Fallback<Bicgstab<K>, SparseLu>;
 
 /// [`Robust`] for B unknowns at a node that convection and diffusion couple to all nine points around it.
-pub type RobustTransport<const B: usize> = Fallback<IluBicgstab<B>, SparseLu>;
+pub type RobustTransport<const B: usize> = Fallback<TransportBicgstab<B>, SparseLu>;
 
 /// The same on a line.
 pub type RobustLine = Fallback<BlockElimination, SparseLu>;

@@ -1,0 +1,41 @@
+use super::coarse::Cycle;
+use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalled};
+use crate::error::Failure;
+use crate::work::Work;
+
+/// BiCGSTAB preconditioned by a cycle of multigrid with incomplete elimination, for B coupled unknowns a node on the nine
+/// points of two dimensions
+///
+/// For implicit steps of convection and diffusion, whose matrices are neither symmetric nor dominated by their star.
+/// Couplings around periodic axes are left to the iteration on each level. The iterations counted are products with the
+/// matrix.
+///
+/// # Source
+/// Trottenberg, Oosterlee, Schüller, *Multigrid*, Academic Press (2001), 7.8; van der Vorst, *Bi-CGSTAB* (1992).
+#[derive(Debug, Clone, Default)]
+pub struct TransportBicgstab<const B: usize> {
+    cycle: Cycle<B>,
+    krylov: Krylov<B>,
+}
+
+impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for TransportBicgstab<B> {
+    fn solve(
+        &mut self,
+        a: &BlockMatrix<2, 9, B>,
+        b: &[[f64; B]],
+        x: &mut [[f64; B]],
+        tolerance: [f64; B],
+    ) -> Result<Work, Failure> {
+        let Self { cycle, krylov } = self;
+        let (r, _) = krylov.prepare(a.patch.padded_len());
+        let sizes = a.residual(b, x, r);
+        if solved(sizes, tolerance) {
+            return Ok(solved_in::<B, [[f64; B]; B]>(0));
+        }
+        if !sizes.iter().all(|size| size.is_finite()) || !cycle.build(a) {
+            return Err(stalled(a.rows.len() * B, sizes, tolerance, 0));
+        }
+        let iterations = krylov.solve(a, b, x, tolerance, 1, |v, x| cycle.solve(a, v, x))?;
+        Ok(solved_in::<B, [[f64; B]; B]>(iterations))
+    }
+}
