@@ -176,3 +176,41 @@ fn negative_diffusivities_of_data_are_refused() {
     let refused = computed.map_or_else(Some, |(_, failure)| failure);
     assert!(matches!(&refused, Some(Error::Failed { failure: Failure::NotPositive { .. }, .. })), "{refused:?}");
 }
+
+/// Where a pile has become so wide that equal cells resolve it, the mesh goes back to these: its error is then not much
+/// larger than theirs.
+#[test]
+fn a_pile_that_has_spread_has_equal_cells() {
+    for (m, at) in [(2.0, -1.7), (3.0, 0.4)] {
+        let [diffusivity, solution] = barenblatt(m, 1.0, [2.5, 2.5]);
+        let solution = solution.replace("x^2", &format!("(x - {at})^2"));
+        let of = |end: f64, generator: &str| {
+            outcome(&line(&format!(
+                r#"
+                [domain]
+                lower = [-7.5]
+                upper = [7.5]
+                [grid]
+                cells = [80]
+                {generator}
+                [time]
+                start = 0.01
+                end = {end}
+                [pde]
+                kind = "formula"
+                unknowns = ["u"]
+                diffusivity = {{ u = "{diffusivity}" }}
+                initial = {{ u = "{solution}" }}
+                exact = {{ u = "{solution}" }}
+                boundary = {{ u = "no-flux" }}
+                "#
+            )))
+        };
+        let ratios = [1.0, 5.0, 20.0].map(|end| {
+            let [moving, fixed] = ["", "[mesh]\ngenerator = { kind = \"fixed\" }"].map(|by| of(end, by).1.unwrap());
+            println!("m = {m}, t = {end}: {moving:.2e} for {fixed:.2e}");
+            moving / fixed
+        });
+        assert!(ratios.iter().all(|ratio| *ratio < 1.5), "m = {m}: {ratios:?}");
+    }
+}

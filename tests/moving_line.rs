@@ -328,3 +328,102 @@ fn nonsense_is_refused_by_name() {
         assert!(error.contains(said), "{table}: {error}");
     }
 }
+
+/// On a periodic line a mesh goes along with what moves, unless another unknown does not: a wave that rests, or has half
+/// of the speed, beside one that is carried. l2 is that of equal cells at most.
+#[test]
+fn a_mesh_does_not_sweep_over_what_rests() {
+    for (speed, exact) in [("0", "cos(2*pi*x)"), ("0.5", "cos(2*pi*(x - t/2))"), ("-1", "cos(2*pi*(x + t))")] {
+        let error = |generator: &str| {
+            let run = run(&format!(
+                r#"
+                [domain]
+                lower = [-0.5]
+                upper = [0.5]
+                periodic = [true]
+                [grid]
+                cells = [60]
+                {generator}
+                [time]
+                start = 0.0
+                end = 3.0
+                [pde]
+                kind = "formula"
+                unknowns = ["a", "b"]
+                flux = {{ a = ["a"], b = ["{speed}*b"] }}
+                diffusivity = {{ a = "1e-5", b = "1e-5" }}
+                initial = {{ a = "sin(2*pi*x)", b = "cos(2*pi*x)" }}
+                exact = {{ a = "exp(-4*pi^2*1e-5*t)*sin(2*pi*(x - t))", b = "exp(-4*pi^2*1e-5*t)*{exact}" }}
+                "#
+            ));
+            run.record.reports.last().unwrap().error.unwrap().l2
+        };
+        let (moving, fixed) = (error(""), error("[mesh]\ngenerator = { kind = \"fixed\" }"));
+        println!("b at {speed}: {moving:.2e} for {fixed:.2e}");
+        assert!(moving <= 1.05 * fixed, "b at {speed}: {moving:e} for {fixed:e}");
+    }
+}
+
+/// A top hat that is carried ten times around, while its flanks widen until equal cells would resolve them.
+#[test]
+fn a_carried_shape_keeps_its_mesh_while_it_widens() {
+    let flanks = |t: &str| {
+        let half = |sign: &str| format!("erf((0.2 {sign} (mod(x - t + 0.75, 1) - 0.5))/sqrt(4e-4*{t}))");
+        format!("0.5*({} + {})", half("-"), half("+"))
+    };
+    let of = |generator: &str| {
+        run(&format!(
+            r#"
+            [domain]
+            lower = [-0.5]
+            upper = [0.5]
+            periodic = [true]
+            [grid]
+            cells = [80]
+            {generator}
+            [time]
+            start = 0.25
+            end = 10.25
+            [pde]
+            kind = "formula"
+            unknowns = ["u"]
+            flux = {{ u = ["u"] }}
+            diffusivity = {{ u = "1e-4" }}
+            initial = {{ u = "{}" }}
+            exact = {{ u = "{}" }}
+            "#,
+            flanks("0.25"),
+            flanks("t"),
+        ))
+    };
+    let (moving, fixed) = (of(""), of("[mesh]\ngenerator = { kind = \"fixed\" }"));
+    let l2 = |run: &MovingRun<1>| run.record.reports.last().unwrap().error.unwrap().l2;
+    println!("{:.2e} for {:.2e}", l2(&moving), l2(&fixed));
+    assert!(l2(&moving) < l2(&fixed) / 10.0);
+    let steps = moving.record.work.steps;
+    assert!(steps < 500, "{steps} steps");
+    assert!(solution(&moving).iter().all(|[_, u]| (-1e-3..=1.001).contains(u)));
+}
+
+/// A shock without viscosity forms and goes around: the mesh, whose cells there are a hundredth of equal ones, takes ten
+/// times the steps of these (632), and not a hundred times.
+#[test]
+fn shocks_without_viscosity_do_not_take_steps_without_end() {
+    let run = run(r#"
+        [domain]
+        periodic = [true]
+        [grid]
+        cells = [80]
+        [time]
+        start = 0.0
+        end = 1.0
+        [pde]
+        kind = "formula"
+        unknowns = ["u"]
+        flux = { u = ["u^2/2"] }
+        initial = { u = "0.5 + sin(2*pi*x)" }
+        "#);
+    let steps = run.record.work.steps;
+    println!("{steps} steps");
+    assert!(steps < 10_000, "{steps} steps");
+}

@@ -24,7 +24,7 @@ use std::borrow::Cow;
 /// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. Where the steepest slope
 /// is less than twice (⟨|∇u|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could
 /// be taken, and s is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and
-/// 5·10³ around jumps.
+/// 500 around jumps.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
@@ -36,8 +36,9 @@ pub struct RootGradient {}
 const BETA: f64 = 4.0;
 /// The largest ρ over the smallest, before it is smoothed.
 const CONTRAST: f64 = 1e6;
-/// The same around a jump, which no mesh resolves: cells of about a thousandth of a uniform one.
-const CONTRAST_OF_JUMPS: f64 = 5e3;
+/// The same around a jump, which no mesh resolves: cells of about a hundredth of a uniform one. A shock
+/// without viscosity is never wider than a cell, and thinner ones take more steps to follow.
+const CONTRAST_OF_JUMPS: f64 = 500.0;
 /// Shares of the range on an edge of the mesh from which it begins to be a jump, and is one.
 const JUMPS: [f64; 2] = [0.25, 0.5];
 /// The steepest slope over that of the background from which there begins to be, and is, something to gain.

@@ -39,7 +39,7 @@ struct Last<const D: usize> {
     /// Where each node went.
     #[serde(with = "nodal")]
     way: Vec<[f64; D]>,
-    /// What the mesh follows, at its start.
+    /// What the mesh follows, at its start: the unknowns of each node after those of the one before.
     u: Vec<f64>,
 }
 
@@ -69,6 +69,11 @@ const NEWEST: f64 = 0.7;
 const FARTHEST: f64 = 0.25;
 /// Share of the squared gradient, and of its determinant, below which it is of rounding.
 const SINGULAR: f64 = 1e-3;
+/// A mesh goes along with all unknowns where at most the first share of their changes is left then, and not at all from
+/// the second on.
+const LEFT: [f64; 2] = [0.5, 0.8];
+/// Ranges below this share of the values are of rounding.
+const ROUNDING: f64 = 1e-9;
 /// Shares of the velocity that are tried: nodes that were made to run into each other stop.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
@@ -151,7 +156,8 @@ impl<const D: usize> Gait<D> {
     ///
     /// Where u is carried along at c, what a node finds changes by δu = (d − c Δt)·∇u over a step in which it goes by
     /// d: c is the best fit to the last step. Nothing else decides on a rigid shift of a periodic mesh, which leaves
-    /// any density as equidistributed as it was.
+    /// any density as equidistributed as it was. Unknowns that do not go along would be swept over: as much of c counts
+    /// as leaves each of them less change than there is at a place at rest.
     fn drift(&self, mesh: &Mesh<D>, u: &[f64]) -> [f64; D]
     where
         Mesh<D>: Cells<D>,
@@ -160,26 +166,40 @@ impl<const D: usize> Gait<D> {
         let Some(Last { took, way, u: before }) = self.last.as_ref().filter(|last| last.u.len() == u.len()) else {
             return [0.0; D];
         };
-        let middle: Vec<f64> = u.iter().zip(before).map(|(a, b)| 0.5 * (a + b)).collect();
-        let gradient = Metrics::new(mesh).gradient(&middle);
-        let cells = DualCells::new(mesh);
-        // normal equations of Σ A (g·s − (d·g − δu))², lengths in uniform cells
+        let (nodes, cells) = (mesh.x().len(), DualCells::new(mesh));
+        let metrics = Metrics::new(mesh);
+        // lengths in uniform cells, unknowns in units of their ranges
         let extent = mesh.extent();
         let h: [f64; D] = std::array::from_fn(|d| extent[d] / mesh.lattice().cells()[d] as f64);
+        let unknowns: Vec<Vec<Seen<D>>> = (0..u.len() / nodes)
+            .filter_map(|c| {
+                let of = |values: &[f64]| values.iter().skip(c).step_by(u.len() / nodes).copied().collect::<Vec<f64>>();
+                let (u, before) = (of(u), of(before));
+                let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
+                let range = (high - low > ROUNDING * low.abs().max(high.abs())).then_some(high - low)?;
+                let middle: Vec<f64> = u.iter().zip(&before).map(|(a, b)| 0.5 * (a + b) / range).collect();
+                let found = |k: usize, g: [f64; D]| dot(way[k], g) - (u[k] - before[k]) / range;
+                let gradient = metrics.gradient(&middle);
+                let seen = |(k, g): (usize, [f64; D])| (std::array::from_fn(|d| g[d] * h[d]), found(k, g));
+                Some(gradient.into_iter().enumerate().map(seen).collect())
+            })
+            .collect();
+        // normal equations of Σ A (g·s − (d·g − δu))²
         let (mut matrix, mut right) = ([[0.0; D]; D], [0.0; D]);
-        for (k, (g, area)) in gradient.iter().zip(cells.areas()).enumerate() {
-            let found = dot(way[k], *g) - (u[k] - before[k]);
-            for d in 0..D {
-                let own = g[d] * h[d];
-                right[d] += area * own * found;
-                (0..D).for_each(|e| matrix[d][e] += area * own * (g[e] * h[e]));
+        for unknown in &unknowns {
+            for ((own, found), area) in unknown.iter().zip(cells.areas()) {
+                for d in 0..D {
+                    right[d] += area * own[d] * found;
+                    (0..D).for_each(|e| matrix[d][e] += area * own[d] * own[e]);
+                }
             }
         }
         let shift = shift(matrix, right, periodic);
+        let kept = unknowns.iter().map(|unknown| along(unknown, shift, cells.areas())).fold(1.0, f64::min);
         std::array::from_fn(|d| {
             let mean = sum(way.iter().map(|way| way[d])) / way.len() as f64;
             match periodic[d] {
-                true => (shift[d] * h[d]).clamp(mean - FARTHEST * extent[d], mean + FARTHEST * extent[d]) / took,
+                true => (kept * shift[d] * h[d]).clamp(mean - FARTHEST * extent[d], mean + FARTHEST * extent[d]) / took,
                 false => 0.0,
             }
         })
@@ -197,7 +217,9 @@ impl<const D: usize> Gait<D> {
         }
         if let Some(Last { took, way, u }) = &self.last {
             check_nodal("last way", way, nodes)?;
-            check_nodal("solution before", u.as_chunks::<1>().0, nodes)?;
+            if u.is_empty() || u.len() % nodes != 0 || u.iter().any(|u| !u.is_finite()) {
+                return Err(Unfit::Damaged(format!("its solution before has {} values for {nodes} nodes", u.len())));
+            }
             if !(took.is_finite() && *took > 0.0) {
                 return Err(Unfit::Damaged(format!("its last mesh step is {took} long")));
             }
@@ -209,6 +231,23 @@ impl<const D: usize> Gait<D> {
             false => Err(Unfit::Damaged("its mesh cannot have gone so".into())),
         }
     }
+}
+
+/// Of an unknown at a node: its gradient per uniform cell, g, and what it would have changed by at a place at rest, as
+/// f = d·∇u − δu.
+type Seen<const D: usize> = ([f64; D], f64);
+
+/// How far an unknown goes along with a shift s: 1 where what is left of its change, √(Σ A (g·s − f)²), is small beside
+/// that at a place at rest, √(Σ A f²), with the areas A of all nodes, and 0 where it is not.
+fn along<const D: usize>(unknown: &[Seen<D>], shift: [f64; D], areas: &[f64]) -> f64 {
+    let of = |left: &dyn Fn(&Seen<D>) -> f64| {
+        sum(unknown.iter().zip(areas).map(|(node, area)| area * left(node).powi(2))).sqrt()
+    };
+    let (riding, resting) = (of(&|(g, found)| dot(*g, shift) - found), of(&|(_, found)| *found));
+    if riding == 0.0 {
+        return 1.0;
+    }
+    ((LEFT[1] - riding / resting) / (LEFT[1] - LEFT[0])).clamp(0.0, 1.0)
 }
 
 /// The solution of the normal equations of a shift along the periodic axes; 0 along axes that tell nothing of it.

@@ -2,7 +2,7 @@
 
 use super::State;
 use crate::density::need;
-use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
+use crate::geometry::{Cells, DualCells, Field, Mesh, Patch, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
@@ -31,8 +31,8 @@ const INTERPOLATION: f64 = 0.2;
 ///
 /// Where the solution stands still nothing heals what that adds up to, so a mesh that starts far from where it wants to
 /// be takes its time: over a run it adds no more than a share of the error that equal cells have. Where the solution
-/// changes by itself, a mesh that follows may add a share of that change, unless equal cells resolve it: there is no
-/// hurry on the way back to them.
+/// changes by itself, a mesh that follows may add a share of that change, unless equal cells resolve it. On the way back to
+/// these it may add what it interpolates worse than they do.
 pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
 where
     Mesh<D>: Cells<D>,
@@ -73,17 +73,26 @@ where
             .map(|(k, area)| (0..D).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
         // what the mesh itself does not resolve does more harm than the way to where it does
-        let jumps = patch.places().flat_map(|k| strides.map(|s| u[k + s] - u[k]));
-        let jump = jumps.fold(0.0, larger) / range;
+        let jump = edges(&state.mesh, &values).fold(0.0, larger) / range;
         let unresolved = ((jump - UNRESOLVED[0]) / (UNRESOLVED[1] - UNRESOLVED[0])).clamp(0.0, 1.0);
         let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
-        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + of_change * hurry * state.own_change * dt;
+        let excess = (INTERPOLATION * jump * jump - uniform).max(0.0);
+        let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + of_change * hurry * state.own_change * dt + excess;
         if harm > budget {
             share = share.min(budget / harm);
         }
     }
     share
+}
+
+/// The changes of nodal values over all edges of a mesh.
+fn edges<const D: usize>(mesh: &Mesh<D>, values: &[f64]) -> impl Iterator<Item = f64> {
+    let patch = Patch { origin: [0; D], size: mesh.lattice().nodes(), wraps: mesh.lattice().periodic() };
+    let u = padded(mesh.lattice(), values.as_chunks::<1>().0, [[0.0]; D]);
+    let strides = patch.padded_strides();
+    let places: Vec<usize> = patch.places().collect();
+    places.into_iter().flat_map(move |k| strides.map(|s| (u[k + s][0] - u[k][0]).abs()))
 }
 
 /// The largest change of an unknown at a fixed place in a step, as a share of its range, over the time that it took.

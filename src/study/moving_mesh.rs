@@ -259,8 +259,8 @@ where
                 let why = match start.end {
                     Ending::AtRest => None,
                     Ending::Jump => Some(
-                        "the initial solution jumps, and no mesh resolves a jump; it starts with a \
-                         thousandth of a uniform cell there",
+                        "the initial solution jumps, and no mesh resolves a jump; it starts with its \
+                         thinnest cells there",
                     ),
                     Ending::Restless => Some(
                         "the mesh does not come to rest on the initial solution, which may be \

@@ -11,7 +11,8 @@ const REACH: usize = 8;
 ///
 /// Where a front leaves a node within a step, second-order steps in time go beyond the empty state by a share of what
 /// was there, as for any function of time with a kink, and nothing diffuses back what is missing. Where the nodes around
-/// have too little, those around these are asked, too; what nobody has is left. Values that are given on sides stay.
+/// have too little, those around these are asked, too, and at last all nodes; what these do not have either is left.
+/// Values that are given on sides stay.
 ///
 /// # Source
 /// Kucharik, Shashkov and Wendroff, *An efficient linearity-and-bound-preserving remapping method* (2003).
@@ -29,22 +30,30 @@ pub(super) fn repair<const B: usize, const D: usize>(
             }
             let mut is_given = vec![false; values.len()];
             sides.iter().for_each(|side| is_given[side.i] = side.given[c].is_some());
+            let has = |value: &[f64; B], k: usize| if is_given[k] { 0.0 } else { cells.areas()[k] * room(value) };
             for i in (0..values.len()).filter(|&i| !is_given[i]) {
-                let missing = -cells.areas()[i] * room(&values[i]);
+                let missing = -has(&values[i], i);
                 if missing <= 0.0 {
                     continue;
                 }
-                let has = |k: usize| if is_given[k] { 0.0 } else { cells.areas()[k] * room(&values[k]).max(0.0) };
-                let donors = |reach: usize| around(cells.patch(), i, reach).filter(|&k| has(k) > 0.0);
-                let sum = |reach: usize| donors(reach).map(has).sum::<f64>();
-                let reach = (1..REACH).find(|&reach| sum(reach) >= missing).unwrap_or(REACH);
-                let (donors, share) = (donors(reach).collect::<Vec<usize>>(), (missing / sum(reach)).min(1.0));
-                // 0 where there is nobody
-                let taken: f64 = donors.iter().map(|&k| share * has(k)).sum();
+                let donors = |reach: usize| around(cells.patch(), i, reach).filter(|&k| has(&values[k], k) > 0.0);
+                // the sum of nothing is to be 0, not −0
+                let sum = |reach: usize| donors(reach).fold(0.0, |sum, k| sum + has(&values[k], k));
+                let Some(reach) = (1..=REACH).find(|&reach| sum(reach) >= missing) else { continue };
+                let (share, donors) = (missing / sum(reach), donors(reach).collect::<Vec<usize>>());
                 donors.into_iter().for_each(|k| values[k][c] -= share * sign * room(&values[k]));
-                values[i][c] += sign * taken / cells.areas()[i];
-                if share < 1.0 {
-                    values[i][c] = end;
+                values[i][c] = end;
+            }
+            // what is missing far from all that there is
+            let of = |sign: f64| {
+                let parts = values.iter().enumerate().map(|(k, value)| (sign * has(value, k)).max(0.0));
+                crate::numerics::sum(parts)
+            };
+            let (all, missing) = (of(1.0), of(-1.0));
+            if missing > 0.0 && all >= missing {
+                for (k, value) in values.iter_mut().enumerate().filter(|(k, _)| !is_given[*k]) {
+                    let left = if has(value, k) > 0.0 { 1.0 - missing / all } else { 0.0 };
+                    value[c] = end + left * (value[c] - end);
                 }
             }
         }
@@ -105,17 +114,20 @@ mod tests {
         }
     }
 
-    /// More than all others have stays missing; a node alone lacks what it lacks.
+    /// Far from all that there is every node gives something; more than all have stays missing.
     #[test]
     fn what_nobody_has_is_left() {
-        let mesh = Mesh::uniform(Lattice::bounded([3]).unwrap(), [0.0], [1.0]).unwrap();
-        let mut u = [[0.0], [-1.0], [0.25], [0.0]];
-        let ends = [[0.0, f64::INFINITY]];
-        repair(&DualCells::new(&mesh), &[], &ends, &mut u);
-        assert!((u[1][0] + 0.75).abs() < 1e-15);
-        assert_eq!([u[0], u[2], u[3]], [[0.0]; 3]);
-        let mut alone = [[-1.0]; 4];
-        repair(&DualCells::new(&mesh), &[], &ends, &mut alone);
-        assert_eq!(alone, [[-1.0]; 4]);
+        let mesh = Mesh::uniform(Lattice::bounded([20]).unwrap(), [0.0], [1.0]).unwrap();
+        let (cells, ends) = (DualCells::new(&mesh), [[0.0, f64::INFINITY]]);
+        let mut u = [[0.0]; 21];
+        (u[1], u[2], u[19]) = ([0.5], [0.25], [-0.3]);
+        repair(&cells, &[], &ends, &mut u);
+        assert!((u[1][0] - 0.3).abs() < 1e-15 && (u[2][0] - 0.15).abs() < 1e-15 && u[19] == [0.0]);
+        for lacking in [[[-1.0]; 21], std::array::from_fn(|i| [if i == 9 { 0.5 } else { -0.1 }])] {
+            let mut left = lacking;
+            repair(&cells, &[], &ends, &mut left);
+            let sum = |u: &[[f64; 1]]| -> f64 { u.iter().zip(cells.areas()).map(|(u, area)| area * u[0]).sum() };
+            assert!((sum(&left) - sum(&lacking)).abs() < 1e-15);
+        }
     }
 }
