@@ -16,6 +16,7 @@ pub use given::Given;
 pub(crate) use need::need;
 pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
+pub(crate) use root_gradient::largest_step;
 pub use smoothing::smooth;
 pub use tables::{ArclengthTable, GivenTable, RootGradientTable};
 

@@ -168,7 +168,7 @@ impl Followed {
 }
 
 /// The largest difference between neighbouring nodes.
-fn largest_step<const D: usize>(lattice: &Lattice<D>, u: &[f64]) -> f64 {
+pub(crate) fn largest_step<const D: usize>(lattice: &Lattice<D>, u: &[f64]) -> f64 {
     let (nodes, wraps, steps) = (lattice.nodes(), lattice.periodic(), lattice.strides());
     (0..D).fold(0.0, |most, axis| {
         let (n, s) = (nodes[axis], steps[axis]);

@@ -381,26 +381,6 @@ fn inside<'a, const D: usize>(mesh: &Mesh<D>, x: &'a [[f64; D]]) -> Cow<'a, [[f6
     }
 }
 
-/// For each unknown without a flux through the sides, adds the integral of the remaining residual to the values, in
-/// proportion to its magnitude at each node: sums are then conserved to round-off, whatever the tolerance of Newton's
-/// method, and values stay that have no residual, such as a state that grows if anything is added to it.
-fn settle<const B: usize, const D: usize>(
-    cells: &DualCells<D>,
-    residual: &[[f64; B]],
-    values: &mut [[f64; B]],
-    closed: impl Fn(usize) -> bool,
-) {
-    let integral = |of: &dyn Fn(&[f64; B]) -> f64| {
-        crate::numerics::sum(cells.areas().iter().zip(residual).map(|(area, residual)| area * of(residual)))
-    };
-    for c in (0..B).filter(|&c| closed(c)) {
-        let (left, all) = (integral(&|residual| residual[c]), integral(&|residual| residual[c].abs()));
-        if all > 0.0 {
-            values.iter_mut().zip(residual).for_each(|(value, residual)| value[c] += left / all * residual[c].abs());
-        }
-    }
-}
-
 #[inline(always)]
 fn add<const B: usize>(sum: &mut Block<B>, scale: f64, block: &Block<B>) {
     for (sum, entry) in sum.as_flattened_mut().iter_mut().zip(block.as_flattened()) {

@@ -1,8 +1,8 @@
 //! What a mesh may do to the solution on its way.
 
 use super::State;
-use crate::density::need;
-use crate::geometry::{Cells, DualCells, Field, Mesh, Patch, length, padded};
+use crate::density::{largest_step, need};
+use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
@@ -73,7 +73,7 @@ where
             .map(|(k, area)| (0..D).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
         // what the mesh itself does not resolve does more harm than the way to where it does
-        let jump = edges(&state.mesh, &values).fold(0.0, larger) / range;
+        let jump = largest_step(lattice, &values) / range;
         let unresolved = ((jump - UNRESOLVED[0]) / (UNRESOLVED[1] - UNRESOLVED[0])).clamp(0.0, 1.0);
         let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
@@ -84,15 +84,6 @@ where
         }
     }
     share
-}
-
-/// The changes of nodal values over all edges of a mesh.
-fn edges<const D: usize>(mesh: &Mesh<D>, values: &[f64]) -> impl Iterator<Item = f64> {
-    let patch = Patch { origin: [0; D], size: mesh.lattice().nodes(), wraps: mesh.lattice().periodic() };
-    let u = padded(mesh.lattice(), values.as_chunks::<1>().0, [[0.0]; D]);
-    let strides = patch.padded_strides();
-    let places: Vec<usize> = patch.places().collect();
-    places.into_iter().flat_map(move |k| strides.map(|s| (u[k + s][0] - u[k][0]).abs()))
 }
 
 /// The largest change of an unknown at a fixed place in a step, as a share of its range, over the time that it took.

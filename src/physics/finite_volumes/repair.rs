@@ -1,7 +1,9 @@
-//! What keeps values above those at which their diffusion vanishes.
+//! What is set right after an implicit step: what Newton's method left, and values beyond those at which their diffusion
+//! vanishes.
 
 use super::Side;
 use crate::geometry::{DualCells, Patch, strides};
+use crate::numerics::sum;
 
 /// How many nodes away there may be what a node lacks.
 const REACH: usize = 8;
@@ -37,17 +39,16 @@ pub(super) fn repair<const B: usize, const D: usize>(
                     continue;
                 }
                 let donors = |reach: usize| around(cells.patch(), i, reach).filter(|&k| has(&values[k], k) > 0.0);
-                // the sum of nothing is to be 0, not −0
-                let sum = |reach: usize| donors(reach).fold(0.0, |sum, k| sum + has(&values[k], k));
-                let Some(reach) = (1..=REACH).find(|&reach| sum(reach) >= missing) else { continue };
-                let (share, donors) = (missing / sum(reach), donors(reach).collect::<Vec<usize>>());
+                let of = |reach: usize| donors(reach).fold(0.0, |all, k| all + has(&values[k], k));
+                let Some(reach) = (1..=REACH).find(|&reach| of(reach) >= missing) else { continue };
+                let (share, donors) = (missing / of(reach), donors(reach).collect::<Vec<usize>>());
                 donors.into_iter().for_each(|k| values[k][c] -= share * sign * room(&values[k]));
                 values[i][c] = end;
             }
             // what is missing far from all that there is
             let of = |sign: f64| {
                 let parts = values.iter().enumerate().map(|(k, value)| (sign * has(value, k)).max(0.0));
-                crate::numerics::sum(parts)
+                sum(parts)
             };
             let (all, missing) = (of(1.0), of(-1.0));
             if missing > 0.0 && all >= missing {
@@ -56,6 +57,26 @@ pub(super) fn repair<const B: usize, const D: usize>(
                     value[c] = end + left * (value[c] - end);
                 }
             }
+        }
+    }
+}
+
+/// For each unknown without a flux through the sides, adds the integral of the remaining residual to the values, in
+/// proportion to its magnitude at each node: sums are then conserved to round-off, whatever the tolerance of Newton's
+/// method, and values stay that have no residual, such as a state that grows if anything is added to it.
+pub(super) fn settle<const B: usize, const D: usize>(
+    cells: &DualCells<D>,
+    residual: &[[f64; B]],
+    values: &mut [[f64; B]],
+    closed: impl Fn(usize) -> bool,
+) {
+    let integral = |of: &dyn Fn(&[f64; B]) -> f64| {
+        sum(cells.areas().iter().zip(residual).map(|(area, residual)| area * of(residual)))
+    };
+    for c in (0..B).filter(|&c| closed(c)) {
+        let (left, all) = (integral(&|residual| residual[c]), integral(&|residual| residual[c].abs()));
+        if all > 0.0 {
+            values.iter_mut().zip(residual).for_each(|(value, residual)| value[c] += left / all * residual[c].abs());
         }
     }
 }

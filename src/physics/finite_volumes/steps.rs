@@ -1,11 +1,9 @@
 //! Steps in time.
 
 use super::newton::Solved;
-use super::repair::repair;
+use super::repair::{repair, settle};
 use super::transport::Transport;
-use super::{
-    Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, inside, settle, sides, stretched,
-};
+use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, inside, sides, stretched};
 use crate::error::Failure;
 use crate::geometry::{Cells, DualCells, Mesh, diagonal, padded};
 use crate::numerics::larger;
