@@ -43,6 +43,8 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     terms: Terms<D, B>,
     layers: Layers<P, B>,
     loads: Loads<P, B>,
+    /// The sources that take time.
+    timed: Loads<P, B>,
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
 }
@@ -61,6 +63,9 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
         Self {
             names: std::array::from_fn(|c| names[c].clone()),
             loads: Loads::new(std::array::from_fn(|c| Some(&nodal[Self::SOURCE * B + c]).filter(|_| kinds.loaded[c]))),
+            timed: Loads::new(std::array::from_fn(|c| {
+                Some(&nodal[Self::SOURCE * B + c]).filter(|source| source.depends_on(P))
+            })),
             terms: Terms::new(&terms, &names),
             layers: Layers::new(std::array::from_fn(|c| &nodal[Self::DIFFUSIVITY * B + c])),
             bounds: Bounds::new(
@@ -276,7 +281,7 @@ where
     }
 
     fn loads(&self, t: f64, mesh: &Mesh<D>, x: &[[f64; D]], u: [f64; B]) -> Result<Vec<[f64; B]>, Failure> {
-        let loads = self.loads.at(t, x, u);
+        let loads = self.loads.at(t, x, |_| u);
         match loads.as_flattened().iter().position(|value| !value.is_finite()) {
             None => Ok(loads),
             Some(place) => {

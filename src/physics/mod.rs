@@ -44,6 +44,17 @@ pub struct Motion<'a, const D: usize = 2> {
     pub new: &'a Mesh<D>,
 }
 
+/// What is prescribed in time for an unknown at a place; 0 where nothing is.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Forcing {
+    /// Its source.
+    pub source: f64,
+    /// What flows in through sides there.
+    pub inflow: f64,
+    /// Its value on a side.
+    pub value: f64,
+}
+
 /// A partial differential equation that can be advanced on a moving mesh.
 pub trait Physics<const D: usize = 2>: Send {
     /// Names of the unknowns.
@@ -65,6 +76,14 @@ pub trait Physics<const D: usize = 2>: Send {
     /// # Errors
     /// A [`Failure`] where the step cannot be solved; [`Failure::NonFinite`] where its result is not finite.
     fn step(&mut self, motion: Motion<'_, D>, u: &Field) -> Result<(Field, Work), Failure>;
+
+    /// What formulas that take time prescribe at some places, with the unknowns there: for each place and unknown.
+    /// `beyond` says on which sides a place lies ([`Lattice::beyond`]). Empty if no formula takes time.
+    ///
+    /// [`Lattice::beyond`]: crate::geometry::Lattice::beyond
+    fn forcing(&self, _t: f64, _x: &[[f64; D]], _beyond: &[[[bool; 2]; D]], _u: &[f64]) -> Vec<Forcing> {
+        Vec::new()
+    }
 
     /// For each unknown, whether it never leaves the range of its initial and side values, since it is only carried and
     /// diffused; empty if nothing is known.

@@ -131,6 +131,17 @@ pub(super) enum Open {
     Flux(Flux),
 }
 
+impl Open {
+    /// Whether what is given there takes time, in D dimensions.
+    pub fn takes_time<const D: usize>(&self) -> bool {
+        match self {
+            Self::Value(formula) => formula.depends_on(D),
+            Self::Flux(flux) => flux.value.depends_on(D + flux.slopes.len()),
+            Self::Closed | Self::Outflow => false,
+        }
+    }
+}
+
 /// A flux into the domain and its derivatives by the unknowns: formulas of place, unknowns and time.
 #[derive(Debug, Clone)]
 pub(super) struct Flux {

@@ -1,6 +1,7 @@
 //! Everything that the rest of a run depends on, as a value.
 
 use super::conserved::AtStart;
+use super::forced::Forced;
 use super::pace::Pace;
 use super::{Record, Safety, Schedule, State};
 use crate::error::{Result, Unfit};
@@ -27,6 +28,7 @@ pub(crate) trait Keeper<const D: usize = 2> {
 pub(crate) struct Course {
     pub at_start: AtStart,
     pub pace: Pace,
+    pub forced: Forced,
     /// Since the run began, over all its parts.
     pub seconds: f64,
 }

@@ -8,6 +8,7 @@ mod control;
 mod coupling;
 mod doors;
 mod doubts;
+mod forced;
 mod growth;
 mod journey;
 mod observer;
@@ -39,6 +40,7 @@ use crate::physics::Physics;
 use clock::Clock;
 use conserved::AtStart;
 use doubts::ends;
+use forced::Forced;
 use pace::Pace;
 use std::any::Any;
 use std::time::Instant;
@@ -212,11 +214,20 @@ where
         if record.data.is_empty() {
             record.data = (0..state.u.components()).map(|c| ends(state.u.component(c))).collect();
         }
-        let mut pace = match course {
-            Some(course) => course.pace,
-            None => timed(&mut record.seconds.pde, || Pace::new(self, state))?,
+        let (mut pace, forced) = match course {
+            Some(course) => (course.pace, course.forced),
+            None => timed(&mut record.seconds.pde, || {
+                let (mut pace, forced) = (Pace::new(self, state)?, Forced::of(self, state));
+                pace.foresee(forced.sizes(&state.mesh));
+                Ok::<_, Error>((pace, forced))
+            })?,
         };
-        let course = |pace: &Pace| Course { at_start: at_start.clone(), pace: pace.clone(), seconds: clock.seconds() };
+        let course = |pace: &Pace| Course {
+            at_start: at_start.clone(),
+            pace: pace.clone(),
+            forced: forced.clone(),
+            seconds: clock.seconds(),
+        };
         self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
         while let Some((t, dt)) = pace.next(&self.schedule, state) {
             let step = state.step + 1;
@@ -230,6 +241,13 @@ where
                 }
                 Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
             };
+            if let Some(hidden) = timed(&mut record.seconds.pde, || forced.hidden(self, state, &next.state)) {
+                if pace.shorten(dt) {
+                    record.work.rejected_steps += 1;
+                    continue;
+                }
+                self.warn_of_hidden(hidden, state.t, dt, record);
+            }
             record.travelled += next.state.mesh.farthest(&state.mesh);
             *state = next.state;
             record.work.add(next.work);

@@ -58,6 +58,28 @@ impl Pace {
         }
     }
 
+    /// Tells what is to come: sizes of the unknowns beside which, while they are still much smaller, nothing has begun.
+    pub fn foresee(&mut self, sizes: impl Iterator<Item = f64>) {
+        if let Self::Free(free) = self {
+            free.foreseen.iter_mut().zip(sizes).for_each(|(foreseen, size)| *foreseen = size);
+        }
+    }
+
+    /// Makes the next step shorter than one that took `dt`; false where it may not be.
+    pub fn shorten(&mut self, dt: f64) -> bool {
+        match self {
+            Self::Even { .. } => false,
+            Self::Free(free) => {
+                let shorter = GROWTH[0] * dt;
+                let may = shorter > SHORTEST * free.longest;
+                if may {
+                    free.dt = shorter;
+                }
+                may
+            }
+        }
+    }
+
     /// Tries the next step; none is returned where it is refused.
     ///
     /// # Errors
@@ -101,6 +123,10 @@ pub(crate) struct Free {
     scale: f64,
     /// The largest range of each unknown so far.
     ranges: Vec<f64>,
+    /// The largest size of each unknown so far.
+    sizes: Vec<f64>,
+    /// The size that each may come to by what is prescribed in time.
+    foreseen: Vec<f64>,
     /// Where errors decide, not changes.
     control: Option<Control>,
     /// Steps that failed since the last one that did not.
@@ -140,6 +166,10 @@ const TRIAL: f64 = 1e-2;
 const TRIALS: usize = 3;
 /// An unknown whose range is so small beside the largest of all is of rounding.
 const OF_ROUNDING: f64 = 1e-9;
+/// Share of what is to come above which something has begun.
+const BEGUN: f64 = 1e-4;
+/// An unknown whose range is so small beside its size is the same everywhere.
+const ALIKE: f64 = 1e-13;
 
 impl Free {
     fn new<const D: usize>(
@@ -157,6 +187,8 @@ impl Free {
             longest,
             scale: dt,
             ranges: ranges.clone(),
+            sizes: vec![0.0; ranges.len()],
+            foreseen: vec![0.0; ranges.len()],
             control,
             failures: 0,
             short: 0,
@@ -191,7 +223,8 @@ impl Free {
     fn is_sound(&self) -> bool {
         [self.dt, self.longest, self.scale].iter().all(|dt| dt.is_finite() && *dt > 0.0)
             && !self.ranges.is_empty()
-            && self.ranges.iter().all(|range| range.is_finite() && *range >= 0.0)
+            && [&self.sizes, &self.foreseen].iter().all(|sizes| sizes.len() == self.ranges.len())
+            && self.ranges.iter().chain(&self.sizes).chain(&self.foreseen).all(|size| size.is_finite() && *size >= 0.0)
     }
 
     /// Learns from a step; none is returned where it is refused.
@@ -221,10 +254,14 @@ impl Free {
         let dt = after.t - before.t;
         // a step that was cut short to meet a report says what a whole one would have done
         let cut = self.dt / dt;
+        for (c, size) in self.sizes.iter_mut().enumerate() {
+            *size = before.u.component(c).fold(*size, larger);
+        }
+        let scales = self.scales();
         let (taken, factor) = match (&mut self.control, &step.errors) {
-            (Some(control), Some(errors)) => control.judge(relative(errors, &self.ranges), cut),
+            (Some(control), Some(errors)) => control.judge(relative(errors, &scales), cut),
             _ => {
-                let share = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), self.ranges[0]);
+                let share = share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), scales[0]);
                 let whole = share * cut;
                 let factor = if whole.is_finite() { (CHANGE / whole).clamp(GROWTH[0], GROWTH[1]) } else { GROWTH[0] };
                 (share <= TOO_MUCH * CHANGE, factor)
@@ -285,7 +322,7 @@ impl Free {
         if self.dt >= self.scale {
             return self.dt;
         }
-        let mut in_place = dt * CHANGE / share(change_in_place(before, after, 0), self.ranges[0]);
+        let mut in_place = dt * CHANGE / share(change_in_place(before, after, 0), self.scales()[0]);
         if in_place < DOUBTED * self.scale {
             // the change at fixed places contains the errors of interpolation that the moving mesh makes; a τ
             // shortened by these would move the mesh faster and make more of them
@@ -312,7 +349,7 @@ impl Free {
         // what sweeps over a peak that grows lowers it at its nodes now and then
         if grows(change, &after.u) || at_rest.as_ref().is_some_and(|(change, u)| grows(*change, u)) {
             Cause::BlowUp
-        } else if self.share_of(at_rest) / self.dt < DOUBTED * share(change, self.ranges[0]) / dt {
+        } else if self.share_of(at_rest) / self.dt < DOUBTED * share(change, self.scales()[0]) / dt {
             Cause::Restless
         } else if after.t - start < AT_START * (end - start) {
             Cause::Start
@@ -321,9 +358,19 @@ impl Free {
         }
     }
 
+    /// What a change of each unknown is measured by: its range, or its largest size so far where it is the same
+    /// everywhere; and not much less than it will come to.
+    fn scales(&self) -> Vec<f64> {
+        let scale = |c: usize| {
+            let (range, size) = (self.ranges[c], self.sizes[c]);
+            if range > ALIKE * size { range } else { size }.max(BEGUN * self.foreseen[c])
+        };
+        (0..self.ranges.len()).map(scale).collect()
+    }
+
     /// A change as a share of the range; infinite where there is none.
     fn share_of(&self, changed: Option<(f64, Field)>) -> f64 {
-        changed.map_or(f64::INFINITY, |(change, _)| share(change, self.ranges[0]))
+        changed.map_or(f64::INFINITY, |(change, _)| share(change, self.scales()[0]))
     }
 }
 

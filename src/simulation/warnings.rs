@@ -1,6 +1,7 @@
 //! What a run says once while it goes on: meshes that cannot rest, interface values that are noisy.
 
 use super::doubts::{ends, named};
+use super::forced::Hidden;
 use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State};
 use crate::geometry::Mesh;
 use crate::meshing::{Movable, Relaxation};
@@ -17,6 +18,7 @@ const BEYOND: f64 = 0.05;
 const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
 const WIDE: &str = "changes within cells that are too wide for central fluxes";
+const PASSED: &str = "changes within a step";
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
 impl<const D: usize> Simulation<D>
@@ -103,6 +105,20 @@ where
              there may be at the wrong place; set `pde.scheme` = \"limited\", refine `grid.cells`, or raise \
              `pde.diffusivity`",
             named(mesh.image(mesh.x()[k]))
+        ));
+    }
+
+    /// Says once in a run that steps of given length pass over something that is prescribed in time.
+    pub(super) fn warn_of_hidden(&self, hidden: Hidden, t: f64, dt: f64, record: &mut Record) {
+        if record.warnings.iter().any(|said| said.contains(PASSED)) {
+            return;
+        }
+        let name = &self.physics.unknowns()[hidden.unknown];
+        let what = hidden.what;
+        record.warnings.push(format!(
+            "{what} of `{name}` {PASSED}: between t = {t} and {} it comes and goes, or jumps, at times that no stage \
+             of the step sees; lower `time.step`, or leave it out so that steps follow it",
+            t + dt
         ));
     }
 

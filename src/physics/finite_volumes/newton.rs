@@ -102,7 +102,10 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
             correction = vec![[0.0; B]; patch.padded_len()];
             let enough = scale.enough(largest, L::TOLERANCE);
-            work += self.solver.solve(&matrix, &residual, &mut correction, enough)?;
+            let factor = of_size_one(largest);
+            residual.as_flattened_mut().iter_mut().for_each(|value| *value *= factor);
+            work += self.solver.solve(&matrix, &residual, &mut correction, enough.map(|enough| enough * factor))?;
+            correction.as_flattened_mut().iter_mut().for_each(|value| *value /= factor);
             work.newton_iterations += 1;
             <Half<'_, D> as Around<D, S>>::repeat_sides(&patch, &mut correction);
             for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
@@ -176,9 +179,10 @@ impl<const B: usize> Scale<B> {
         ROUNDINGS * f64::EPSILON * self.stiffest
     }
 
-    /// Residuals that are small enough, as this share of each unknown.
+    /// Residuals that are small enough, as this share of each unknown; none below the smallest normal number, beneath
+    /// which products lose all digits.
     fn wanted(&self, share: f64) -> [f64; B] {
-        std::array::from_fn(|c| (share * self.sizes[c]).max(self.rounding() * self.size))
+        std::array::from_fn(|c| (share * self.sizes[c]).max(self.rounding() * self.size).max(f64::MIN_POSITIVE))
     }
 
     fn diverges(&self, largest: [f64; B]) -> bool {
@@ -191,8 +195,19 @@ impl<const B: usize> Scale<B> {
         let share = self.overall(largest).min(1.0);
         std::array::from_fn(|c| {
             let newton = (0.01 * largest[c] * share).max(0.1 * tolerance * self.sizes[c]);
-            newton.min(1e-3 * largest[c]).max(0.1 * self.rounding() * self.size)
+            newton.min(1e-3 * largest[c]).max(0.1 * self.rounding() * self.size).max(0.1 * f64::MIN_POSITIVE)
         })
+    }
+}
+
+/// The power of two that brings residuals to the size of 1 whose squares are beyond the range of numbers; 1 for others.
+fn of_size_one<const B: usize>(largest: [f64; B]) -> f64 {
+    let largest = largest.into_iter().fold(0.0, larger);
+    let squares = 1e-140..1e140;
+    if largest > 0.0 && largest.is_finite() && !squares.contains(&largest) {
+        2.0_f64.powi(-(largest.log2().round() as i32).clamp(-1000, 1000))
+    } else {
+        1.0
     }
 }
 

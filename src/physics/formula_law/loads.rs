@@ -1,4 +1,4 @@
-//! Sources with a part that is a function of place and time alone.
+//! Sources as functions of place and time, with unknowns that are given.
 
 use crate::formula::{Formula, Program};
 use crate::parallel;
@@ -17,13 +17,15 @@ impl<const P: usize, const B: usize> Loads<P, B> {
         self.sources.iter().any(Option::is_some)
     }
 
-    /// The sources at some places where the unknowns are u; 0 for those that are not of this kind.
-    pub fn at<const D: usize>(&self, t: f64, x: &[[f64; D]], u: [f64; B]) -> Vec<[f64; B]> {
+    /// The sources at some places, at the k-th of which the unknowns are u(k); 0 for those that are not of this kind.
+    pub fn at<const D: usize>(&self, t: f64, x: &[[f64; D]], u: impl Fn(usize) -> [f64; B] + Sync) -> Vec<[f64; B]> {
         let mut loads = vec![[0.0; B]; x.len()];
         parallel::for_each_piece(&mut loads, |begin, loads| {
-            let points: Vec<[f64; P]> = (x[begin..].iter().take(loads.len()))
-                .map(|x| std::array::from_fn(|v| if v < D { x[v] } else { u[v - D] }))
-                .collect();
+            let point = |k: usize| {
+                let u = u(k);
+                std::array::from_fn(|v| if v < D { x[k][v] } else { u[v - D] })
+            };
+            let points: Vec<[f64; P]> = (begin..begin + loads.len()).map(point).collect();
             let mut values = vec![[0.0]; points.len()];
             for (c, source) in self.sources.iter().enumerate() {
                 let Some(source) = source else { continue };

@@ -8,7 +8,8 @@ use crate::numerics::larger;
 use crate::numerics::linear::{RobustLine, RobustTransport};
 use crate::physics::finite_volumes::Law;
 use crate::physics::prescribed::evaluate;
-use crate::physics::{Motion, Physics, nodal};
+use crate::physics::sides::Open;
+use crate::physics::{Forcing, Motion, Physics, nodal};
 use crate::work::Work;
 
 /// A flux that outweighs diffusion by this over an edge, and a change over it, as a share of the range, from which a
@@ -57,6 +58,37 @@ where
         let unknown = |exact| evaluate(exact, t, mesh).into_flattened();
         let known: Vec<Vec<f64>> = self.exact.iter().map(|(_, exact)| unknown(exact)).collect();
         (!known.is_empty()).then(|| Field::joined(&known).expect("each has one value a node"))
+    }
+
+    fn forcing(&self, t: f64, x: &[[f64; D]], beyond: &[[[bool; 2]; D]], u: &[f64]) -> Vec<Forcing> {
+        let timed = |c: usize| {
+            (0..D).flat_map(move |d| [(d, 0), (d, 1)]).filter(move |&(d, end)| self.sides[c][d][end].takes_time::<D>())
+        };
+        if !self.timed.are_some() && (0..B).all(|c| timed(c).next().is_none()) {
+            return Vec::new();
+        }
+        let u = u.as_chunks::<B>().0;
+        let sources = self.timed.at(t, x, |k| u[k]);
+        let mut all = Vec::with_capacity(B * x.len());
+        for k in 0..x.len() {
+            for c in 0..B {
+                let mut forcing = Forcing { source: sources[k][c], ..Forcing::default() };
+                for (d, end) in timed(c).filter(|&(d, end)| beyond[k][d][end]) {
+                    match &self.sides[c][d][end] {
+                        Open::Value(formula) => {
+                            forcing.value = formula.eval(&x[k].into_iter().chain([t]).collect::<Vec<f64>>());
+                        }
+                        Open::Flux(flux) => {
+                            let place: Vec<f64> = x[k].into_iter().chain(u[k]).chain([t]).collect();
+                            forcing.inflow += flux.value.eval(&place);
+                        }
+                        Open::Closed | Open::Outflow => {}
+                    }
+                }
+                all.push(forcing);
+            }
+        }
+        all
     }
 
     fn keeps_range(&self) -> Vec<bool> {

@@ -1,0 +1,187 @@
+//! Sources, inflows and side values that come and go between the stages of a step.
+
+use super::doubts::ends;
+use super::{Simulation, State};
+use crate::geometry::Mesh;
+use crate::meshing::Movable;
+use crate::numerics::larger;
+use crate::physics::Forcing;
+use serde::{Deserialize, Serialize};
+
+/// Moments of a run, and of a step at least, at which is looked.
+const MOMENTS: f64 = 2048.0;
+const A_STEP: f64 = 4.0;
+/// Places at which is looked.
+const PLACES: usize = 128;
+/// Share of what a source or an inflow brings during the run, or of the range of its unknown if that is more, that a
+/// step may miss.
+const MISSED: f64 = 1e-3;
+/// Share of the change of a value on a side during the run, or of the range of its unknown if that is more, by which it
+/// may bend between stages of a step; and how long it may do so, as a share of the run times that change.
+const BENDS: f64 = 0.05;
+const FOR_LONG: f64 = 5e-5;
+/// Where the stages of TR-BDF2 lie within a step, and their weights in what a step takes of a source: γ = 2 − √2.
+const STAGES: [f64; 3] = [0.0, 2.0 - std::f64::consts::SQRT_2, 1.0];
+const WEIGHTS: [f64; 3] =
+    [0.25 * std::f64::consts::SQRT_2, 0.25 * std::f64::consts::SQRT_2, 1.0 - 0.5 * std::f64::consts::SQRT_2];
+const SOURCE: usize = 0;
+const INFLOW: usize = 1;
+const VALUE: usize = 2;
+
+/// What formulas that take time bring about during a run: of each unknown the most that its source and its inflow add
+/// up to at a place, and by how much its values on sides change. Empty where no formula takes time.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Forced {
+    most: Vec<[f64; 3]>,
+}
+
+/// Something prescribed that a step does not see.
+pub(crate) struct Hidden {
+    pub what: &'static str,
+    pub unknown: usize,
+}
+
+impl Forced {
+    /// Looks ahead from the start of a run.
+    pub fn of<const D: usize>(simulation: &Simulation<D>, start: &State<D>) -> Self
+    where
+        Mesh<D>: Movable<D>,
+    {
+        let looked = Looked::at(&start.mesh);
+        let (begin, end) = (simulation.schedule.start(), simulation.schedule.end());
+        let dt = (end - begin) / MOMENTS;
+        let mut sums: Vec<[f64; 3]> = Vec::new();
+        let mut first: Vec<Forcing> = Vec::new();
+        let mut most = vec![[0.0; 3]; start.u.components()];
+        for moment in 0..MOMENTS as usize {
+            let forcing = looked.on_way(simulation, start, start, begin + (moment as f64 + 0.5) * dt);
+            if forcing.is_empty() {
+                return Self { most: Vec::new() };
+            }
+            if first.is_empty() {
+                (sums, first) = (vec![[0.0; 3]; forcing.len()], forcing.clone());
+            }
+            for (k, (sum, now)) in sums.iter_mut().zip(&forcing).enumerate() {
+                sum[SOURCE] += dt * now.source;
+                sum[INFLOW] += dt * now.inflow;
+                sum[VALUE] = now.value - first[k].value;
+                let most = &mut most[k % start.u.components()];
+                *most = std::array::from_fn(|q| larger(most[q], sum[q]));
+            }
+        }
+        Self { most }
+    }
+
+    /// The size that each unknown may come to by that.
+    pub fn sizes<const D: usize>(&self, mesh: &Mesh<D>) -> impl Iterator<Item = f64> {
+        let extent = mesh.extent().into_iter().fold(0.0, f64::max);
+        self.most.iter().map(move |most| most[SOURCE].max(most[INFLOW] / extent).max(most[VALUE]))
+    }
+
+    /// What is prescribed along the ways of the nodes during a step that its stages do not see, if there is something.
+    pub fn hidden<const D: usize>(
+        &self,
+        simulation: &Simulation<D>,
+        before: &State<D>,
+        after: &State<D>,
+    ) -> Option<Hidden>
+    where
+        Mesh<D>: Movable<D>,
+    {
+        if self.most.is_empty() {
+            return None;
+        }
+        let (run, dt) = (simulation.schedule.end() - simulation.schedule.start(), after.t - before.t);
+        let count = (MOMENTS * dt / run).ceil().clamp(A_STEP, MOMENTS);
+        let looked = Looked::at(&after.mesh);
+        let at = |share: f64| looked.on_way(simulation, before, after, before.t + share * dt);
+        let stages = STAGES.map(at);
+        let mut off = vec![[0.0; 3]; stages[0].len()];
+        let mut bent = vec![0.0_f64; off.len()];
+        for moment in 0..count as usize {
+            let share = (moment as f64 + 0.5) / count;
+            let later = usize::from(share > STAGES[1]);
+            let between = (share - STAGES[later]) / (STAGES[later + 1] - STAGES[later]);
+            for (k, now) in at(share).into_iter().enumerate() {
+                let line = (1.0 - between) * stages[later][k].value + between * stages[later + 1][k].value;
+                let bend = (now.value - line).abs();
+                bent[k] = larger(bent[k], bend);
+                off[k][SOURCE] += dt * now.source / count;
+                off[k][INFLOW] += dt * now.inflow / count;
+                off[k][VALUE] += dt * bend / count;
+            }
+        }
+        for (k, off) in off.iter_mut().enumerate() {
+            for (stage, weight) in stages.iter().zip(WEIGHTS) {
+                off[SOURCE] -= dt * weight * stage[k].source;
+                off[INFLOW] -= dt * weight * stage[k].inflow;
+            }
+        }
+        let unknowns = self.most.len();
+        let extent = before.mesh.extent().into_iter().fold(0.0, f64::max);
+        let ranges: Vec<f64> = (0..unknowns)
+            .map(|c| {
+                let [low, high] = ends(before.u.component(c).chain(after.u.component(c)));
+                high - low
+            })
+            .collect();
+        let worth = |c: usize, q: usize, range: f64| self.most[c][q].max(range);
+        off.iter().zip(bent).enumerate().find_map(|(k, (off, bent))| {
+            let c = k % unknowns;
+            let what = if off[SOURCE].abs() > MISSED * worth(c, SOURCE, ranges[c]) {
+                "the source"
+            } else if off[INFLOW].abs() > MISSED * worth(c, INFLOW, ranges[c] * extent) {
+                "the inflow through a side"
+            } else if bent > BENDS * worth(c, VALUE, ranges[c])
+                && off[VALUE] > FOR_LONG * run * worth(c, VALUE, ranges[c])
+            {
+                "the value on a side"
+            } else {
+                return None;
+            };
+            Some(Hidden { what, unknown: c })
+        })
+    }
+}
+
+/// Some nodes of a lattice: all where there are few, and always some of each side.
+struct Looked<const D: usize> {
+    nodes: Vec<usize>,
+    beyond: Vec<[[bool; 2]; D]>,
+}
+
+impl<const D: usize> Looked<D> {
+    fn at(mesh: &Mesh<D>) -> Self {
+        let lattice = mesh.lattice();
+        let sides: Vec<usize> = lattice.sides().collect();
+        let some = |nodes: Vec<usize>| {
+            let stride = nodes.len().div_ceil(PLACES / 2).max(1);
+            nodes.into_iter().step_by(stride).collect::<Vec<usize>>()
+        };
+        let mut nodes = some((0..lattice.len()).collect());
+        nodes.extend(some(sides));
+        let beyond = nodes.iter().map(|&k| lattice.beyond(k)).collect();
+        Self { nodes, beyond }
+    }
+
+    /// What is prescribed at a time between two states where these nodes are by then, on straight ways.
+    fn on_way(&self, simulation: &Simulation<D>, before: &State<D>, after: &State<D>, t: f64) -> Vec<Forcing>
+    where
+        Mesh<D>: Movable<D>,
+    {
+        let dt = after.t - before.t;
+        let share = if dt > 0.0 { (t - before.t) / dt } else { 0.0 };
+        let between = |a: f64, b: f64| a + share * (b - a);
+        let place = |&k: &usize| {
+            let [from, to] = [before, after].map(|state| state.mesh.x()[k]);
+            before.mesh.image(std::array::from_fn(|d| between(from[d], to[d])))
+        };
+        let x: Vec<[f64; D]> = self.nodes.iter().map(place).collect();
+        let count = before.u.components();
+        let values = |&k: &usize| {
+            (k * count..(k + 1) * count).map(|place| between(before.u.values()[place], after.u.values()[place]))
+        };
+        let u: Vec<f64> = self.nodes.iter().flat_map(values).collect();
+        simulation.physics.forcing(t, &x, &self.beyond, &u)
+    }
+}
