@@ -91,56 +91,76 @@ impl Forced {
         if self.most.is_empty() {
             return None;
         }
-        let (run, dt) = (simulation.schedule.end() - simulation.schedule.start(), after.t - before.t);
-        let count = (MOMENTS * dt / run).ceil().clamp(A_STEP, MOMENTS);
-        let looked = Looked::at(&after.mesh);
-        let at = |share: f64| looked.on_way(simulation, before, after, before.t + share * dt);
-        let stages = STAGES.map(at);
-        let mut off = vec![[0.0; 3]; stages[0].len()];
-        let mut bent = vec![0.0_f64; off.len()];
-        for moment in 0..count as usize {
-            let share = (moment as f64 + 0.5) / count;
-            let later = usize::from(share > STAGES[1]);
-            let between = (share - STAGES[later]) / (STAGES[later + 1] - STAGES[later]);
-            for (k, now) in at(share).into_iter().enumerate() {
-                let line = (1.0 - between) * stages[later][k].value + between * stages[later + 1][k].value;
-                let bend = (now.value - line).abs();
-                bent[k] = larger(bent[k], bend);
-                off[k][SOURCE] += dt * now.source / count;
-                off[k][INFLOW] += dt * now.inflow / count;
-                off[k][VALUE] += dt * bend / count;
-            }
-        }
-        for (k, off) in off.iter_mut().enumerate() {
-            for (stage, weight) in stages.iter().zip(WEIGHTS) {
-                off[SOURCE] -= dt * weight * stage[k].source;
-                off[INFLOW] -= dt * weight * stage[k].inflow;
-            }
-        }
+        let run = simulation.schedule.end() - simulation.schedule.start();
+        let missed = Missed::in_step(simulation, before, after, run);
         let unknowns = self.most.len();
         let extent = before.mesh.extent().into_iter().fold(0.0, f64::max);
-        let ranges: Vec<f64> = (0..unknowns)
-            .map(|c| {
-                let [low, high] = ends(before.u.component(c).chain(after.u.component(c)));
-                high - low
-            })
-            .collect();
-        let worth = |c: usize, q: usize, range: f64| self.most[c][q].max(range);
-        off.iter().zip(bent).enumerate().find_map(|(k, (off, bent))| {
+        let range = |c: usize| {
+            let [low, high] = ends(before.u.component(c).chain(after.u.component(c)));
+            high - low
+        };
+        let ranges: Vec<f64> = (0..unknowns).map(range).collect();
+        missed.into_iter().enumerate().find_map(|(k, missed)| {
             let c = k % unknowns;
-            let what = if off[SOURCE].abs() > MISSED * worth(c, SOURCE, ranges[c]) {
+            let [source, inflow, value] = self.most[c];
+            let value = value.max(ranges[c]);
+            let what = if missed.source.abs() > MISSED * source.max(ranges[c]) {
                 "the source"
-            } else if off[INFLOW].abs() > MISSED * worth(c, INFLOW, ranges[c] * extent) {
+            } else if missed.inflow.abs() > MISSED * inflow.max(ranges[c] * extent) {
                 "the inflow through a side"
-            } else if bent > BENDS * worth(c, VALUE, ranges[c])
-                && off[VALUE] > FOR_LONG * run * worth(c, VALUE, ranges[c])
-            {
+            } else if missed.bend > BENDS * value && missed.bent > FOR_LONG * run * value {
                 "the value on a side"
             } else {
                 return None;
             };
             Some(Hidden { what, unknown: c })
         })
+    }
+}
+
+/// What the stages of a step miss of what is prescribed for an unknown at a place.
+#[derive(Debug, Clone, Copy, Default)]
+struct Missed {
+    /// The integrals over the step of source and inflow, less what the stages make of them.
+    source: f64,
+    inflow: f64,
+    /// How far a value on a side is off the straight lines between the stages: at most, and integrated over the step.
+    bend: f64,
+    bent: f64,
+}
+
+impl Missed {
+    /// For all places that are looked at, and each unknown there.
+    fn in_step<const D: usize>(simulation: &Simulation<D>, before: &State<D>, after: &State<D>, run: f64) -> Vec<Self>
+    where
+        Mesh<D>: Movable<D>,
+    {
+        let dt = after.t - before.t;
+        let count = (MOMENTS * dt / run).ceil().clamp(A_STEP, MOMENTS);
+        let looked = Looked::at(&after.mesh);
+        let at = |share: f64| looked.on_way(simulation, before, after, before.t + share * dt);
+        let stages = STAGES.map(at);
+        let mut all = vec![Self::default(); stages[0].len()];
+        for moment in 0..count as usize {
+            let share = (moment as f64 + 0.5) / count;
+            let later = usize::from(share > STAGES[1]);
+            let between = (share - STAGES[later]) / (STAGES[later + 1] - STAGES[later]);
+            for (k, (missed, now)) in all.iter_mut().zip(at(share)).enumerate() {
+                let line = (1.0 - between) * stages[later][k].value + between * stages[later + 1][k].value;
+                let bend = (now.value - line).abs();
+                missed.source += dt * now.source / count;
+                missed.inflow += dt * now.inflow / count;
+                missed.bend = larger(missed.bend, bend);
+                missed.bent += dt * bend / count;
+            }
+        }
+        for (k, missed) in all.iter_mut().enumerate() {
+            for (stage, weight) in stages.iter().zip(WEIGHTS) {
+                missed.source -= dt * weight * stage[k].source;
+                missed.inflow -= dt * weight * stage[k].inflow;
+            }
+        }
+        all
     }
 }
 

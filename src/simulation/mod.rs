@@ -1,5 +1,6 @@
 //! The time loop: mesh, then physics, then whoever watches.
 
+mod assess;
 mod benefit;
 mod checkpoint;
 mod clock;
@@ -22,6 +23,7 @@ mod warnings;
 pub use benefit::Benefit;
 pub(crate) use checkpoint::{Checkpoint, Course, Keeper};
 pub use conserved::{Amount, Conserved};
+use coupling::Advanced;
 pub use coupling::Coupling;
 pub use observer::{Event, Moving, Observer, Snapshot};
 pub use record::{ErrorNorms, Record, Report, Seconds, WorkTotal};
@@ -32,9 +34,9 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Cells, Field, Mesh, Quality, check_unfolded, largest};
+use crate::geometry::{Field, Mesh, check_unfolded};
 use crate::kept::Kept;
-use crate::meshing::{Interface, Movable};
+use crate::meshing::Movable;
 use crate::mover::{self, Gait, Mover, Start};
 use crate::physics::Physics;
 use clock::Clock;
@@ -214,60 +216,66 @@ where
         if record.data.is_empty() {
             record.data = (0..state.u.components()).map(|c| ends(state.u.component(c))).collect();
         }
-        let (mut pace, forced) = match course {
-            Some(course) => (course.pace, course.forced),
-            None => timed(&mut record.seconds.pde, || {
-                let (mut pace, forced) = (Pace::new(self, state)?, Forced::of(self, state));
-                pace.foresee(forced.sizes(&state.mesh));
-                Ok::<_, Error>((pace, forced))
-            })?,
+        let mut course = match course {
+            Some(course) => course,
+            None => self.begin(state, at_start, record)?,
         };
-        let course = |pace: &Pace| Course {
-            at_start: at_start.clone(),
-            pace: pace.clone(),
-            forced: forced.clone(),
-            seconds: clock.seconds(),
-        };
-        self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
-        while let Some((t, dt)) = pace.next(&self.schedule, state) {
-            let step = state.step + 1;
-            let next = match pace.step(self, state, (t, dt), record) {
-                Ok(Some(next)) => next,
-                Ok(None) => {
-                    if observers.iter().any(|observer| observer.interrupts()) {
-                        self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
-                    }
-                    continue;
+        self.pause(state, record, observers, &mut keeper, &clock, &course)?;
+        while let Some((t, dt)) = course.pace.next(&self.schedule, state) {
+            let Some(next) = self.advance(state, (t, dt), &mut course, record)? else {
+                if observers.iter().any(|observer| observer.interrupts()) {
+                    self.pause(state, record, observers, &mut keeper, &clock, &course)?;
                 }
-                Err(failure) => return Err(Error::Failed { failure, moment: Some(Moment { t, step }) }),
+                continue;
             };
-            if let Some(hidden) = timed(&mut record.seconds.pde, || forced.hidden(self, state, &next.state)) {
-                if pace.shorten(dt) {
-                    record.work.rejected_steps += 1;
-                    continue;
-                }
-                self.warn_of_hidden(hidden, state.t, dt, record);
-            }
             record.travelled += next.state.mesh.farthest(&state.mesh);
             *state = next.state;
             record.work.add(next.work);
             record.interface = next.interface;
-            self.warn_of_noise(state, record);
-            self.warn_of_unrest(state, dt, record);
-            self.warn_of_range(state, record);
-            self.warn_of_growth(state, record);
+            self.warn(state, dt, record);
             if self.schedule.reports_at(t) {
-                self.warn_of_wide_cells(state, record);
-                let report = self.report(state, &at_start, record.interface);
+                let report = self.report(state, &course.at_start, record.interface);
                 record.reports.push(report);
             }
             self.show(Event::Stepped, state, record, observers, dt, &clock)?;
-            self.pause(state, record, observers, &mut keeper, &clock, || course(&pace))?;
+            self.pause(state, record, observers, &mut keeper, &clock, &course)?;
         }
         if let Some(keeper) = keeper {
-            self.checkpoint(state, record, observers, keeper, &clock, course(&pace))?;
+            self.checkpoint(state, record, observers, keeper, &clock, &course)?;
         }
         self.show(Event::Finished, state, record, observers, 0.0, &clock)
+    }
+
+    /// What the loop carries from step to step, before the first.
+    fn begin(&mut self, state: &State<D>, at_start: AtStart, record: &mut Record) -> Result<Course> {
+        timed(&mut record.seconds.pde, || {
+            let (mut pace, forced) = (Pace::new(self, state)?, Forced::of(self, state));
+            pace.foresee(forced.sizes(&state.mesh));
+            Ok(Course { at_start, pace, forced, seconds: 0.0 })
+        })
+    }
+
+    /// Tries a step; none is returned where a shorter one has to be tried.
+    fn advance(
+        &mut self,
+        state: &State<D>,
+        (t, dt): (f64, f64),
+        course: &mut Course,
+        record: &mut Record,
+    ) -> Result<Option<Advanced<D>>> {
+        let moment = Some(Moment { t, step: state.step + 1 });
+        let next = course.pace.step(self, state, (t, dt), record);
+        let Some(next) = next.map_err(|failure| Error::Failed { failure, moment })? else { return Ok(None) };
+        let hidden = timed(&mut record.seconds.pde, || course.forced.hidden(self, state, &next.state));
+        match hidden {
+            Some(_) if course.pace.shorten(dt) => {
+                record.work.rejected_steps += 1;
+                return Ok(None);
+            }
+            Some(hidden) => self.warn_of_hidden(hidden, state.t, dt, record),
+            None => {}
+        }
+        Ok(Some(next))
     }
 
     /// Writes a checkpoint where one is due, and ends the run where an observer asks for that.
@@ -278,13 +286,13 @@ where
         observers: &mut [&mut dyn Observer],
         keeper: &mut Option<&mut dyn Keeper<D>>,
         clock: &Clock,
-        course: impl FnOnce() -> Course,
+        course: &Course,
     ) -> Result<()> {
         let asked = end_where_asked(observers, state);
         if let Some(keeper) = keeper
             && (asked.is_err() || keeper.due(state.step))
         {
-            self.checkpoint(state, record, observers, *keeper, clock, course())?;
+            self.checkpoint(state, record, observers, *keeper, clock, course)?;
         }
         asked
     }
@@ -296,13 +304,14 @@ where
         observers: &mut [&mut dyn Observer],
         keeper: &mut dyn Keeper<D>,
         clock: &Clock,
-        course: Course,
+        course: &Course,
     ) -> Result<()> {
         let began = Instant::now();
         let mut kept = Kept::default();
         self.mover.generator.keep(&mut kept);
         observers.iter_mut().try_for_each(|observer| observer.keep(&mut kept))?;
         let last = state.t >= self.schedule.end();
+        let course = Course { seconds: clock.seconds(), ..course.clone() };
         keeper.keep(&Checkpoint::of(state, clock.counted(record), course, kept), last)?;
         record.seconds.output += began.elapsed().as_secs_f64();
         Ok(())
@@ -337,38 +346,6 @@ where
         let outcome = observers.iter_mut().try_for_each(|observer| observer.observe(event, &snapshot));
         record.seconds.output += output.elapsed().as_secs_f64();
         outcome
-    }
-
-    /// Quality of the mesh, and the error where an exact solution is known.
-    fn assess(&self, state: &State<D>) -> (Quality, Option<ErrorNorms>) {
-        let Some(exact) = self.physics.exact(state.t, &state.mesh) else {
-            return (state.mesh.quality_and_integral(&state.rho, &state.rho).0, None);
-        };
-        let known = self.physics.known();
-        let (mut linf, mut squares) = (0.0_f64, vec![0.0; state.mesh.x().len()]);
-        for (n, &c) in known.iter().enumerate() {
-            let errors: Vec<f64> = state.u.component(c).zip(exact.component(n)).map(|(u, exact)| u - exact).collect();
-            linf = linf.max(largest(&errors));
-            squares.iter_mut().zip(&errors).for_each(|(square, error)| *square += error * error);
-        }
-        let (quality, integral) = state.mesh.quality_and_integral(&state.rho, &squares);
-        let mean = integral / (state.mesh.extent().iter().product::<f64>() * known.len() as f64);
-        (quality, Some(ErrorNorms { linf, l2: mean.sqrt() }))
-    }
-
-    fn report(&self, state: &State<D>, at_start: &AtStart, interface: Option<Interface>) -> Report {
-        let (quality, error) = self.assess(state);
-        let followed = self.monitor.followed(state.t, &state.mesh, &state.u).ok();
-        let benefit = followed.and_then(|u| Benefit::of(&state.mesh, &u).ok());
-        Report {
-            t: state.t,
-            error,
-            quality,
-            conserved: at_start.conserved(&*self.physics, &state.mesh, &state.u),
-            interface,
-            comparison: None,
-            benefit,
-        }
     }
 }
 

@@ -1,3 +1,7 @@
+mod change;
+
+pub(crate) use change::rushed;
+
 use super::control::Control;
 use super::coupling::{Advanced, Stretch, attempt};
 use super::journey::{change_in_place, range};
@@ -5,10 +9,11 @@ use super::safety::{Safety, divided};
 use super::schedule::{Schedule, Steps};
 use super::{Record, Simulation, State};
 use crate::error::{Cause, Error, Failure, Moment, Result};
-use crate::geometry::{Field, Lattice, Mesh};
-use crate::meshing::{Movable, Relaxation};
+use crate::geometry::{Field, Mesh};
+use crate::meshing::Movable;
 use crate::numerics::larger;
 use crate::physics::Motion;
+use change::{at_rest, change_at_nodes, relative, share};
 use serde::{Deserialize, Serialize};
 
 /// How long steps are, and what is remembered for the next
@@ -372,51 +377,4 @@ impl Free {
     fn share_of(&self, changed: Option<(f64, Field)>) -> f64 {
         changed.map_or(f64::INFINITY, |(change, _)| share(change, self.scales()[0]))
     }
-}
-
-/// The change in a step of length `dt` if the mesh rested, and what it would lead to; none where that fails.
-fn at_rest<const D: usize>(
-    simulation: &mut Simulation<D>,
-    State { t, mesh, u, .. }: &State<D>,
-    dt: f64,
-) -> Option<(f64, Field)>
-where
-    Mesh<D>: Movable<D>,
-{
-    let motion = Motion { t: *t, dt, old: mesh, new: mesh };
-    let (after, _) = simulation.physics.step(motion, u).ok()?;
-    Some((change_at_nodes(mesh.lattice(), u, &after), after))
-}
-
-/// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic
-/// length.
-pub(super) fn rushed<const D: usize>(simulation: &Simulation<D>, before: &State<D>, after: &State<D>) -> bool
-where
-    Mesh<D>: Movable<D>,
-{
-    let follows = simulation.mover.equation.relaxation == Relaxation::Auto && simulation.mover.generator.moves();
-    let range = range(&before.u, 0).max(range(&after.u, 0));
-    follows
-        && !simulation.physics.is_given()
-        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), range) > TOO_MUCH * CHANGE
-}
-
-/// The largest error of all unknowns, each as a share of its range.
-fn relative(errors: &[f64], ranges: &[f64]) -> f64 {
-    let largest = ranges.iter().copied().fold(0.0, f64::max);
-    let counted = errors.iter().zip(ranges).filter(|(_, range)| **range > OF_ROUNDING * largest);
-    counted.fold(0.0, |m, (error, range)| larger(m, error / range))
-}
-
-/// The largest change of the first unknown at a node inside. On sides, where values are
-/// given, nothing has to be solved for.
-fn change_at_nodes<const D: usize>(lattice: &Lattice<D>, before: &Field, after: &Field) -> f64 {
-    let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
-    let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; D]);
-    inside.fold(0.0, |m, (_, change)| larger(m, change))
-}
-
-/// A change as a share of a range; 0 for constants.
-fn share(change: f64, range: f64) -> f64 {
-    if range > 0.0 { change / range } else { 0.0 }
 }

@@ -25,8 +25,19 @@ impl<const D: usize> Simulation<D>
 where
     Mesh<D>: Movable<D>,
 {
+    /// Says once what a step of length `dt` that led to a state gives reason to.
+    pub(super) fn warn(&self, state: &State<D>, dt: f64, record: &mut Record) {
+        self.warn_of_noise(state, record);
+        self.warn_of_unrest(state, dt, record);
+        self.warn_of_range(state, record);
+        self.warn_of_growth(state, record);
+        if self.schedule.reports_at(state.t) {
+            self.warn_of_wide_cells(state, record);
+        }
+    }
+
     /// Says once in a run that the mesh turns back from step to step, and with which τ it would rest on this solution.
-    pub(super) fn warn_of_unrest(&self, state: &State<D>, dt: f64, record: &mut Record) {
+    fn warn_of_unrest(&self, state: &State<D>, dt: f64, record: &mut Record) {
         let relaxation = self.mover.equation.relaxation;
         let hardly_follows = relaxation == Relaxation::Auto && state.gait.steps() > HARDLY_FOLLOWS;
         if !(hardly_follows || relaxation != Relaxation::Auto && state.gait.is_restless())
@@ -61,7 +72,7 @@ where
 
     /// Says once of each unknown that it leaves the range of its data where the equation keeps it: where cells are too
     /// wide for central fluxes.
-    pub(super) fn warn_of_range(&self, state: &State<D>, record: &mut Record) {
+    fn warn_of_range(&self, state: &State<D>, record: &mut Record) {
         let keeps = self.physics.keeps_range();
         if !keeps.contains(&true) {
             return;
@@ -93,7 +104,7 @@ where
     }
 
     /// Says once in a run that a front is thinner than cells that are too wide for its flux.
-    pub(super) fn warn_of_wide_cells(&self, state: &State<D>, record: &mut Record) {
+    fn warn_of_wide_cells(&self, state: &State<D>, record: &mut Record) {
         if record.warnings.iter().any(|said| said.contains(WIDE)) {
             return;
         }
@@ -123,7 +134,7 @@ where
     }
 
     /// Says once in a run that interface values are noisy, or that nobody knows.
-    pub(super) fn warn_of_noise(&self, state: &State<D>, record: &mut Record) {
+    fn warn_of_noise(&self, state: &State<D>, record: &mut Record) {
         let Some(interface) = record.interface.filter(|i| i.walks > 0) else { return };
         let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * NOISE_WORTH_A_WARNING);
         let warning = match percent {

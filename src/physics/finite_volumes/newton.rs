@@ -54,9 +54,8 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let mut scale = Scale::of(u);
         let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
-        let mut work = Work::default();
-        // that of the first values would make a step of the first order; later it stays, so that Newton's method ends
-        let mut damping = Damping::none();
+        // a damping of the first values would make a step of the first order; later it stays, so that the method ends
+        let (mut work, mut damping) = (Work::default(), Damping::none());
         let loads = half.loads(law, u)?;
         let (mut correction, mut retreats) = (Vec::new(), 0);
         let stalled = loop {
@@ -74,39 +73,22 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             }
             damping.add_to(&mut view, &patch, u);
             half.residual(law, excess, &view, [known, &loads], u, &mut residual);
-            for side in sides {
-                for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
-                    *residual = if given.is_some() { 0.0 } else { *residual };
-                }
-            }
+            leave_given(sides, &mut residual);
             let bound = hold(bounds, u, patch, &mut residual);
             let (largest, iterations) = (largest_of(&residual), work.newton_iterations);
-            if iterations == 0 {
-                scale.begin(largest);
-            }
-            // at least one Newton step is done: small changes, if left out, would add up over many time steps
-            let wanted = scale.wanted(if iterations == 0 { 0.0 } else { L::TOLERANCE });
+            let wanted = scale.wanted(iterations, largest, L::TOLERANCE);
             if (0..B).all(|c| largest[c] <= wanted[c]) {
                 break None;
             }
             if iterations == MAX_NEWTON || scale.diverges(largest) {
-                let over = |c: &usize| largest[*c] / wanted[*c];
-                let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
-                break Some(Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations });
+                break Some(stalled_at(largest, wanted, iterations));
             }
             half.matrix(law, excess, &view, sides, &mut matrix);
-            for (i, c) in bound {
-                matrix.rows[i].iter_mut().for_each(|block| block[c] = [0.0; B]);
-                matrix.rows[i][0][c][c] = 1.0;
-            }
+            fix(bound, &mut matrix);
             scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
-            correction = vec![[0.0; B]; patch.padded_len()];
             let enough = scale.enough(largest, L::TOLERANCE);
-            let factor = of_size_one(largest);
-            residual.as_flattened_mut().iter_mut().for_each(|value| *value *= factor);
-            work += self.solver.solve(&matrix, &residual, &mut correction, enough.map(|enough| enough * factor))?;
-            correction.as_flattened_mut().iter_mut().for_each(|value| *value /= factor);
-            work.newton_iterations += 1;
+            correction = vec![[0.0; B]; patch.padded_len()];
+            work += self.solve(&matrix, &mut residual, (largest, enough), &mut correction)?;
             <Half<'_, D> as Around<D, S>>::repeat_sides(&patch, &mut correction);
             for (u, correction) in u.as_flattened_mut().iter_mut().zip(correction.as_flattened()) {
                 *u += correction;
@@ -114,6 +96,50 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         };
         Ok(Solved { residual, work, stalled })
     }
+
+    /// The correction for a residual, which is brought to the size of 1 where its squares are beyond the range of
+    /// numbers.
+    fn solve<const S: usize>(
+        &mut self,
+        matrix: &BlockMatrix<D, S, B>,
+        residual: &mut [[f64; B]],
+        (largest, enough): ([f64; B], [f64; B]),
+        correction: &mut [[f64; B]],
+    ) -> Result<Work, Failure>
+    where
+        Solver: LinearSolver<D, S, B, Block<B>>,
+    {
+        let factor = of_size_one(largest);
+        residual.as_flattened_mut().iter_mut().for_each(|value| *value *= factor);
+        let mut work = self.solver.solve(matrix, residual, correction, enough.map(|enough| enough * factor))?;
+        work.newton_iterations += 1;
+        correction.as_flattened_mut().iter_mut().for_each(|value| *value /= factor);
+        Ok(work)
+    }
+}
+
+/// Nothing has to be done for values that are given.
+fn leave_given<const B: usize>(sides: &[Side<B>], residual: &mut [[f64; B]]) {
+    for side in sides {
+        for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
+            *residual = if given.is_some() { 0.0 } else { *residual };
+        }
+    }
+}
+
+/// The rows of values that lie on their bounds say that these do not change.
+fn fix<const D: usize, const S: usize, const B: usize>(bound: Vec<(usize, usize)>, matrix: &mut BlockMatrix<D, S, B>) {
+    for (i, c) in bound {
+        matrix.rows[i].iter_mut().for_each(|block| block[c] = [0.0; B]);
+        matrix.rows[i][0][c][c] = 1.0;
+    }
+}
+
+/// That of the unknown which is farthest from what is wanted.
+fn stalled_at<const B: usize>(largest: [f64; B], wanted: [f64; B], iterations: usize) -> Failure {
+    let over = |c: &usize| largest[*c] / wanted[*c];
+    let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
+    Failure::NewtonStalled { residual: largest[c], tolerance: wanted[c], iterations }
 }
 
 /// Takes back half of a correction that was added to values, and halves it.
@@ -165,12 +191,6 @@ impl<const B: usize> Scale<B> {
         Self { sizes, size, at_first: f64::INFINITY, stiffest: 1.0 }
     }
 
-    fn begin(&mut self, largest: [f64; B]) {
-        self.size = largest.into_iter().fold(self.size, larger);
-        self.sizes = std::array::from_fn(|c| larger(self.sizes[c], largest[c]).max(f64::EPSILON * self.size));
-        self.at_first = self.overall(largest);
-    }
-
     fn overall(&self, largest: [f64; B]) -> f64 {
         (0..B).fold(0.0, |m, c| larger(m, largest[c] / self.sizes[c]))
     }
@@ -179,9 +199,16 @@ impl<const B: usize> Scale<B> {
         ROUNDINGS * f64::EPSILON * self.stiffest
     }
 
-    /// Residuals that are small enough, as this share of each unknown; none below the smallest normal number, beneath
-    /// which products lose all digits.
-    fn wanted(&self, share: f64) -> [f64; B] {
+    /// Residuals that are small enough after some iterations, as a share of each unknown; none below the smallest normal
+    /// number, beneath which products lose all digits. At least one iteration is done: small changes, if left out,
+    /// would add up over many time steps.
+    fn wanted(&mut self, iterations: usize, largest: [f64; B], tolerance: f64) -> [f64; B] {
+        if iterations == 0 {
+            self.size = largest.into_iter().fold(self.size, larger);
+            self.sizes = std::array::from_fn(|c| larger(self.sizes[c], largest[c]).max(f64::EPSILON * self.size));
+            self.at_first = self.overall(largest);
+        }
+        let share = if iterations == 0 { 0.0 } else { tolerance };
         std::array::from_fn(|c| (share * self.sizes[c]).max(self.rounding() * self.size).max(f64::MIN_POSITIVE))
     }
 

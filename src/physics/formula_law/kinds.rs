@@ -58,17 +58,12 @@ impl<const B: usize> Kinds<B> {
         };
         let keeps_range = |c: usize| {
             let flows = (0..D).any(|d| !is_zero(d, c));
-            let ends = |end: &Open| match end {
-                Open::Value(_) | Open::Outflow => true,
-                Open::Closed => !flows,
-                Open::Flux(_) => false,
-            };
             // of the unknown alone, so that no place draws it together; else where the flux ends it would pile up
             !has_source(c)
                 && flux_is_own(c)
                 && is_plain(c)
                 && (cartesian || !flows)
-                && sides[c].as_flattened().iter().all(ends)
+                && sides[c].as_flattened().iter().all(|end| adds_nothing(end, flows))
         };
         let on_place = |formula: &Formula| (0..D).any(|d| formula.depends_on(d));
         let is_loaded = |c: usize| on_place(&nodal[(D + 1) * B + c]) && !(0..B).any(|e| on_place(by_unknown(c, e)));
@@ -78,9 +73,8 @@ impl<const B: usize> Kinds<B> {
         let bends = |c: usize| shares(c) && bends(c);
         let reacts_alike = |c: usize| bends(c) && !on_place(&nodal[(D + 1) * B + c]);
         let is_fed = |c: usize| sides[c].as_flattened().iter().any(|end| matches!(end, Open::Flux(_)));
-        let opens = |&(d, end): &(usize, usize)| {
-            sides.iter().any(|sides| matches!(sides[d][end], Open::Outflow | Open::Flux(_)))
-        };
+        let lets_through = |end: &Open| matches!(end, Open::Outflow | Open::Flux(_));
+        let opens = |&(d, end): &(usize, usize)| sides.iter().any(|sides| lets_through(&sides[d][end]));
         Self {
             limited: Limited {
                 unknowns: limited,
@@ -99,6 +93,15 @@ impl<const B: usize> Kinds<B> {
             reacts: std::array::from_fn(|c| has_source(c) && is_plain(c) && !is_fed(c)),
             open: (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(opens).collect(),
         }
+    }
+}
+
+/// Whether a side brings no more of an unknown than there is, where a flux may carry it.
+fn adds_nothing(end: &Open, flows: bool) -> bool {
+    match end {
+        Open::Value(_) | Open::Outflow => true,
+        Open::Closed => !flows,
+        Open::Flux(_) => false,
     }
 }
 

@@ -1,0 +1,56 @@
+//! How much a solution changes in a step.
+
+use super::{CHANGE, OF_ROUNDING, TOO_MUCH};
+use crate::geometry::{Field, Lattice, Mesh};
+use crate::meshing::{Movable, Relaxation};
+use crate::numerics::larger;
+use crate::physics::Motion;
+use crate::simulation::journey::range;
+use crate::simulation::{Simulation, State};
+
+/// The change in a step of length `dt` if the mesh rested, and what it would lead to; none where that fails.
+pub(super) fn at_rest<const D: usize>(
+    simulation: &mut Simulation<D>,
+    State { t, mesh, u, .. }: &State<D>,
+    dt: f64,
+) -> Option<(f64, Field)>
+where
+    Mesh<D>: Movable<D>,
+{
+    let motion = Motion { t: *t, dt, old: mesh, new: mesh };
+    let (after, _) = simulation.physics.step(motion, u).ok()?;
+    Some((change_at_nodes(mesh.lattice(), u, &after), after))
+}
+
+/// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic
+/// length.
+pub(crate) fn rushed<const D: usize>(simulation: &Simulation<D>, before: &State<D>, after: &State<D>) -> bool
+where
+    Mesh<D>: Movable<D>,
+{
+    let follows = simulation.mover.equation.relaxation == Relaxation::Auto && simulation.mover.generator.moves();
+    let range = range(&before.u, 0).max(range(&after.u, 0));
+    follows
+        && !simulation.physics.is_given()
+        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), range) > TOO_MUCH * CHANGE
+}
+
+/// The largest error of all unknowns, each as a share of its range.
+pub(super) fn relative(errors: &[f64], ranges: &[f64]) -> f64 {
+    let largest = ranges.iter().copied().fold(0.0, f64::max);
+    let counted = errors.iter().zip(ranges).filter(|(_, range)| **range > OF_ROUNDING * largest);
+    counted.fold(0.0, |m, (error, range)| larger(m, error / range))
+}
+
+/// The largest change of the first unknown at a node inside. On sides, where values are
+/// given, nothing has to be solved for.
+pub(super) fn change_at_nodes<const D: usize>(lattice: &Lattice<D>, before: &Field, after: &Field) -> f64 {
+    let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
+    let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; D]);
+    inside.fold(0.0, |m, (_, change)| larger(m, change))
+}
+
+/// A change as a share of a range; 0 for constants.
+pub(super) fn share(change: f64, range: f64) -> f64 {
+    if range > 0.0 { change / range } else { 0.0 }
+}
