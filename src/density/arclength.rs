@@ -2,6 +2,7 @@ use super::{MAX_SMOOTHING, Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Mesh, check_length};
 use crate::numerics::difference::Metrics;
+use crate::numerics::larger;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -91,7 +92,7 @@ impl<const D: usize> Monitor<D> for Arclength {
         let alpha = match self.strength {
             Strength::Absolute(alpha) => alpha,
             Strength::Relative(strength) => {
-                let steepest = slope2.iter().copied().fold(0.0, f64::max);
+                let steepest = slope2.iter().copied().fold(0.0, larger);
                 if steepest > 0.0 { strength / steepest } else { 0.0 }
             }
         };

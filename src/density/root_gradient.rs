@@ -2,7 +2,7 @@ use super::need::{bends, between, need as need_of, need_by_bends};
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
 use crate::geometry::{Cells, Field, Lattice, Mesh, check_length, strides};
-use crate::numerics::{larger, sum};
+use crate::numerics::{ends, larger, sum};
 use std::borrow::Cow;
 
 /// The root of the slope, over its mean: no number to set
@@ -134,12 +134,10 @@ impl Followed {
     {
         let lattice = mesh.lattice();
         let longest = lattice.cells().into_iter().max().unwrap_or(1) as f64;
-        let ends = unknowns
-            .iter()
-            .map(|u| u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]));
+        let ends = unknowns.iter().map(|u| ends(u.iter().copied()));
         let ends: Vec<[f64; 2]> = ends.collect();
         let sizes = ends.iter().map(|[low, high]| high.max(-low));
-        let largest = sizes.clone().fold(0.0, f64::max);
+        let largest = sizes.clone().fold(0.0, larger);
         let (mut slopes, mut need, mut step) = (Vec::new(), 0.0, 0.0);
         for ((u, [low, high]), size) in unknowns.iter().zip(&ends).zip(sizes) {
             let range = high - low;

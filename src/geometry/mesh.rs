@@ -1,4 +1,4 @@
-use super::{Lattice, lattice::strides, nodal::check_length};
+use super::{Lattice, lattice::diagonal, lattice::strides, nodal::check_length};
 use crate::error::{Error, Failure, Result};
 use std::borrow::Cow;
 
@@ -205,6 +205,11 @@ impl<const D: usize> Mesh<D> {
     /// Indices and position of a node, as failures carry them: with two entries, of which the second is 0 on a line.
     pub(crate) fn told(&self, k: usize) -> ([usize; 2], [f64; 2]) {
         (first_two(&self.lattice.node(k)), first_two(&self.x[k]))
+    }
+
+    /// What positions jump by on a turn around each axis: the extent of the box along it.
+    pub(crate) fn jump(&self) -> [[f64; D]; D] {
+        diagonal(self.extent())
     }
 
     /// The largest distance of a node from its position in another mesh over the same lattice.

@@ -1,6 +1,6 @@
 use super::Relaxation;
 use crate::error::{Failure, Result};
-use crate::geometry::{Lattice, Mesh, Patch, check_length};
+use crate::geometry::{Lattice, Mesh, Patch, check_length, strides};
 use crate::numerics::difference::Gradient;
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Pcg};
@@ -176,11 +176,6 @@ pub(super) fn cell_means<const D: usize>(lattice: &Lattice<D>, values: &[f64]) -
     places(&patch, strides).map(mean).collect()
 }
 
-/// Distance in an array between neighbours along each axis, with the last axis fastest.
-fn strides<const D: usize>(size: [usize; D]) -> [usize; D] {
-    std::array::from_fn(|d| size[d + 1..].iter().product())
-}
-
 /// One implicit Euler step of a mesh equation, as what each node draws from its neighbours
 ///
 /// ```text
@@ -230,7 +225,10 @@ impl<const D: usize> MeshOperator<D> {
     }
 
     /// Solves a symmetric step on one patch by conjugate gradients, to an error of at most `closeness` in each
-    /// position; otherwise as [`solve`](Self::solve). None where the operator is not symmetric or the iteration fails.
+    /// position; otherwise as [`solve`](Self::solve).
+    ///
+    /// # Errors
+    /// [`Failure::LinearStalled`] where the iteration fails, without an iteration where the operator is not symmetric.
     pub fn solve_symmetric<const S: usize, const K: usize>(
         &self,
         patch: Patch<D>,
@@ -239,8 +237,15 @@ impl<const D: usize> MeshOperator<D> {
         jump: [[f64; K]; D],
         solver: &mut Pcg<D, K>,
         closeness: f64,
-    ) -> Option<(Vec<[f64; K]>, Work)> {
-        let volumes = self.volumes.as_ref()?;
+    ) -> Result<(Vec<[f64; K]>, Work), Failure> {
+        let Some(volumes) = self.volumes.as_ref() else {
+            return Err(Failure::LinearStalled {
+                unknowns: 0,
+                residual: f64::NAN,
+                tolerance: closeness,
+                iterations: 0,
+            });
+        };
         let weights: Vec<f64> = patch.nodes(&self.lattice).map(|node| volumes[node]).collect();
         let mut matrix = self.matrix::<S>(patch);
         let mut right = self.right(patch, old, jump);
@@ -248,8 +253,8 @@ impl<const D: usize> MeshOperator<D> {
             row.iter_mut().chain(right).for_each(|entry| *entry *= weight);
         }
         let mut x = patch.gather(&self.lattice, new, jump);
-        let linear_iterations = solver.solve(&matrix, &weights, &right, &mut x, [closeness; K]).ok()?;
-        Some((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
+        let linear_iterations = solver.solve(&matrix, &weights, &right, &mut x, [closeness; K])?;
+        Ok((x, Work { linear_solves: K, linear_iterations, ..Work::default() }))
     }
 
     /// The first node off the sides that has a weight below zero (|b|h > 2) or NaN.

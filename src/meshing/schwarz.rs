@@ -1,6 +1,6 @@
 use super::overlap::{Local, Part, residual};
 use super::ring::{Trace, ring, traces};
-use super::sides::{jump, size};
+use super::sides::size;
 use super::{Contraction, Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Lattice, Mesh};
@@ -330,7 +330,7 @@ impl MeshGenerator for Schwarz {
         };
         let seconds = started.elapsed().as_secs_f64();
 
-        let residual = residual(&operator, mesh.x(), &x, jump(mesh));
+        let residual = residual(&operator, mesh.x(), &x, mesh.jump());
         self.parts.set(&operator, &residual, beta);
         let size = size(mesh);
         let tolerance = self.tolerance.map(|tolerance| tolerance * size[0].max(size[1]));

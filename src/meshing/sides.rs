@@ -140,11 +140,6 @@ fn at_ends<const D: usize>(
     (0..D).filter(|&d| !along.contains(&d) && upper(d)).map(|d| last[d] * strides[d]).sum()
 }
 
-/// The period that is added to positions on wrapping around each axis.
-pub(super) fn jump<const D: usize>(mesh: &Mesh<D>) -> [[f64; D]; D] {
-    diagonal(mesh.extent())
-}
-
 /// The largest coordinate along each axis.
 pub(super) fn size<const D: usize>(mesh: &Mesh<D>) -> [f64; D] {
     std::array::from_fn(|d| mesh.lower()[d].abs().max(mesh.upper()[d].abs()))

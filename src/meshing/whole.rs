@@ -1,4 +1,4 @@
-use super::sides::{jump, size};
+use super::sides::size;
 use super::{MeshGenerator, Mmpde, Moved, move_sides};
 use crate::error::{Failure, Result, Unfit};
 use crate::geometry::{Cells, Mesh, Patch};
@@ -82,19 +82,25 @@ impl<const D: usize> Whole<D> {
         if operator.is_symmetric() {
             let guess = self.guess(mesh, &x, dt);
             let (solver, closeness) = (&mut self.symmetric, self.closeness * mesh.shortest_edge());
-            if let Some((new, cost)) =
-                operator.solve_symmetric::<S, D>(patch, mesh.x(), &guess, jump(mesh), solver, closeness)
-            {
-                work += cost;
-                patch.scatter(lattice, &new, &mut x, jump(mesh));
-                let moved = mesh.moved(x)?;
-                self.last = Some(Step { from: mesh.clone(), to: moved.clone(), dt });
-                return Ok(Moved { mesh: moved, work, interface: None });
+            match operator.solve_symmetric::<S, D>(patch, mesh.x(), &guess, mesh.jump(), solver, closeness) {
+                Ok((new, cost)) => {
+                    work += cost;
+                    patch.scatter(lattice, &new, &mut x, mesh.jump());
+                    let moved = mesh.moved(x)?;
+                    self.last = Some(Step { from: mesh.clone(), to: moved.clone(), dt });
+                    return Ok(Moved { mesh: moved, work, interface: None });
+                }
+                Err(Failure::LinearStalled { iterations, .. }) => {
+                    work.linear_iterations += iterations;
+                    // the other solver of three dimensions is elimination
+                    work.direct_stalled += if D == 3 { D } else { 0 };
+                }
+                Err(other) => return Err(other),
             }
         }
-        let (new, cost) = operator.solve::<S, D>(patch, mesh.x(), &x, jump(mesh), direct(self), size(mesh))?;
+        let (new, cost) = operator.solve::<S, D>(patch, mesh.x(), &x, mesh.jump(), direct(self), size(mesh))?;
         work += cost;
-        patch.scatter(lattice, &new, &mut x, jump(mesh));
+        patch.scatter(lattice, &new, &mut x, mesh.jump());
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: None })
     }
 

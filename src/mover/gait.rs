@@ -1,9 +1,9 @@
 use crate::error::{Failure, Result, Unfit};
-use crate::geometry::{Cells, DualCells, Mesh, check_unfolded, diagonal, dot, length};
+use crate::geometry::{Cells, DualCells, Mesh, check_unfolded, dot, length};
 use crate::kept::{check_nodal, nodal};
 use crate::meshing::{Relaxation, STEPS_TO_BEGIN_WITH};
 use crate::numerics::difference::{Metrics, derivative, scaled_gradient};
-use crate::numerics::sum;
+use crate::numerics::{ends, larger, sum};
 use serde::{Deserialize, Serialize};
 
 /// What a mover carries from step to step: how the mesh was going, and how fast it may follow
@@ -132,7 +132,7 @@ impl<const D: usize> Gait<D> {
             (0..D).for_each(|d| v[d] = share * (v[d] + gain * e[d] / dt));
         }
         let mut steps = self.steps;
-        let most = correction.iter().map(|e| length(*e)).fold(0.0, f64::max);
+        let most = correction.iter().map(|e| length(*e)).fold(0.0, larger);
         let edge = mesh.shortest_edge();
         let c = if most > SOLVED_TO * edge { cosine(&correction, &self.correction) } else { 0.0 };
         let turned = c < TURNS_BACK && most > SEEN * edge;
@@ -175,7 +175,7 @@ impl<const D: usize> Gait<D> {
             .filter_map(|c| {
                 let of = |values: &[f64]| values.iter().skip(c).step_by(u.len() / nodes).copied().collect::<Vec<f64>>();
                 let (u, before) = (of(u), of(before));
-                let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
+                let [low, high] = ends(u.iter().copied());
                 let range = (high - low > ROUNDING * low.abs().max(high.abs())).then_some(high - low)?;
                 let middle: Vec<f64> = u.iter().zip(&before).map(|(a, b)| 0.5 * (a + b) / range).collect();
                 let found = |k: usize, g: [f64; D]| dot(way[k], g) - (u[k] - before[k]) / range;
@@ -284,7 +284,7 @@ fn cosine<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
 /// brings them back, and a prediction that learns from them would make them run ever faster. The part of v − drift
 /// along x_ξ, by its mean over the nodes, is taken out.
 fn go_along<const D: usize>(mesh: &Mesh<D>, velocity: &mut [[f64; D]], drift: [f64; D]) {
-    let (lattice, jump) = (mesh.lattice(), diagonal(mesh.extent()));
+    let (lattice, jump) = (mesh.lattice(), mesh.jump());
     for d in (0..D).filter(|&d| lattice.periodic()[d]) {
         let along = derivative(lattice, mesh.x(), d, jump[d]);
         let pairs = velocity.iter().zip(&along);

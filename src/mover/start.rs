@@ -3,6 +3,7 @@ use crate::density::Monitor;
 use crate::error::Result;
 use crate::geometry::{Mesh, check_unfolded, interpolate, strides};
 use crate::meshing::{Form, Mmpde, Movable, Relaxation};
+use crate::numerics::ends;
 
 /// A mesh that was adapted to a density at the start.
 #[derive(Debug, Clone)]
@@ -138,7 +139,7 @@ fn holds<const D: usize>(mesh: &Mesh<D>, u: &[f64], most: f64, thin: f64) -> boo
     let lattice = mesh.lattice();
     let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());
     let size: [f64; D] = std::array::from_fn(|d| mesh.extent()[d] / cells[d] as f64);
-    let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(*u), h.max(*u)]);
+    let [low, high] = ends(u.iter().copied());
     let nodes = cells.map(|n| n + 1);
     let strides = strides(nodes);
     (0..D).any(|d| {

@@ -1,6 +1,6 @@
 //! Second-order differences on the lattice, and the metrics of a mesh that follow from them.
 
-use crate::geometry::{Lattice, Mesh, cofactors, diagonal};
+use crate::geometry::{Lattice, Mesh, cofactors};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -116,7 +116,7 @@ pub struct Metrics<const D: usize = 2> {
 impl<const D: usize> Metrics<D> {
     /// Metrics at all nodes, by [`derivative`].
     pub fn new(mesh: &Mesh<D>) -> Self {
-        let (lattice, jump) = (*mesh.lattice(), diagonal(mesh.extent()));
+        let (lattice, jump) = (*mesh.lattice(), mesh.jump());
         let tangents = std::array::from_fn(|d| derivative(&lattice, mesh.x(), d, jump[d]));
         Self { lattice, tangents }
     }

@@ -9,6 +9,11 @@ pub(crate) fn larger(m: f64, value: f64) -> f64 {
     if value.abs() <= m || m.is_nan() { m } else { value.abs() }
 }
 
+/// The least and the largest of some values; [∞, −∞] of none. A NaN counts as none.
+pub(crate) fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
+
 /// Compensated sum, in order: its round-off does not grow with the number of terms
 ///
 /// # Source

@@ -1,5 +1,6 @@
 use super::picture::{Canvas, Picture};
 use super::sheet::{LONGER, Sheet, colour};
+use crate::numerics::ends;
 use std::fmt::Write;
 
 /// Draws curves over common x, coloured by a parameter such as the time, within the box from `lower` to `upper`.
@@ -17,7 +18,7 @@ pub fn draw_curves(
     // heights change little beside the width of a box: both axes are drawn to a size of their own
     let sheet = Sheet { lower, extent, size: [LONGER, 0.6 * LONGER] };
     let mut s = sheet.begin(title);
-    let [first, last] = curves.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], (t, _)| [l.min(*t), h.max(*t)]);
+    let [first, last] = ends(curves.iter().map(|(t, _)| *t));
     for (t, y) in curves {
         let points = x.iter().zip(y).map(|(x, y)| {
             let [x, y] = sheet.place([*x, *y]);

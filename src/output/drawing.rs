@@ -2,6 +2,7 @@
 
 use super::picture::{Canvas, Picture, add_point, point};
 use super::sheet::{LEFT, LONGER, SHORTER_AT_LEAST, Sheet, TOP, colour};
+use crate::numerics::ends;
 use crate::simulation::{Scene, Values};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -91,7 +92,7 @@ type Paths = [[[String; STRENGTHS.len()]; TONES]; 2];
 impl<'a> Drawing<'a> {
     fn of(scene: &'a Scene, u: &'a [f64], range: Option<[f64; 2]>) -> Self {
         let [wx, wy] = scene.extent;
-        let ends = || u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
+        let ends = || ends(u.iter().copied());
         let scale = LONGER / wx.max(wy);
         let lines = scene.cells.map(|n| {
             let stride = n.div_ceil(MAX_CELLS);

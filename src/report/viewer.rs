@@ -1,5 +1,6 @@
 use super::files::RunFiles;
 use super::frame::Frame;
+use crate::numerics::ends;
 use crate::parallel::map;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
@@ -196,7 +197,7 @@ impl PackedSeries {
                 _ => frame.cell_fields[a - nodal].1[k.min(count - 1)],
             };
             let all = || frames.iter().flat_map(|frame| nodes.iter().map(move |&k| at(frame, k)));
-            let [low, high] = all().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+            let [low, high] = ends(all());
             // a density that nothing asked for is the same everywhere
             let needless = low == high && a >= 2 && first.fields.len() > 1 && ["rho", "mesh density"].contains(&name);
             (!needless).then(|| {

@@ -3,7 +3,7 @@
 use super::{Simulation, State};
 use crate::density::{NOISE_WORTH_A_WARNING, noise};
 use crate::geometry::{Cells, Field, Lattice, Mesh, node_areas};
-use crate::numerics::{larger, sum};
+use crate::numerics::{ends, larger, sum};
 
 /// Share of the content of an unknown whose loss is told.
 const LOSS: f64 = 0.2;
@@ -179,11 +179,6 @@ fn remedy<const D: usize>(simulation: &Simulation<D>, state: &State<D>, nodal: &
         true => "refine `grid.cells`, or make it wider",
         false => "refine `grid.cells`, or let the mesh follow it by `monitor.of`",
     }
-}
-
-/// The least and the largest.
-pub(super) fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(u), high.max(u)])
 }
 
 fn initial_on_equal_cells<const D: usize>(

@@ -1,10 +1,9 @@
 //! Sources, inflows and side values that come and go between the stages of a step.
 
-use super::doubts::ends;
 use super::{Simulation, State};
 use crate::geometry::Mesh;
 use crate::meshing::Movable;
-use crate::numerics::larger;
+use crate::numerics::{ends, larger};
 use crate::physics::Forcing;
 use serde::{Deserialize, Serialize};
 

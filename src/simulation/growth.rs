@@ -1,10 +1,10 @@
 //! Cells in which small values grow.
 
-use super::doubts::{ends, named};
+use super::doubts::named;
 use super::{Record, Simulation, State};
 use crate::geometry::{Cells, Mesh, node_areas};
 use crate::meshing::Movable;
-use crate::numerics::{larger, sum};
+use crate::numerics::{ends, larger, sum};
 
 /// Where w is less than the width of equal cells, cells are asked to be this many times as wide as equal ones: narrower
 /// ones there would take the nodes of the front.

@@ -1,11 +1,12 @@
 //! What a run says once while it goes on: meshes that cannot rest, interface values that are noisy.
 
-use super::doubts::{ends, named};
+use super::doubts::named;
 use super::forced::Hidden;
 use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State};
 use crate::geometry::Mesh;
 use crate::meshing::{Movable, Relaxation};
 use crate::mover;
+use crate::numerics::ends;
 
 /// More time steps in τ than any layer needs: what a mesh moves by then is little more than noise.
 const HARDLY_FOLLOWS: f64 = 2e3;

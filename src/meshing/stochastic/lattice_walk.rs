@@ -1,4 +1,3 @@
-use super::super::sides::jump;
 use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
 use crate::meshing::Decomposition;
@@ -83,7 +82,7 @@ impl Estimator for GridWalk {
     }
 
     fn estimate(&self, problem: &Problem<'_>, points: &[usize], _strips: &mut Strips) -> Result<Estimates, Failure> {
-        let (mesh, jump) = (problem.mesh, jump(problem.mesh));
+        let (mesh, jump) = (problem.mesh, problem.mesh.jump());
         let walks = Walks::new(problem, self.walks, points.len())?;
         let paid = |p: usize, Stop { node, turns }: Stop| -> [f64; 2] {
             if self.increment {

@@ -20,7 +20,7 @@ pub use strips::Strips;
 
 use strips::Corrected;
 
-use super::sides::{jump, size};
+use super::sides::size;
 use super::{Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
 use crate::error::{Error, Failure, Result, Unfit};
 use crate::geometry::{Lattice, Mesh, Patch};
@@ -317,7 +317,7 @@ impl<E: Estimator> MeshGenerator for Stochastic<E> {
         }
         let seconds = started.elapsed().as_secs_f64();
 
-        let (jump, size) = (jump(mesh), size(mesh));
+        let (jump, size) = (mesh.jump(), size(mesh));
         let solved = parallel::map_mut(&mut parts.patches, |(patch, solver)| {
             operator.solve::<5, 2>(*patch, mesh.x(), &x, jump, solver, size)
         });

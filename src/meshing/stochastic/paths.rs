@@ -1,4 +1,3 @@
-use super::super::sides::jump;
 use super::surface::{Bilinear, Grid, Surface};
 use super::{MonteCarlo, Problem};
 use crate::elementary::ln;
@@ -58,7 +57,7 @@ impl Domain {
         };
         let b = gradient.of_log(lattice, problem.rho);
         let drift: Vec<[f64; 2]> = b.iter().map(|b| [b[0] * n[0] * ds, b[1] * n[1] * ds]).collect();
-        let jump = jump(mesh);
+        let jump = mesh.jump();
         let [along_xi, along_eta] = [0, 1].map(|d| derivative(lattice, mesh.x(), d, jump[d]));
         let slopes: Vec<[f64; 4]> = (along_xi.iter().zip(&along_eta))
             .map(|(a, b)| [a[0] / n[0], b[0] / n[1], a[1] / n[0], b[1] / n[1]])

@@ -1,6 +1,6 @@
 use super::super::Decomposition;
 use super::super::overlap::{Local, Part, place, residual};
-use super::super::sides::{jump, size};
+use super::super::sides::size;
 use super::Problem;
 use super::coarse::Coarse;
 use crate::error::Failure;
@@ -172,7 +172,7 @@ impl Strips {
         let mut before = f64::INFINITY;
         loop {
             add(&mut found.base, &found.correction);
-            found.residual = residual(problem.operator, mesh.x(), &found.base, jump(mesh));
+            found.residual = residual(problem.operator, mesh.x(), &found.base, mesh.jump());
             self.exchange(problem, local, &mut found)?;
             found.exchanges += 1;
             let change = found.correction.as_flattened().iter().fold(0.0, |m, &c| larger(m, c));

@@ -235,11 +235,11 @@ fn sweeps_in_strips_are_those_of_the_whole_lattice() {
         let (found, _) = step.estimate(&walk);
         let patch = crate::geometry::Patch::whole(&lattice);
         let matrix: LatticeMatrix<2, 5> = step.operator.matrix(patch);
-        let right = step.operator.right(patch, step.mesh.x(), jump(&step.mesh));
-        let mut x = patch.gather(&lattice, &step.new, jump(&step.mesh));
+        let right = step.operator.right(patch, step.mesh.x(), step.mesh.jump());
+        let mut x = patch.gather(&lattice, &step.new, step.mesh.jump());
         relax(&matrix, &right, &mut x, smoother, 4, lattice_walk::lowest(&problem));
         let mut swept = step.new.clone();
-        patch.scatter(&lattice, &x, &mut swept, jump(&step.mesh));
+        patch.scatter(&lattice, &x, &mut swept, step.mesh.jump());
         for k in step.decomposition.points() {
             assert!((0..2).all(|c| (swept[k][c] - found.guess[k][c]).abs() < 1e-14), "{smoother:?}, node {k}");
         }

@@ -2,7 +2,7 @@
 
 use super::{Burgers, Convection};
 use crate::error::Failure;
-use crate::geometry::{Field, Patch, diagonal};
+use crate::geometry::{Field, Patch};
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver};
 use crate::parallel;
@@ -90,7 +90,7 @@ impl Burgers {
         let Motion { t, dt, old, new } = motion;
         let lattice = new.lattice();
         let patch = Patch::whole(lattice);
-        let jump = diagonal(new.extent());
+        let jump = new.jump();
         let [x_old, x_new] = [old, new].map(|mesh| patch.gather(lattice, mesh.x(), jump));
         let velocity = x_old.iter().zip(&x_new).map(|(a, b)| [0, 1].map(|d| (b[d] - a[d]) / dt)).collect();
         let inside = Inside { patch, dt, offsets: LatticeMatrix::<2, 9>::zero(patch).offsets(), velocity };

@@ -3,7 +3,7 @@
 use super::reconstruction::{Places, speeds};
 use super::{Block, Crossing, Half, Law, View, sides};
 use crate::geometry::{Patch, length};
-use crate::numerics::larger;
+use crate::numerics::{ends, larger};
 use crate::parallel;
 
 /// By how much diffusion through faces is raised, each stored with the node below it, for each unknown
@@ -88,7 +88,7 @@ impl<const D: usize> Half<'_, D> {
             std::array::from_fn(|c| if vanishes[c] { f64::INFINITY } else { SWEEPS * fastest(axis, c) })
         });
         let ranges: [f64; B] = std::array::from_fn(|c| {
-            let [low, high] = u.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u[c]), h.max(u[c])]);
+            let [low, high] = ends(u.iter().map(|u| u[c]));
             high - low
         });
         let excess = |k: usize, axis: usize, c: usize, change: f64| {

@@ -2,7 +2,7 @@
 
 use super::{Block, Side};
 use crate::geometry::{Lattice, Patch, length};
-use crate::numerics::larger;
+use crate::numerics::{ends, larger};
 use crate::parallel;
 
 /// How far the values at the faces below and above a node differ from its own, along one axis: by the differences to
@@ -36,7 +36,7 @@ pub(super) fn increments([below, above]: [f64; 2], [h_below, h_above]: [f64; 2],
 /// would cut off its peak, it is left as it is.
 #[inline(always)]
 pub(super) fn smoothness(seconds: [f64; 3]) -> f64 {
-    let [least, most] = seconds.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, m], s| [l.min(*s), m.max(*s)]);
+    let [least, most] = ends(seconds.iter().copied());
     let ratio = if least > 0.0 {
         least / most
     } else if most < 0.0 {

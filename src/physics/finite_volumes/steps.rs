@@ -5,7 +5,7 @@ use super::repair::{repair, settle};
 use super::transport::Transport;
 use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, inside, sides, stretched};
 use crate::error::Failure;
-use crate::geometry::{Cells, DualCells, Mesh, diagonal, padded};
+use crate::geometry::{Cells, DualCells, Mesh, padded};
 use crate::numerics::larger;
 use crate::numerics::linear::LinearSolver;
 use crate::physics::{Motion, check_finite};
@@ -35,7 +35,7 @@ where
             t,
             mesh,
             cells: known.unwrap_or_else(|| law.cells(mesh)),
-            x: padded(mesh.lattice(), mesh.x(), diagonal(mesh.extent())),
+            x: padded(mesh.lattice(), mesh.x(), mesh.jump()),
             excess: weights.iter().any(|weight| *weight != 0.0).then(|| Excess::of(mesh, weights)),
             weights,
             jumps: false,

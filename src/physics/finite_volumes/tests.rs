@@ -1,7 +1,7 @@
 //! Invariants of the fluxes, the geometric conservation law, and Newton's matrix against the residual.
 
 use super::*;
-use crate::geometry::{Lattice, diagonal, padded};
+use crate::geometry::{Lattice, padded};
 use crate::numerics::larger;
 use crate::numerics::linear::BlockMatrix;
 use crate::physics::{Burgers, BurgersFlux, Convection, Motion, Physics};
@@ -99,7 +99,7 @@ pub(in crate::physics) fn order_of_newton<const B: usize, L: Law<B>>(
     let lattice = new.lattice();
     let [old_cells, cells] = [old, new].map(DualCells::new);
     let (patch, swept) = (*cells.patch(), old_cells.swept(&cells));
-    let [from, x] = [old, new].map(|mesh| padded(lattice, mesh.x(), diagonal(mesh.extent())));
+    let [from, x] = [old, new].map(|mesh| padded(lattice, mesh.x(), mesh.jump()));
     let weights = law.weights(t, old, u);
     let shared = weights.iter().any(|weight| *weight != 0.0);
     let stretched = if shared { stretched([&old_cells, &cells], [&from, &x]) } else { Vec::new() };

@@ -3,7 +3,7 @@
 use super::reconstruction::{Places, speeds};
 use super::{Around, Block, Half, Law, Limited, Side, inside, sides};
 use crate::error::Failure;
-use crate::geometry::{Cells, DualCells, Mesh, diagonal, length, padded};
+use crate::geometry::{Cells, DualCells, Mesh, length, padded};
 use crate::numerics::larger;
 use crate::physics::Motion;
 
@@ -123,7 +123,7 @@ where
             }
         };
         let (cells, t) = (self.law.cells(&mesh), t + share * dt);
-        let x = padded(mesh.lattice(), mesh.x(), diagonal(mesh.extent()));
+        let x = padded(mesh.lattice(), mesh.x(), mesh.jump());
         let sides = sides(self.law, t, &mesh);
         Ok(Stage { share, t, mesh, cells, x, sides })
     }

@@ -1,6 +1,7 @@
 //! States that an equation keeps.
 
 use super::FormulaLaw;
+use crate::numerics::ends;
 use crate::physics::finite_volumes::{Law, Side};
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> FormulaLaw<D, B, P, K, Solver>
@@ -27,7 +28,7 @@ where
         std::array::from_fn(|c| {
             let given = sides.iter().filter_map(|side| side.given[c]);
             let values = u.iter().map(|u| u[c]).chain(given);
-            let [least, most] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)]);
+            let [least, most] = ends(values);
             let mut kept = [f64::NEG_INFINITY, f64::INFINITY];
             for &state in &states[c] {
                 if (state <= least || state >= most) && self.is_kept(t, x, u, (c, state)) {

@@ -4,8 +4,8 @@ use super::FormulaLaw;
 use super::checks::WIGGLES;
 use crate::error::Failure;
 use crate::geometry::{Cells, Field, Mesh, dot};
-use crate::numerics::larger;
 use crate::numerics::linear::{RobustLine, RobustTransport};
+use crate::numerics::{ends, larger};
 use crate::physics::finite_volumes::Law;
 use crate::physics::prescribed::evaluate;
 use crate::physics::sides::Open;
@@ -101,7 +101,7 @@ where
         let (limited, damped) = (self.limited().unknowns, self.kinds.damped);
         let mut worst: Option<(usize, usize, f64)> = None;
         for c in (0..B).filter(|&c| !limited[c] && !damped[c]) {
-            let [low, high] = u.component(c).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)]);
+            let [low, high] = ends(u.component(c));
             for (axis, s) in lattice.strides().into_iter().enumerate() {
                 let inside = |k: &usize| lattice.node(*k)[axis] + 1 < lattice.nodes()[axis];
                 for k in (0..lattice.len()).filter(inside) {
