@@ -332,3 +332,10 @@ def test_ctrl_c_is_heard_where_nothing_can_be_stopped(tmp_path):
     settings = {"grid.cells": [2000, 2000]}
     said, seconds = interrupted(str(ROOT / "studies/laplacian-model-problem.toml"), settings, tmp_path / "out")
     assert "goes on in the background" in said and seconds < 5
+
+
+def test_ctrl_c_leaves_a_line_where_it_was(tmp_path):
+    settings = {"time.step": 1e-7}
+    said, _ = interrupted(str(ROOT / "studies/moving-front-1d.toml"), settings, tmp_path / "out")
+    assert said.startswith("interrupted at t = "), said
+    assert driftmesh.load(tmp_path / "out").status == "interrupted"
