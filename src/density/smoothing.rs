@@ -1,7 +1,7 @@
 use crate::error::Failure;
 use crate::geometry::{Lattice, check_length};
 
-/// Passes of the filter (1 2 1)⊗(1 2 1)/16 over a nodal field
+/// Passes of the filter (1 2 1)/4 along each axis over a nodal field
 ///
 /// Sides repeat their own value (not mirrored, which would weigh the interior neighbour twice); periodic axes wrap.
 ///

@@ -25,7 +25,7 @@ pub struct ArclengthTable {
     pub of: Option<String>,
     /// How α is chosen.
     pub strength: Strength,
-    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    /// Passes of the filter (1 2 1)/4 along each axis, which smooth the density.
     pub smoothing: usize,
     /// How the mesh equation differences ρ.
     pub gradient: Gradient,
@@ -53,7 +53,7 @@ pub struct GivenTable {
     /// said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    /// Passes of the filter (1 2 1)/4 along each axis, which smooth the density.
     pub smoothing: usize,
     /// How the mesh equation differences ρ.
     pub gradient: Gradient,

@@ -13,10 +13,15 @@ use serde::{Deserialize, Serialize};
 /// e = xⁿ⁺¹ − x* the correction of a step, and c the cosine between it and the one before,
 ///
 /// ```text
-/// c = Σ eⁿ·eⁿ⁻¹ / √(Σ |eⁿ|² Σ |eⁿ⁻¹|²),    c < −0.1:  τ ← 1.3 τ,  v ← √(1 + c) v;    c > 0.5:  τ ← max(0.97 τ, 15 Δt)
+/// c = Σ eⁿ·eⁿ⁻¹ / √(Σ |eⁿ|² Σ |eⁿ⁻¹|²)
+///
+/// c < −0.1:  τ ← min(1.3 τ, 10⁵ Δt),  v ← √(1 + c) v
+/// c > 0.5:   τ ← max(0.97 τ, 15 Δt)
+/// c > 0.9:   τ ← max(0.9 τ, 15 Δt)
 /// ```
 ///
-/// Corrections within what the mesh equation is solved to, a hundredth of the shortest edge, change nothing.
+/// where τ is the mover's to choose ([`Relaxation::Auto`]); a τ that is given stays, and v with it. Corrections below a
+/// hundredth of the shortest edge, the error that the mesh equation is solved to, change nothing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gait<const D: usize = 2> {
     #[serde(with = "nodal")]

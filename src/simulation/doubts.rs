@@ -71,8 +71,9 @@ where
         Some(Self { finer: at(finer)?, coarser: at(finer / 2)? })
     }
 
-    /// The content of an unknown is ∫|u − m|, m its median over the domain. Where it on the finer cells and on the
-    /// coarser ones differ as much as it and that of the mesh do, nothing is known.
+    /// Says that the mesh misses a share of an unknown's content ∫|u − m|, with m the median of u over the domain.
+    /// Nothing is said where the content on the coarser cells differs from that on the finer ones by half as much as
+    /// that on the mesh does, or more: no reference is known then.
     fn lost(&self, simulation: &Simulation<D>, state: &State<D>, c: usize, name: &str) -> Option<String> {
         let nodal: Vec<f64> = state.u.component(c).collect();
         let values: Vec<f64> = self.finer.1.component(c).collect();

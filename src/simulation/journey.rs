@@ -6,10 +6,10 @@ use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
-/// What moving the nodes through a solution may add to its error over a whole run, as a share of its range: at most
-/// this,
+/// Moving the nodes through a solution may add at most this share of its range to its error over a whole run.
 const MOST: f64 = 3e-3;
-/// and at most so much of the error with which equal cells interpolate it.
+/// Moving the nodes may add over a whole run at most this share of the error with which equal cells interpolate the
+/// solution, where that is less than `MOST` allows: a moving mesh is to be better than equal cells.
 const OF_UNIFORM: f64 = 0.25;
 /// Likewise in each step, as a share of what the solution changes by itself.
 const OF_CHANGE: f64 = 0.2;

@@ -105,8 +105,10 @@ pub struct Simulation<const D: usize = 2> {
     pub schedule: Schedule,
 }
 
-/// Standard error of interface values, as a share of the shortest edge, above which a run says so.
-pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
+/// Standard error of the nodes on interfaces between subdomains, as a share of the shortest edge of the mesh, above
+/// which a run warns that they are noisy.
+pub const INTERFACE_NOISE_WORTH_A_WARNING: f64 = 0.05;
+
 impl<const D: usize> Simulation<D>
 where
     Mesh<D>: Movable<D>,

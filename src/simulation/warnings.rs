@@ -2,7 +2,7 @@
 
 use super::doubts::{ends, named};
 use super::forced::Hidden;
-use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State};
+use super::{INTERFACE_NOISE_WORTH_A_WARNING, Record, Simulation, State};
 use crate::geometry::Mesh;
 use crate::meshing::{Movable, Relaxation};
 use crate::mover;
@@ -136,7 +136,7 @@ where
     /// Says once in a run that interface values are noisy, or that nobody knows.
     fn warn_of_noise(&self, state: &State<D>, record: &mut Record) {
         let Some(interface) = record.interface.filter(|i| i.walks > 0) else { return };
-        let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * NOISE_WORTH_A_WARNING);
+        let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * INTERFACE_NOISE_WORTH_A_WARNING);
         let warning = match percent {
             None => format!(
                 "{UNKNOWN}: at t = {} it cannot be told from these samples; it takes two or more a point",

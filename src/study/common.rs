@@ -36,7 +36,7 @@ impl Header {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyKind {
-    /// A PDE in two dimensions on a moving mesh.
+    /// A PDE in one or two dimensions on a moving mesh.
     MovingMesh,
     /// Poisson's equation on a mesh of any shape.
     Poisson,

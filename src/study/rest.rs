@@ -7,7 +7,7 @@ use crate::geometry::Mesh;
 use crate::meshing::{Form, Mmpde, Movable, Relaxation};
 use crate::simulation::{Record, Simulation, State};
 
-/// How close that step is solved, as a share of the shortest edge.
+/// The mesh step that measures what the density asks for is solved to this share of the shortest edge.
 const CLOSE: f64 = 1e-2;
 /// A mesh of which no node went so many cells in a whole run does not move.
 const MOVES: f64 = 0.25;

@@ -112,8 +112,8 @@ pub struct FrontTable {
     pub method: Method,
     /// How temperatures get to the new mesh.
     pub transfer: Transfer,
-    /// Smoothing of the front's heights over neighbouring columns of the grid after every step: three weights, or
-    /// "none".
+    /// Weights `[a, b, a]` over three neighbouring columns of the grid, which smooth the velocity of the front in every
+    /// step; "none" for no smoothing.
     #[serde(serialize_with = "write_filter", deserialize_with = "read_filter")]
     #[schemars(schema_with = "filter_schema")]
     pub filter: Filter,

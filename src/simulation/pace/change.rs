@@ -42,8 +42,8 @@ pub(super) fn relative(errors: &[f64], ranges: &[f64]) -> f64 {
     counted.fold(0.0, |m, (error, range)| larger(m, error / range))
 }
 
-/// The largest change of the first unknown at a node inside. On sides, where values are
-/// given, nothing has to be solved for.
+/// The largest change of the first unknown at a node inside. On sides, where values are given, nothing has to be solved
+/// for.
 pub(super) fn change_at_nodes<const D: usize>(lattice: &Lattice<D>, before: &Field, after: &Field) -> f64 {
     let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
     let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; D]);
