@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CheckpointsAt {
-    /// After so many steps each.
+    /// Every n steps.
     Steps(usize),
     /// After the first step that ends so many seconds after the last checkpoint.
     Seconds(f64),

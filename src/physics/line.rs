@@ -31,7 +31,7 @@ pub type LineFormulaPde = FormulaPde<1>;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Coordinates {
-    /// x.
+    /// The Cartesian coordinate x.
     #[default]
     Cartesian,
     /// The distance r from an axis: volumes have the weight r.

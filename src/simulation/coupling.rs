@@ -25,11 +25,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Coupling {
-    /// k ≥ 1.
+    /// Number of sub-steps of the mesh in a time step; with a tolerance, the most.
     pub mesh_steps: usize,
-    /// l ≥ 1.
+    /// How often mesh and solution are computed in a time step; with a tolerance, the most.
     pub iterations: usize,
-    /// ε ≥ 0; 0 for exactly k and l.
+    /// Sub-steps are doubled, and mesh and solution computed again, until the mesh changes by at most this share of the
+    /// longest side of the box; 0 for exactly `mesh_steps` and `iterations`.
     pub tolerance: f64,
 }
 

@@ -28,11 +28,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Safety {
-    /// Most parts that a step of the mesh is divided in; 1 for none.
+    /// Largest number of parts into which a step of the mesh is divided where it fails, from 1, for none, to 64.
     pub substeps: usize,
-    /// Most further passes of the filter of ρ; 0 for none.
+    /// Largest number of further smoothing passes over the density ρ where a step of the mesh fails, from 0, for none,
+    /// to 1000.
     pub smoothing: usize,
-    /// How often a time step is halved at most; 0 for never.
+    /// How often a time step that fails is halved at most, from 0, for never, to 30.
     pub halvings: usize,
 }
 
