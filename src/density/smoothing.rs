@@ -44,14 +44,15 @@ pub(super) fn smooth_widely<const D: usize>(
     }
 }
 
-/// With more passes a coarser grid takes over, on which at least three are left.
+/// Largest number of passes of the wide filter that are done on a grid itself; for more, a grid of half as many cells
+/// takes over, on which at least three are left.
 const MOST_PASSES: f64 = 15.0;
-/// The fewest cells along an axis that are halved.
+/// Smallest number of cells along an axis that is halved for the wide filter.
 const FEWEST_HALVED: usize = 4;
-/// Lines that are filtered side by side: all that is done to them is done within the cache. With half as many, lines
-/// across memory cost up to twice the time on 512² cells.
+/// Number of lines that are filtered side by side, so that all that is done to them is done within the cache. With half
+/// as many, lines across memory cost up to twice the time on 512² cells.
 const LANES: usize = 32;
-/// Values of a line that are read at once where they are neighbours in memory: what one fetch brings.
+/// Number of values of a line that are read at once where they are neighbours in memory: those that one fetch brings.
 const PIECE: usize = 8;
 
 /// The values at one place of some lines.

@@ -26,17 +26,21 @@ pub enum Ending {
     Restless,
 }
 
+/// Largest number of mesh steps of an adapted start.
 const MOST_STEPS: usize = 500;
-/// A mesh with more cells along an axis starts from one with half as many.
+/// A mesh with more cells than this along an axis starts from one with half as many.
 const COARSE: usize = 100;
-/// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there: a
-/// layer that the mesh resolves changes by less over each of its edges, however thin it is.
+/// u jumps over an edge shorter than [`THIN`] if it changes there by more than this share of its range: a layer that
+/// the mesh resolves changes by less over each of its edges, however thin it is.
 const JUMP: f64 = 0.2;
+/// Length of an edge, in equal cells, below which a large change of u over it is a jump.
 const THIN: f64 = 1e-3;
-/// The same at the end of all steps: the density does not draw ever more cells into a jump.
+/// At the end of all steps, u jumps over an edge shorter than [`THIN_AT_THE_END`] if it changes there by more than this
+/// share of its range: the density does not draw ever more cells into a jump.
 const JUMP_AT_THE_END: f64 = 0.4;
+/// Length of an edge, in equal cells, below which a large change of u over it is a jump at the end of all steps.
 const THIN_AT_THE_END: f64 = 0.1;
-/// Motion in one step, as a share of the shortest edge, below which a mesh stands still.
+/// A mesh stands still where no node moves by more than this share of the shortest edge in a step.
 const AT_REST: f64 = 4e-3;
 
 /// The mesh that rests on a density, from a given mesh

@@ -28,7 +28,7 @@ impl Default for CheckpointsAt {
     }
 }
 
-/// A year, above which nobody means it.
+/// Largest number of seconds between checkpoints that may be set: a year.
 const LONGEST: f64 = 3.2e7;
 
 impl CheckpointsAt {
@@ -59,7 +59,7 @@ struct Sealed {
     /// The resolved study without `[output]`, which changes no number.
     study: String,
     step: usize,
-    /// Of a run with steps in time.
+    /// What a later end must know of the schedule; none for a study without time steps.
     #[serde(default)]
     past: Option<Past>,
     /// A value as MessagePack, which depends on the kind of the study.
@@ -296,10 +296,10 @@ fn numbers(study: &str) -> Result<toml::Table, toml::de::Error> {
     Ok(table)
 }
 
-/// What a later end of a run may change.
+/// Keys of `[time]` that may differ where a run goes on to a later end.
 const OF_THE_END: [&str; 3] = ["end", "duration", "report"];
 
-/// A study but for how far it goes.
+/// A study without time.end, time.duration and time.report, the keys that may differ on resuming.
 fn unended(study: &toml::Table) -> toml::Table {
     let mut study = study.clone();
     if let Some(time) = study.get_mut("time").and_then(toml::Value::as_table_mut) {

@@ -29,7 +29,7 @@ pub(crate) struct Course {
     pub at_start: AtStart,
     pub pace: Pace,
     pub forced: Forced,
-    /// Since the run began, over all its parts.
+    /// Seconds of the steps since the run began, over all its parts.
     pub seconds: f64,
 }
 

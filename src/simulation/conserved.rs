@@ -29,7 +29,8 @@ pub struct Amount {
     pub drift: f64,
 }
 
-/// An integral at the start that is so small a share of what it could be is of rounding.
+/// An integral at the start is made of rounding where it is below this share of the largest value times the area of the
+/// box.
 const ROUNDING: f64 = 1e-12;
 
 /// Integrals at the start of a run, and the largest value of each unknown there.

@@ -40,11 +40,11 @@ pub struct Safety {
 /// Steps that were tried again, by what was tried.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Retries {
-    /// With the mesh in more parts.
+    /// Steps tried again with the mesh in more parts.
     pub substeps: usize,
-    /// With a smoother density.
+    /// Steps tried again with a smoother density.
     pub smoothed: usize,
-    /// With a shorter time step.
+    /// Steps tried again with a shorter time step.
     pub shortened: usize,
 }
 
@@ -62,7 +62,7 @@ impl Default for Safety {
 }
 
 impl Safety {
-    /// The first failure ends a run.
+    /// Nothing is tried again: the first failure ends a run.
     pub const OFF: Self = Self { substeps: 1, smoothing: 0, halvings: 0 };
 
     /// Refuses settings out of range.
@@ -91,7 +91,8 @@ impl Safety {
 
 /// One step in 2^`parts` parts, or in as many as it takes; with the halvings that it took.
 ///
-/// What it fails with is what its last part failed with.
+/// # Errors
+/// The failure of the last part that was tried.
 pub(super) fn divided<const D: usize>(
     simulation: &mut Simulation<D>,
     state: &State<D>,

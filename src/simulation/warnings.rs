@@ -7,14 +7,14 @@ use crate::geometry::Mesh;
 use crate::meshing::{Movable, Relaxation};
 use crate::mover;
 
-/// More time steps in τ than any layer needs: what a mesh moves by then is little more than noise.
+/// τ above this many time steps is warned of: the mesh then hardly moves.
 const HARDLY_FOLLOWS: f64 = 2e3;
 const HASTY: &str = "`mesh.relaxation` is short";
 const RESTLESS: &str = "the mesh hardly follows its density any more";
 const NOISY: &str = "interface values are noisy";
-/// How far beyond its data an unknown may be, as a share of their range, before that is said.
+/// How far an unknown may leave the range of its data, as a share of that range, before a run warns of it.
 const BEYOND: f64 = 0.05;
-/// What is smaller beside the size of an unknown is of rounding and of Newton's method.
+/// Excesses below this share of the size of an unknown are left by rounding and by Newton's method.
 const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
 const WIDE: &str = "changes within cells that are too wide for central fluxes";
