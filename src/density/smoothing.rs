@@ -26,8 +26,8 @@ pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: 
     Ok(())
 }
 
-/// So many passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does
-/// not depend on their number, which need not be whole
+/// Passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does not depend
+/// on their number, which need not be whole
 ///
 /// A pass adds ½ to the variance of the filter, in cells². More than [`MOST_PASSES`] are done on a grid of half as many
 /// cells: a pass, the means of neighbours, the passes that are left there, their values back on the finer cells, and a

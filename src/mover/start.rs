@@ -20,9 +20,9 @@ pub struct Start<const D: usize = 2> {
 pub enum Ending {
     /// The mesh stands still.
     AtRest,
-    /// It is as fine as it gets around a jump, which no mesh resolves.
+    /// The mesh is as fine as it gets around a jump, which no mesh resolves.
     Jump,
-    /// It went on moving.
+    /// The mesh went on moving.
     Restless,
 }
 
@@ -63,7 +63,7 @@ where
     from_coarser(mesh, form, &mut |mesh| followed(mesh).map(|(u, rho)| (vec![u], rho)))
 }
 
-/// The same where ρ is made of several u, of which the mesh follows the first.
+/// The mesh that rests on a density that is made of several u, of which the mesh follows the first; see [`adapted`].
 pub(crate) fn adapted_to_all<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
 where
     Mesh<D>: Movable<D>,
@@ -107,7 +107,7 @@ where
     start.ok().filter(|start| start.end == Ending::AtRest).map(|start| start.steps)
 }
 
-/// The same, on this mesh alone.
+/// The mesh that rests on a density, from the given mesh alone; see [`adapted`].
 fn to_rest<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
 where
     Mesh<D>: Movable<D>,

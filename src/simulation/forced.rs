@@ -23,8 +23,9 @@ const BENDS: f64 = 0.05;
 /// A side value may differ by more than [`BENDS`] allows if the integral of that difference over the step is below this
 /// share of the length of the run times its change.
 const FOR_LONG: f64 = 5e-5;
-/// Where the stages of TR-BDF2 lie within a step, and their weights in what a step takes of a source: γ = 2 − √2.
+/// Places of the stages of TR-BDF2 within a step, as shares of it: γ = 2 − √2.
 const STAGES: [f64; 3] = [0.0, 2.0 - std::f64::consts::SQRT_2, 1.0];
+/// Weights of the stages of TR-BDF2 in what a step takes of a source.
 const WEIGHTS: [f64; 3] =
     [0.25 * std::f64::consts::SQRT_2, 0.25 * std::f64::consts::SQRT_2, 1.0 - 0.5 * std::f64::consts::SQRT_2];
 const SOURCE: usize = 0;

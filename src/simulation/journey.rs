@@ -33,8 +33,8 @@ const INTERPOLATION: f64 = 0.2;
 /// e = (δ²u_i + δ²u_k)/16,   δ² the second difference along the lattice
 /// ```
 ///
-/// Where the solution stands still nothing removes these errors, and they add up. In a step Δt of a run of length T they may
-/// therefore change an unknown by at most this share of its range:
+/// Where the solution stands still nothing removes these errors, and they add up. In a step Δt of a run of length T
+/// they may therefore change an unknown by at most this share of its range:
 ///
 /// ```text
 /// min(0.003, E₀/4) Δt/T + c n U Δt + max(E − E₀, 0)

@@ -89,7 +89,7 @@ impl Pace {
     /// Tries the next step; none is returned where it is refused.
     ///
     /// # Errors
-    /// What it failed with when all was tried.
+    /// The failure of the step, after all that may be tried was tried.
     pub(super) fn step<const D: usize>(
         &mut self,
         simulation: &mut Simulation<D>,
@@ -133,11 +133,11 @@ pub(crate) struct Free {
     sizes: Vec<f64>,
     /// The size that prescribed formulas will give to each unknown in the run.
     foreseen: Vec<f64>,
-    /// Where errors decide, not changes.
+    /// The controller of the error, where errors decide how long steps are, not changes.
     control: Option<Control>,
-    /// Steps that failed since the last one that did not.
+    /// Number of steps that failed since the last one that did not.
     failures: usize,
-    /// Steps in a row that were very short.
+    /// Number of very short steps in a row.
     short: usize,
 }
 
@@ -245,7 +245,7 @@ impl Free {
     /// Learns from a step; none is returned where it is refused.
     ///
     /// # Errors
-    /// What a step failed with once it was halved as often as may be, or [`Failure::VanishingStep`], where the next
+    /// The failure of a step that was halved as often as may be, or [`Failure::VanishingStep`] where the next step
     /// would be too short.
     fn judge<const D: usize>(
         &mut self,
@@ -346,7 +346,7 @@ impl Free {
         self.dt.max(in_place.min(self.scale))
     }
 
-    /// What makes steps as short as this one.
+    /// The cause of steps that are too short.
     fn cause<const D: usize>(
         &self,
         simulation: &mut Simulation<D>,

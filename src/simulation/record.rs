@@ -7,7 +7,7 @@ use crate::stopwatch::Stopwatch;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
-/// What a run did so far.
+/// The record of a run so far.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Record {
     /// Steps and their cost.
@@ -64,7 +64,7 @@ pub struct WorkTotal {
     pub steps: usize,
     /// Time steps tried in vain.
     pub rejected_steps: usize,
-    /// What all of them cost.
+    /// Cost of the accepted steps.
     #[serde(flatten)]
     pub work: Work,
 }
