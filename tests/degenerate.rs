@@ -67,8 +67,8 @@ fn porous(m: f64, units: [f64; 2], cells: usize, end: f64, fixed: bool) -> Outco
     )))
 }
 
-/// Barenblatt's fronts for m = 2, 3 and 5 are never negative, keep their mass, and have at most a half of the error on a
-/// mesh at rest, in the mean of three times and two numbers of cells; in other units, too.
+/// Barenblatt's fronts for m = 2, 3 and 5 are never negative, keep their mass, and have at most a half of the error on
+/// a mesh at rest, in the mean of three times and two numbers of cells; in other units, too.
 #[test]
 fn barenblatts_fronts_are_followed_without_undershoots() {
     for (m, units) in [(2.0, [1.0, 1.0]), (3.0, [1.0, 1.0]), (3.0, [1e-5, 300.0]), (5.0, [1.0, 1.0])] {

@@ -329,8 +329,8 @@ fn nonsense_is_refused_by_name() {
     }
 }
 
-/// On a periodic line a mesh goes along with what moves, unless another unknown does not: a wave that rests, or has half
-/// of the speed, beside one that is carried. l2 is that of equal cells at most.
+/// On a periodic line a mesh goes along with what moves, unless another unknown does not: a wave that rests, or has
+/// half of the speed, beside one that is carried. l2 is that of equal cells at most.
 #[test]
 fn a_mesh_does_not_sweep_over_what_rests() {
     for (speed, exact) in [("0", "cos(2*pi*x)"), ("0.5", "cos(2*pi*(x - t/2))"), ("-1", "cos(2*pi*(x + t))")] {
@@ -405,8 +405,8 @@ fn a_carried_shape_keeps_its_mesh_while_it_widens() {
     assert!(solution(&moving).iter().all(|[_, u]| (-1e-3..=1.001).contains(u)));
 }
 
-/// A shock without viscosity forms and goes around: the mesh, whose cells there are a hundredth of equal ones, takes ten
-/// times the steps of these (632), and not a hundred times.
+/// A shock without viscosity forms and goes around: the mesh, whose cells there are a hundredth of equal ones, takes
+/// ten times the steps of these (632), and not a hundred times.
 #[test]
 fn shocks_without_viscosity_do_not_take_steps_without_end() {
     let run = run(r#"

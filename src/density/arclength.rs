@@ -37,13 +37,13 @@ pub struct Arclength {
     pub smoothing: usize,
 }
 
-/// How α is chosen.
+/// How α of the arc-length density √(1 + α |∇u|²) is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Strength {
-    /// α = this / max |∇u|², the maximum over all nodes; no unit.
+    /// A number without unit: α is this over the largest |∇u|² at a node.
     Relative(f64),
-    /// α itself.
+    /// α itself, in the unit of (x/u)².
     Absolute(f64),
 }
 

@@ -6,7 +6,7 @@ use crate::geometry::{Field, Mesh};
 /// A monitor that follows a formula of the unknowns instead of the first of them.
 pub(super) struct Following<const D: usize> {
     monitor: Box<dyn Monitor<D>>,
-    /// Of the place, the unknowns and t.
+    /// The formula that is followed, of the place, the unknowns and t.
     of: Program<PLACES, 1>,
     unknowns: usize,
 }

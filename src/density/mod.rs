@@ -26,7 +26,8 @@ use crate::kind::kinds;
 use crate::numerics::difference::Gradient;
 use following::Following;
 
-/// More passes than this leave nothing of ρ on any lattice that fits a machine.
+/// Largest number of passes of the filter over a density that a study may set: more leave nothing of it on any lattice
+/// that fits a machine.
 const MAX_SMOOTHING: usize = 1000;
 
 /// Where a mesh should be fine, decided from the solution on the mesh it has.

@@ -2,21 +2,24 @@ use crate::geometry::{Mesh, Patch, diagonal, length, padded, strides};
 use crate::numerics::difference::scaled_gradient;
 use crate::numerics::larger;
 
-/// Changes of u over a uniform cell, as shares of its range, that equal cells resolve at most, and that take the whole
-/// density at least: a Gaussian is interpolated to 1 % of its range at the first and to 2 % at the second.
+/// Largest change of u over an equal cell, as a share of its range, up to which equal cells are good enough, and from
+/// which on the density counts in full: a Gaussian is interpolated with an error of 1 % of its range at the first, and
+/// of 2 % at the second.
 const SLOPES: [f64; 2] = [0.18, 0.25];
-/// The same for the bends of u in both directions within [`WINDOW`] nodes: a jump by J has the bends J where it is
-/// within a cell, and J/2 where it is at a node, so that two cells share it and no slope tells of it.
+/// Largest bends of u in both directions within [`WINDOW`] nodes, as shares of its range, up to which equal cells are
+/// good enough, and from which on the density counts in full. A jump by J has the bends J where it is within a cell,
+/// and J/2 where it is at a node, so that two cells share it and no slope tells of it.
 const BENDS: [f64; 2] = [0.06, 0.09];
-/// Nodes in a row over which bends are added up: those of a jump are in four of them.
+/// Number of nodes in a row over which bends are added up: those of a jump are in four of them.
 const WINDOW: usize = 4;
 
-/// How much equal cells leave to be desired where u changes by this share of its range over one at most: from 0 to 1.
+/// The need for a density that is not even, where u changes by `share` of its range over an equal cell at most: 0 where
+/// equal cells resolve u, 1 where they do not.
 pub(crate) fn need(share: f64) -> f64 {
     between(SLOPES, share)
 }
 
-/// The same where u bends by this share of its range in both directions within a few nodes.
+/// The same need, where u bends by `share` of its range in both directions within a few nodes.
 pub(super) fn need_by_bends(share: f64) -> f64 {
     between(BENDS, share)
 }

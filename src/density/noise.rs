@@ -1,6 +1,7 @@
 use crate::geometry::Lattice;
 
-/// Share of what a mesh follows that goes up and down from node to node, above which a run says that it follows noise.
+/// Share of all changes of what a mesh follows that goes up and down from node to node, as [`noise`] measures it, above
+/// which a run warns that it follows noise.
 pub const NOISE_WORTH_A_WARNING: f64 = 0.25;
 
 /// Share of all that `values` change along lattice lines that the next edge takes back

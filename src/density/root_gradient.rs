@@ -32,25 +32,31 @@ use std::borrow::Cow;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RootGradient {}
 
-/// Share of the layer in the density.
+/// β where equal cells do not resolve u: the density is 1 + β (√|∇u| − background)/mean before it is smoothed.
 const BETA: f64 = 4.0;
-/// The largest ρ over the smallest, before it is smoothed.
+/// Largest ratio of two values of the density before it is smoothed.
 const CONTRAST: f64 = 1e6;
-/// The same around a jump, which no mesh resolves: cells of about a hundredth of a uniform one. A shock
-/// without viscosity is never wider than a cell, and thinner ones take more steps to follow.
+/// Largest ratio of two values of the density around a jump, which no mesh resolves, before it is smoothed: cells there
+/// are about a hundredth of equal ones. A shock without viscosity is never wider than a cell, and thinner cells take
+/// more steps to follow it.
 const CONTRAST_OF_JUMPS: f64 = 500.0;
-/// Shares of the range on an edge of the mesh from which it begins to be a jump, and is one.
+/// An edge of the mesh over which u changes by the first share of its range begins to be treated as a jump; from the
+/// second on it is one.
 const JUMPS: [f64; 2] = [0.25, 0.5];
-/// The steepest slope over that of the background from which there begins to be, and is, something to gain.
+/// Ratio of the steepest slope to the background's below which the density is even, and above which it counts in full:
+/// where all slopes are alike there is no place from which nodes could be taken.
 const STEEPER: [f64; 2] = [2.0, 4.0];
-/// Passes of the filter on 41 × 41 nodes.
+/// Number of passes of the filter (1 2 1)/4 on 41 × 41 nodes with one layer; it grows with the square of the number of
+/// nodes along an axis, so that the filter is a twentieth of the domain wide.
 const PASSES: f64 = 8.0;
-/// So many layers on a line are smoothed as one is. Were two of them smoothed less, on periodic axes or where a front
-/// winds across the lines, a mesh of 40 cells would not come to rest around layers thinner than a hundredth of the box.
+/// Up to this many layers on a lattice line the density is smoothed as for one layer. Were two of them smoothed less,
+/// on periodic axes or where a front winds across the lines, a mesh of 40 cells would not come to rest around layers
+/// thinner than a hundredth of the box.
 const FEW: f64 = 2.0;
-/// Differences of u below this share of its size are rounding.
+/// u is constant but for rounding where its change over the domain, at the steepest slope, is below this share of its
+/// size; slopes are even where their excess is below this share of the background.
 const ROUNDING: f64 = 1e-10;
-/// An unknown whose range is so small beside the largest of all is made of rounding.
+/// An unknown whose range is below this share of the largest of all is made of rounding, and is left out.
 const OF_ROUNDING: f64 = 1e-9;
 
 impl<const D: usize> Monitor<D> for RootGradient
@@ -102,7 +108,7 @@ impl RootGradient {
         let (cells, layers) = (lattice.cells(), layers(lattice, &rho));
         let passes = std::array::from_fn(|d| {
             let passes = (PASSES * ((cells[d] + 1) as f64 / 41.0).powi(2)).round() * (FEW / layers[d].max(FEW)).powi(2);
-            // from cells to nodes is one of them
+            // taking cell values to nodes is one pass already
             (passes - 1.0).max(0.0)
         });
         smooth_widely(cells, lattice.periodic(), &mut rho, passes);
@@ -123,7 +129,7 @@ struct Followed {
     slopes: Vec<f64>,
     /// The largest need.
     need: f64,
-    /// The largest change over an edge of the mesh, as a share of the range.
+    /// The largest change over an edge of the mesh, as a share of the range of its unknown.
     step: f64,
 }
 
@@ -184,7 +190,7 @@ struct Roots {
     roots: Vec<f64>,
     /// ⟨|∇u|^⅛⟩⁴.
     background: f64,
-    /// Of what exceeds the background.
+    /// Mean of √|∇u| less the background, where that is above 0.
     mean: f64,
     /// The largest |∇u|.
     steepest: f64,
@@ -207,8 +213,9 @@ impl Roots {
     }
 }
 
-/// How many layers the lattice lines along each axis meet: half of all that ρ, given by the cell, rises and falls along
-/// them over the sum of the largest ρ − 1 of each line, so that the lines through the strongest layers count most.
+/// Mean number of layers on a lattice line along each axis: half of all that ρ, given by the cell, rises and falls
+/// along the lines, over the sum of the largest ρ − 1 of each line, so that the lines through the strongest layers
+/// count most.
 fn layers<const D: usize>(lattice: &Lattice<D>, rho: &[f64]) -> [f64; D] {
     let (cells, wraps) = (lattice.cells(), lattice.periodic());
     let steps = strides(cells);

@@ -1,7 +1,7 @@
 use crate::error::Failure;
 use crate::geometry::{Lattice, check_length};
 
-/// Passes of the filter (1 2 1)⊗(1 2 1)/16 over a nodal field
+/// Passes of the filter (1 2 1)/4 along each axis over a nodal field
 ///
 /// Sides repeat their own value (not mirrored, which would weigh the interior neighbour twice); periodic axes wrap.
 ///
@@ -26,8 +26,8 @@ pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: 
     Ok(())
 }
 
-/// So many passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does
-/// not depend on their number, which need not be whole
+/// Passes of the filter (1 2 1)/4 along each axis of a grid of cells, last axis fastest, at a cost that does not depend
+/// on their number, which need not be whole
 ///
 /// A pass adds ½ to the variance of the filter, in cells². More than [`MOST_PASSES`] are done on a grid of half as many
 /// cells: a pass, the means of neighbours, the passes that are left there, their values back on the finer cells, and a
@@ -44,14 +44,15 @@ pub(super) fn smooth_widely<const D: usize>(
     }
 }
 
-/// With more passes a coarser grid takes over, on which at least three are left.
+/// Largest number of passes of the wide filter that are done on a grid itself; for more, a grid of half as many cells
+/// takes over, on which at least three are left.
 const MOST_PASSES: f64 = 15.0;
-/// The fewest cells along an axis that are halved.
+/// Smallest number of cells along an axis that is halved for the wide filter.
 const FEWEST_HALVED: usize = 4;
-/// Lines that are filtered side by side: all that is done to them is done within the cache. With half as many, lines
-/// across memory cost up to twice the time on 512² cells.
+/// Number of lines that are filtered side by side, so that all that is done to them is done within the cache. With half
+/// as many, lines across memory cost up to twice the time on 512² cells.
 const LANES: usize = 32;
-/// Values of a line that are read at once where they are neighbours in memory: what one fetch brings.
+/// Number of values of a line that are read at once where they are neighbours in memory: those that one fetch brings.
 const PIECE: usize = 8;
 
 /// The values at one place of some lines.

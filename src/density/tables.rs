@@ -23,11 +23,11 @@ pub struct ArclengthTable {
     /// said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// How α is chosen.
+    /// How α of the density √(1 + α |∇u|²) is chosen: relative to the steepest slope, or absolute.
     pub strength: Strength,
-    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    /// Passes of the filter (1 2 1)/4 along each axis, which smooth the density.
     pub smoothing: usize,
-    /// How the mesh equation differences ρ.
+    /// How the mesh equation differences the density ρ; it matters with `mesh.form = "gradient"` alone.
     pub gradient: Gradient,
 }
 
@@ -53,9 +53,9 @@ pub struct GivenTable {
     /// said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// Passes of the (1 2 1)⊗(1 2 1)/16 filter.
+    /// Passes of the filter (1 2 1)/4 along each axis, which smooth the density.
     pub smoothing: usize,
-    /// How the mesh equation differences ρ.
+    /// How the mesh equation differences the density ρ; it matters with `mesh.form = "gradient"` alone.
     pub gradient: Gradient,
 }
 

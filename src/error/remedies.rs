@@ -10,8 +10,8 @@ const EXACT: &[&str] = &["\"exact\""];
 /// A formula that gives what is no number or not positive.
 const MEND: &str = "mend the formula that gives it, if one does";
 /// A formula whose slope has no bound.
-const BEND: &str = "mend the formula, for instance by max(…, 1e-9) under a root or a logarithm: Newton's method needs a \
-                    finite derivative";
+const BEND: &str = "mend the formula, for instance by max(…, 1e-9) under a root or a logarithm: Newton's method needs \
+                    a finite derivative";
 
 impl Cause {
     fn remedies(self) -> Vec<Remedy> {

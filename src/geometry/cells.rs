@@ -24,8 +24,7 @@ pub trait Cells<const D: usize>: Sized {
     /// The area of each node: an equal share of every cell around it. These add up to the area of the box.
     fn node_volumes(&self) -> Vec<f64>;
 
-    /// Values at the nodes: means of those of the cells around each; beyond bounded sides stand the cells beside them
-    /// again.
+    /// Values at the nodes: means of the cells around each node; at a bounded side only the cells inside count.
     fn at_nodes(lattice: &Lattice<D>, in_cells: Vec<f64>) -> Vec<f64>;
 
     /// Q of every cell, in lattice order.

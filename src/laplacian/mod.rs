@@ -180,9 +180,8 @@ fn degenerate(mesh: &Mesh<2>, patch: &Patch<2>, k: usize, condition: f64) -> Fai
     Failure::DegenerateStencil { node, x: mesh.x()[mesh.lattice().index(node)], condition }
 }
 
-/// Settings that belong to one kind only are refused with another.
 impl Laplacian {
-    /// The kind of this name; `polynomials` and `scaling` belong to `published`.
+    /// The kind of this name; `polynomials` and `scaling` belong to `published` and are refused with another kind.
     ///
     /// # Errors
     /// [`Error::Invalid`] where there is no such kind, or where it has no such setting.

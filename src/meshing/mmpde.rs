@@ -15,12 +15,12 @@ use crate::work::Work;
 /// and the same for y. τ > 0 (`relaxation`) has the unit of time: it is how long the mesh takes to follow its density
 /// across the domain.
 ///
-/// # Source
-/// (2.4) of Bihlo, Haynes and Walsh (2015), MMPDE5 divided by ρ before it is relaxed.
-///
 /// The default is that of studies and of Python: the conservative form, with a τ that is chosen from how the mesh
 /// moves. A generator used alone takes [`STEPS_TO_BEGIN_WITH`](super::STEPS_TO_BEGIN_WITH) time steps for it.
 /// [`Mmpde::published`] is the form of the paper.
+///
+/// # Source
+/// (2.4) of Bihlo, Haynes and Walsh (2015), MMPDE5 divided by ρ before it is relaxed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mmpde {
     /// The relaxation time τ.

@@ -138,7 +138,6 @@ impl<const D: usize> Whole<D> {
     }
 }
 
-/// The implementation for D dimensions, with stars of S = 2D + 1 points: Rust cannot compute S from D.
 /// Meshes that can be moved to rest: lines and those in the plane.
 pub trait Movable<const D: usize>: Cells<D> {
     /// [`Whole::to`] for meshes of this dimension.
@@ -157,6 +156,7 @@ impl Movable<2> for Mesh<2> {
     }
 }
 
+/// The implementation for D dimensions, with stars of S = 2D + 1 points: Rust cannot compute S from D.
 macro_rules! generator {
     ($D:literal, $S:literal, $direct:ident) => {
         impl MeshGenerator<$D> for Whole<$D> {

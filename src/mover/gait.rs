@@ -13,10 +13,15 @@ use serde::{Deserialize, Serialize};
 /// e = xⁿ⁺¹ − x* the correction of a step, and c the cosine between it and the one before,
 ///
 /// ```text
-/// c = Σ eⁿ·eⁿ⁻¹ / √(Σ |eⁿ|² Σ |eⁿ⁻¹|²),    c < −0.1:  τ ← 1.3 τ,  v ← √(1 + c) v;    c > 0.5:  τ ← max(0.97 τ, 15 Δt)
+/// c = Σ eⁿ·eⁿ⁻¹ / √(Σ |eⁿ|² Σ |eⁿ⁻¹|²)
+///
+/// c < −0.1:  τ ← min(1.3 τ, 10⁵ Δt),  v ← √(1 + c) v
+/// c > 0.5:   τ ← max(0.97 τ, 15 Δt)
+/// c > 0.9:   τ ← max(0.9 τ, 15 Δt)
 /// ```
 ///
-/// Corrections within what the mesh equation is solved to, a hundredth of the shortest edge, change nothing.
+/// where τ is the mover's to choose ([`Relaxation::Auto`]); a τ that is given stays, and v with it. Corrections below a
+/// hundredth of the shortest edge, the error that the mesh equation is solved to, change nothing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gait<const D: usize = 2> {
     #[serde(with = "nodal")]
@@ -24,61 +29,68 @@ pub struct Gait<const D: usize = 2> {
     #[serde(with = "nodal")]
     correction: Vec<[f64; D]>,
     steps: f64,
-    /// How much of the last steps turned back: a mean that forgets.
+    /// Share of the recent steps in which the mesh turned back: a running mean with the weight [`REMEMBERED`] on the
+    /// past.
     unrest: f64,
-    /// The density that moved the mesh last: a mean over steps.
+    /// The density that moved the mesh last, a mean over steps.
     rho: Vec<f64>,
     /// The last step; none before the first.
     last: Option<Last<D>>,
 }
 
-/// A step of a mesh, for what the next one finds of its density.
+/// The last step of a mesh, from which the next one finds how the solution moves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Last<const D: usize> {
+    /// Length of the last mesh step in time.
     took: f64,
-    /// Where each node went.
+    /// Displacement of each node in the last mesh step.
     #[serde(with = "nodal")]
     way: Vec<[f64; D]>,
-    /// What the mesh follows, at its start: the unknowns of each node after those of the one before.
+    /// What the mesh follows at the start of the last mesh step: all unknowns of a node, node by node.
     u: Vec<f64>,
 }
 
-/// Cosines below this are of a mesh that turns back.
+/// A mesh turns back where the cosine between its last two corrections is below this.
 const TURNS_BACK: f64 = -0.1;
-/// Cosines above this are of a mesh that still has some way to go.
+/// A mesh goes on where the cosine between its last two corrections is above this.
 const GOES_ON: f64 = 0.5;
-/// What τ is multiplied by, with each step that turns back and that goes on.
+/// τ is multiplied by this where a step turns back.
 const SLOWER: f64 = 1.3;
+/// τ is multiplied by this where a step goes on.
 const FASTER: f64 = 0.97;
-/// The same with each step that goes where the last one went.
+/// τ is multiplied by this where a step goes straight on.
 const MUCH_FASTER: f64 = 0.9;
+/// A mesh goes straight on where the cosine between its last two corrections is above this.
 const GOES_STRAIGHT_ON: f64 = 0.9;
-/// The fewest and the most time steps in τ.
+/// Smallest and largest number of time steps in a τ that the mover chooses.
 const STEPS: [f64; 2] = [15.0, 1e5];
-/// Corrections below this share of the shortest edge are of the solver.
+/// Corrections below this share of the shortest edge are the error of the mesh equation's solver, and change nothing.
 const SOLVED_TO: f64 = 1e-2;
-/// A step so many times longer than the last one goes no farther at the velocity that was learnt.
+/// In a step that is longer than this multiple of the last one, nodes go no farther at the learnt velocity than in a
+/// step of this multiple.
 const LONGER: f64 = 1.5;
-/// Corrections below this share of the shortest edge do no harm.
+/// Corrections below this share of the shortest edge are too small to do harm, and do not count as turning back.
 const SEEN: f64 = 0.1;
-/// Share of the earlier steps in the mean over the last ones.
+/// Weight of the past in the running mean of how often the mesh turned back.
 const REMEMBERED: f64 = 0.8;
-/// Share of the newest density in the one that moves the mesh.
+/// Weight of the newest density in the one that moves the mesh; the rest is that of the last step.
 const NEWEST: f64 = 0.7;
-/// The farthest that u and the mesh have come apart in a step, as a share of the box: what differences can tell.
+/// Largest distance by which the shift of the solution and the mean way of the nodes may differ in a step, as a share
+/// of the box: differences tell of no larger shift.
 const FARTHEST: f64 = 0.25;
-/// Share of the squared gradient, and of its determinant, below which it is of rounding.
+/// An axis tells nothing of a shift along it if its part of the squared gradients of the unknowns is below this share
+/// of the whole; both axes together do not if the determinant is below this share.
 const SINGULAR: f64 = 1e-3;
-/// A mesh goes along with all unknowns where at most the first share of their changes is left then, and not at all from
-/// the second on.
+/// The mesh goes along with the solution where the shift leaves at most the first share of the change of each unknown,
+/// and not at all where it leaves the second share or more.
 const LEFT: [f64; 2] = [0.5, 0.8];
-/// Ranges below this share of the values are of rounding.
+/// An unknown whose range is below this share of its largest value is constant but for rounding.
 const ROUNDING: f64 = 1e-9;
-/// Shares of the velocity that are tried: nodes that were made to run into each other stop.
+/// Shares of the learnt velocity that are tried in turn until no cell folds.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
 impl<const D: usize> Gait<D> {
-    /// Of a mesh that has stood still so far.
+    /// The gait of a mesh that has stood still so far.
     pub fn at_rest(mesh: &Mesh<D>) -> Self {
         let still = vec![[0.0; D]; mesh.x().len()];
         let steps = STEPS_TO_BEGIN_WITH;
@@ -114,8 +126,9 @@ impl<const D: usize> Gait<D> {
         rho.iter().zip(&self.rho).map(|(newest, last)| NEWEST * newest + (1.0 - NEWEST) * last).collect()
     }
 
-    /// After a step from where it was `predicted` to `mesh`, moved by `rho`, from where u was followed; `gain` is γ
-    /// over this step, `share` how much of the velocity is kept, and `chooses` is true where τ is the mover's own.
+    /// What is known after a step from the `predicted` mesh to `mesh`, which was moved by the density `rho`; `u` is
+    /// what the mesh followed at the start, `gain` is γ over this step, `share` how much of the velocity is kept, and
+    /// `chooses` is true where τ is chosen by the mover.
     pub(super) fn after(
         &self,
         predicted: &Predicted<D>,
@@ -233,8 +246,8 @@ impl<const D: usize> Gait<D> {
     }
 }
 
-/// Of an unknown at a node: its gradient per uniform cell, g, and what it would have changed by at a place at rest, as
-/// f = d·∇u − δu.
+/// At a node, for an unknown: its gradient per uniform cell, g, and the change d·∇u − δu that it would have had at a
+/// place at rest.
 type Seen<const D: usize> = ([f64; D], f64);
 
 /// How far an unknown goes along with a shift s: 1 where what is left of its change, √(Σ A (g·s − f)²), is small beside
@@ -299,7 +312,7 @@ fn go_along<const D: usize>(mesh: &Mesh<D>, velocity: &mut [[f64; D]], drift: [f
 pub(crate) struct Predicted<const D: usize> {
     pub mesh: Mesh<D>,
     velocity: Vec<[f64; D]>,
-    /// Of the gait.
+    /// τ in time steps, as in the gait.
     steps: f64,
 }
 
@@ -329,7 +342,7 @@ impl<const D: usize> Predicted<D> {
         Ok(Self { mesh: mesh.clone(), velocity: vec![[0.0; D]; gait.velocity.len()], steps: gait.steps })
     }
 
-    /// τ where it is measured in time steps of `scale`.
+    /// τ in units of time, where `scale` is the time step of which it may be a multiple.
     pub(super) fn tau(&self, relaxation: Relaxation, scale: f64) -> f64 {
         match relaxation {
             Relaxation::Auto => self.steps * scale,

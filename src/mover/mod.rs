@@ -55,8 +55,8 @@ pub struct Mover<const D: usize = 2> {
 /// What a mesh follows: nodal values on it, in lattice order.
 #[derive(Debug, Clone, Copy)]
 pub struct Followed<'a> {
-    /// What the density was made of: how it moves as a whole is how a mesh on periodic axes goes along. The density
-    /// itself where there is nothing else.
+    /// What the density was computed from: a mesh on periodic axes follows its common translation. The density itself
+    /// where there is nothing else.
     pub u: &'a [f64],
     /// The density.
     pub rho: &'a [f64],
@@ -65,24 +65,24 @@ pub struct Followed<'a> {
 /// A step of a [`Mover`].
 #[derive(Debug, Clone)]
 pub struct Step<const D: usize = 2> {
-    /// The mesh, and what it cost.
+    /// The new mesh, and what the step cost.
     pub moved: Moved<D>,
-    /// What the next step goes on from.
+    /// The memory of the mover for the next step.
     pub gait: Gait<D>,
-    /// Tries that failed.
+    /// Tries of the step that failed.
     pub retries: Retries,
 }
 
-/// How a step of the mesh goes: its length, and what τ is measured in.
+/// Settings of a step of the mesh.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stride {
     /// Length of the step.
     pub dt: f64,
-    /// The time step that τ is a multiple of, where it is given in steps or chosen by the mover.
+    /// Time step of which τ is a multiple, where τ is given in steps or chosen by the mover.
     pub scale: f64,
-    /// Parts of the step, ρ carried from each to the next.
+    /// Number of parts into which the step is divided; ρ is interpolated onto the mesh of each.
     pub parts: usize,
-    /// How much of the correction was done: a mesh that is held back learns no velocity from what it would do.
+    /// Share of the correction that was applied: a mesh that is held back learns no velocity from the rest.
     pub share: f64,
 }
 
@@ -124,7 +124,7 @@ where
         Ok(Step { moved, gait, retries })
     }
 
-    /// Where the mesh goes by itself.
+    /// The mesh to which nodes go on by their velocity.
     pub(crate) fn predict(
         &self,
         mesh: &Mesh<D>,
@@ -136,8 +136,10 @@ where
         Predicted::after(mesh, gait, u, prediction * stride.dt / stride.scale, stride.dt)
     }
 
-    /// A step of the mesh equation from the predicted mesh, with as much care as it needs. What it fails with is what
-    /// it failed with at first.
+    /// A step of the mesh equation from the predicted mesh, with as much care as it needs.
+    ///
+    /// # Errors
+    /// The failure of the first try, where no other helps.
     pub(crate) fn relax(
         &mut self,
         predicted: &Predicted<D>,
@@ -161,7 +163,8 @@ where
         })
     }
 
-    /// What the next step goes on from; `made` are the density that moved the mesh, and the u that it was made of.
+    /// What the next step goes on from; `made` are the density that moved the mesh, and the u from which it was
+    /// computed.
     pub(crate) fn learn(
         &self,
         gait: &Gait<D>,

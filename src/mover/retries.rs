@@ -6,9 +6,9 @@ use std::borrow::Cow;
 /// Tries of a mesh step that failed and were done again.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Retries {
-    /// In more parts.
+    /// Tries in more parts.
     pub substeps: usize,
-    /// With a smoother density.
+    /// Tries with a smoother density.
     pub smoothed: usize,
 }
 
@@ -18,9 +18,9 @@ pub struct Retries {
 /// `smoothing` further passes of the filter [`smooth`] before it moves the mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Care {
-    /// Most parts that a step is divided in; 1 for none.
+    /// Largest number of parts into which a step is divided; 1 for none.
     pub substeps: usize,
-    /// Most further passes over ρ; 0 for none.
+    /// Largest number of further smoothing passes over ρ; 0 for none.
     pub smoothing: usize,
 }
 
@@ -31,7 +31,7 @@ impl Default for Care {
 }
 
 impl Care {
-    /// What is tried after so many parts and passes, if anything.
+    /// The number of parts and of passes that are tried next, if anything is.
     fn beyond(self, substeps: usize, smoothing: usize) -> Option<(usize, usize)> {
         if smoothing == 0 && substeps < self.substeps {
             return Some(((2 * substeps).min(self.substeps), smoothing));
@@ -39,7 +39,10 @@ impl Care {
         (smoothing < self.smoothing).then(|| (substeps, (2 * smoothing).max(2).min(self.smoothing)))
     }
 
-    /// Tries with more and more parts and passes; what it fails with is what it failed with at first.
+    /// Tries with more and more parts and passes.
+    ///
+    /// # Errors
+    /// The failure of the first try.
     pub(super) fn persist<T>(
         self,
         retries: &mut Retries,

@@ -21,23 +21,27 @@ pub struct Start<const D: usize = 2> {
 pub enum Ending {
     /// The mesh stands still.
     AtRest,
-    /// It is as fine as it gets around a jump, which no mesh resolves.
+    /// The mesh is as fine as it gets around a jump, which no mesh resolves.
     Jump,
-    /// It went on moving.
+    /// The mesh went on moving.
     Restless,
 }
 
+/// Largest number of mesh steps of an adapted start.
 const MOST_STEPS: usize = 500;
-/// A mesh with more cells along an axis starts from one with half as many.
+/// A mesh with more cells than this along an axis starts from one with half as many.
 const COARSE: usize = 100;
-/// What changes by more than this share of its range over an edge shorter than this many uniform cells jumps there: a
-/// layer that the mesh resolves changes by less over each of its edges, however thin it is.
+/// u jumps over an edge shorter than [`THIN`] if it changes there by more than this share of its range: a layer that
+/// the mesh resolves changes by less over each of its edges, however thin it is.
 const JUMP: f64 = 0.2;
+/// Length of an edge, in equal cells, below which a large change of u over it is a jump.
 const THIN: f64 = 1e-3;
-/// The same at the end of all steps: the density does not draw ever more cells into a jump.
+/// At the end of all steps, u jumps over an edge shorter than [`THIN_AT_THE_END`] if it changes there by more than this
+/// share of its range: the density does not draw ever more cells into a jump.
 const JUMP_AT_THE_END: f64 = 0.4;
+/// Length of an edge, in equal cells, below which a large change of u over it is a jump at the end of all steps.
 const THIN_AT_THE_END: f64 = 0.1;
-/// Motion in one step, as a share of the shortest edge, below which a mesh stands still.
+/// A mesh stands still where no node moves by more than this share of the shortest edge in a step.
 const AT_REST: f64 = 4e-3;
 
 /// The mesh that rests on a density, from a given mesh
@@ -60,7 +64,7 @@ where
     from_coarser(mesh, form, &mut |mesh| followed(mesh).map(|(u, rho)| (vec![u], rho)))
 }
 
-/// The same where ρ is made of several u, of which the mesh follows the first.
+/// The mesh that rests on a density that is made of several u, of which the mesh follows the first; see [`adapted`].
 pub(crate) fn adapted_to_all<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
 where
     Mesh<D>: Movable<D>,
@@ -104,7 +108,7 @@ where
     start.ok().filter(|start| start.end == Ending::AtRest).map(|start| start.steps)
 }
 
-/// The same, on this mesh alone.
+/// The mesh that rests on a density, from the given mesh alone; see [`adapted`].
 fn to_rest<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
 where
     Mesh<D>: Movable<D>,

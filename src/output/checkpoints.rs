@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CheckpointsAt {
-    /// After so many steps each.
+    /// Every n steps.
     Steps(usize),
     /// After the first step that ends so many seconds after the last checkpoint.
     Seconds(f64),
@@ -28,7 +28,7 @@ impl Default for CheckpointsAt {
     }
 }
 
-/// A year, above which nobody means it.
+/// Largest number of seconds between checkpoints that may be set: a year.
 const LONGEST: f64 = 3.2e7;
 
 impl CheckpointsAt {
@@ -59,7 +59,7 @@ struct Sealed {
     /// The resolved study without `[output]`, which changes no number.
     study: String,
     step: usize,
-    /// Of a run with steps in time.
+    /// What a later end must know of the schedule; none for a study without time steps.
     #[serde(default)]
     past: Option<Past>,
     /// A value as MessagePack, which depends on the kind of the study.
@@ -296,10 +296,10 @@ fn numbers(study: &str) -> Result<toml::Table, toml::de::Error> {
     Ok(table)
 }
 
-/// What a later end of a run may change.
+/// Keys of `[time]` that may differ where a run goes on to a later end.
 const OF_THE_END: [&str; 3] = ["end", "duration", "report"];
 
-/// A study but for how far it goes.
+/// A study without time.end, time.duration and time.report, the keys that may differ on resuming.
 fn unended(study: &toml::Table) -> toml::Table {
     let mut study = study.clone();
     if let Some(time) = study.get_mut("time").and_then(toml::Value::as_table_mut) {

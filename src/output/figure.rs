@@ -8,9 +8,9 @@ use plotters::prelude::{RGBColor, SeriesLabelPosition};
 pub struct Figure {
     /// What it shows.
     pub title: String,
-    /// Of the axis along the bottom, and of the one along the side.
+    /// Labels of the axis along the bottom and of the one along the side.
     pub labels: [String; 2],
-    /// Of the same axes.
+    /// Scales of the axis along the bottom and of the one along the side.
     pub scales: [Scale; 2],
     /// The curves.
     pub curves: Vec<Curve>,
@@ -18,7 +18,7 @@ pub struct Figure {
     pub room: Vec<[f64; 2]>,
 }
 
-/// Of an axis.
+/// How values lie along an axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Scale {
     /// Powers of ten; values of 0 or less are left out.

@@ -18,7 +18,7 @@ use std::thread::JoinHandle;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FramesAt {
-    /// After so many steps each.
+    /// Every n steps.
     Every(usize),
     /// At the first step not before each of these times, which lie within the run.
     Times(Vec<f64>),

@@ -75,14 +75,14 @@ pub enum Ended {
 /// Seconds that a run took, over all its parts.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct Spent<P> {
-    /// By the clock.
+    /// Seconds by the clock.
     pub wall: f64,
-    /// Of all threads.
+    /// Processor seconds of all threads.
     pub cpu: f64,
-    /// By what was computed.
+    /// Seconds by what was computed.
     #[serde(flatten)]
     pub parts: P,
-    /// Watching and writing: progress, history, frames, pictures.
+    /// Seconds of watching and writing: progress, history, frames, pictures.
     pub output: f64,
 }
 

@@ -14,11 +14,11 @@ pub(super) type BoundTexts = Fluxes<2>;
 pub(super) struct Bounds<const D: usize, const B: usize> {
     names: [String; B],
     given: [[Option<Program<D, 1>>; 2]; B],
-    /// The values of each unknown that its equation keeps as far as its formulas tell.
+    /// Those of −1, 0 and 1 that the equation of each unknown keeps, as far as samples of its formulas tell.
     pub states: [Vec<f64>; B],
 }
 
-/// Values that equations may keep: what is empty, full, or magnetised either way.
+/// Values that the equation of an unknown may keep: empty, full, or magnetised either way.
 const STATES: [f64; 3] = [-1.0, 0.0, 1.0];
 
 impl<const D: usize, const B: usize> Bounds<D, B> {
@@ -98,10 +98,10 @@ pub(super) fn read<const D: usize>(name: &str, texts: &BoundTexts) -> Result<[Op
     Ok(read)
 }
 
-/// The values at which unknown c stays where it has them, whatever the others are: no source there, and a flux that is
-/// the same everywhere. Only if it is pushed away from one of them; else rounding heals by itself, and what one unknown
-/// loses and another gains is better left in balance. Formulas are asked at some places, times and values of the
-/// others.
+/// Those of −1, 0 and 1 that the equation of unknown c keeps: with the unknown at this value its source is 0 and its
+/// fluxes are constant, at [`SAMPLES`] sampled places, times and values of the other unknowns. Empty unless the source
+/// pushes away from one of them: else rounding heals by itself, and what one unknown loses and another gains is better
+/// left in balance.
 fn states<const D: usize>(c: usize, flows: &[&Formula], source: &Formula) -> Vec<f64> {
     let values = |sample: usize, state: f64| sampled(source, sample, (D + c, state));
     let keeps = |state: &f64| {
@@ -119,13 +119,14 @@ fn states<const D: usize>(c: usize, flows: &[&Formula], source: &Formula) -> Vec
     if kept.iter().any(pushes) { kept } else { Vec::new() }
 }
 
-/// Values of the variables of a formula without a pattern, of either sign, of all sizes up to ten; but one is fixed.
+/// Values of the variables of a formula at a sample, without a pattern, of either sign and all sizes up to ten; the one
+/// that is fixed has its value.
 pub(super) fn sampled(formula: &Formula, sample: usize, (fixed, value): (usize, f64)) -> Vec<f64> {
     let number_at = |v: usize| 10.0 * (1.7 + 3.1 * sample as f64 + 2.3 * (v * (sample + 1)) as f64).sin();
     (0..formula.variables().len()).map(|v| if v == fixed { value } else { number_at(v) }).collect()
 }
 
-/// Samples for which formulas are asked.
+/// Number of samples at which formulas are evaluated to find out what they keep.
 pub(super) const SAMPLES: usize = 24;
 
 #[cfg(test)]

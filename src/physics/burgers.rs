@@ -199,8 +199,9 @@ impl pulp::WithSimd for FrontAt<'_> {
 
 impl Law<1> for Burgers {
     type Node = f64;
-    /// The feet of a layer that the mesh resolves stand in wide cells that hold next to nothing. The product of both
-    /// values oscillates little there, and limited fluxes have up to twice the error.
+    /// Fluxes in wide cells are limited where u changes over a face by more than these shares of its range. The feet of
+    /// a layer that the mesh resolves stand in wide cells that hold next to nothing: the product of both values
+    /// oscillates little there, and limited fluxes have up to twice the error.
     const COUNTING: Option<[f64; 2]> = Some([0.02, 0.05]);
 
     fn names(&self) -> [&'static str; 1] {
@@ -223,7 +224,7 @@ impl Law<1> for Burgers {
         Crossing { value: [self.viscosity], by_below: [[0.0]], by_above: [[0.0]] }
     }
 
-    /// The product flux balances A u: what both are wrong by where cells grow is the same for u = x/t.
+    /// No coupled mass: for u = x/t the errors of the product flux and of A u on growing cells cancel.
     fn shares_mass(&self) -> [bool; 1] {
         [false]
     }

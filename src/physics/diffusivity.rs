@@ -14,13 +14,13 @@ use std::fmt;
 /// along axis i; or any of these for each unknown by whose gradient something flows, by name.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Diffusivity {
-    /// D ∇u.
+    /// D ∇u with one D in all directions.
     Scalar(String),
-    /// (D_x u_x, D_y u_y).
+    /// (D_x u_x, D_y u_y) with one D along each axis.
     Axes(Vec<String>),
-    /// Σ_j D_ij u_j.
+    /// Σ_j D_ij u_j with a tensor, row by row.
     Tensor(Vec<Vec<String>>),
-    /// The sum over some unknowns.
+    /// A sum over unknowns by whose gradients something flows, by name.
     Cross(BTreeMap<String, Diffusivity>),
 }
 

@@ -27,10 +27,11 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// What is computed once for each node: its values and those of formulas.
     type Node: Copy + Send + Sync;
     /// Newton's method has converged once, after at least one step, every residual is below this share of the size of
-    /// its unknown. It is far below the error of a time step.
+    /// its unknown: far below the error of a time step.
     const TOLERANCE: f64 = 1e-6;
-    /// Shares of the range of an unknown on a face from which it begins to count, and does, where fluxes are limited in
-    /// wide cells ([`Damping`](damping::Damping)); none where each counts.
+    /// Where fluxes are limited in wide cells ([`Damping`](damping::Damping)): change over a face, as a share of the
+    /// range of the unknown, from which that begins, and from which it is complete. None where it is complete for any
+    /// change.
     const COUNTING: Option<[f64; 2]> = None;
 
     /// Names of the unknowns, for messages.
@@ -49,7 +50,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn has_layers(&self) -> bool {
         false
     }
-    /// The mean resistances' inverse, 1/⟨1/D⟩ along the edges between some pairs of places, of such unknowns.
+    /// 1/⟨1/D⟩, the harmonic mean of D along each edge, given by its two ends; none for unknowns whose D does not
+    /// depend on place alone.
     fn through_layers(&self, _t: f64, _mesh: &Mesh<D>, _edges: &[[[f64; D]; 2]]) -> Vec<[Option<f64>; B]> {
         Vec::new()
     }
@@ -61,8 +63,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn has_loads(&self) -> bool {
         false
     }
-    /// Such sources at some places, with the unknowns u, on which they depend but for a part that is the same at all
-    /// places; 0 for others.
+    /// Source terms that depend on place and time only, at the places `x`. The unknowns `u` are the same at all these
+    /// places, and so is what they add, which does not count; 0 for unknowns without such a source.
     fn loads(&self, _t: f64, _mesh: &Mesh<D>, _x: &[[f64; D]], _u: [f64; B]) -> Result<Vec<[f64; B]>, Failure> {
         Ok(Vec::new())
     }
@@ -84,12 +86,12 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     ) -> ([f64; B], Block<B>) {
         ([0.0; B], [[0.0; B]; B])
     }
-    /// The unknowns for which neighbours have a share in the mass of a node where cells grow ([`Excess`]); for the
-    /// others it is A u alone. Diffusion must damp what overshoots by that.
+    /// Unknowns for which the mass matrix couples neighbours where cells grow ([`Excess`]); for the others it is
+    /// lumped, A u alone. Diffusion must damp the overshoots of that coupling.
     fn shares_mass(&self) -> [bool; B] {
         [true; B]
     }
-    /// How much of these shares counts in a step that starts at time t with nodal values `u`.
+    /// Weight s of that coupling for each unknown in a step that starts at time t with nodal values `u`.
     fn weights(&self, _t: f64, _mesh: &Mesh<D>, _u: &[[f64; B]]) -> [f64; B] {
         self.shares_mass().map(|shares| if shares { 1.0 } else { 0.0 })
     }
@@ -104,8 +106,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     ) -> Result<Vec<[[f64; 2]; B]>, Failure> {
         Ok(Vec::new())
     }
-    /// The unknowns whose diffusivity vanishes at some values of unknowns, so that nothing but an upwind flux keeps fronts
-    /// from oscillating where the mesh sweeps over them.
+    /// The unknowns whose diffusivity vanishes at some values of unknowns, so that nothing but an upwind flux keeps
+    /// fronts from oscillating where the mesh sweeps over them.
     fn vanishing_diffusion(&self) -> [bool; B] {
         [false; B]
     }
@@ -119,7 +121,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn has_steep(&self) -> bool {
         false
     }
-    /// These at faces; `node` is the node of a place in padded vectors, of which there is one point each.
+    /// The fluxes by gradients at faces along an axis, for one point in the middle of the face above each place of
+    /// padded vectors.
     fn steep(&self, _at: (f64, &[Point<B, D>]), _mesh: &Mesh<D>) -> Result<Vec<Steep<B, D>>, Failure> {
         Ok(Vec::new())
     }
@@ -127,7 +130,7 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn has_sloped(&self) -> bool {
         false
     }
-    /// These at nodes, at all places of padded vectors.
+    /// The sources by gradients at nodes, for one point at each place of padded vectors.
     fn sloped(&self, _at: (f64, &[Point<B, D>]), _mesh: &Mesh<D>) -> Result<Vec<Sloped<B, D>>, Failure> {
         Ok(Vec::new())
     }
@@ -151,7 +154,7 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     fn has_own_flux(&self) -> [bool; B] {
         [false; B]
     }
-    /// How it is stepped in time.
+    /// How the law is stepped in time.
     fn stepper(&self) -> Stepper {
         Stepper::Trapezoid
     }
@@ -182,7 +185,8 @@ pub(super) struct Limited<const B: usize> {
     pub unknowns: [bool; B],
     /// Whether anything else changes an unknown: there is one that is not limited, diffusion, or a source.
     pub implicit: bool,
-    /// Whether that has an influence on what is carried in the same step.
+    /// Whether the implicit part has an influence on limited unknowns in the same step: it changes one of them, or an
+    /// unknown on which their fluxes depend.
     pub coupled: bool,
 }
 
@@ -197,10 +201,10 @@ pub(super) struct Point<const B: usize, const D: usize> {
 /// A flux by gradients, and its derivatives by the unknowns and by their gradients.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Steep<const B: usize, const D: usize> {
-    /// Of each equation along each axis.
+    /// The flux of each equation along each axis.
     pub flux: [[f64; D]; B],
     pub by_value: [[[f64; D]; B]; B],
-    /// By the unknown and the axis of its derivative.
+    /// Derivatives of the flux of each equation along each axis by the slope of each unknown along each axis.
     pub by_slope: [[[[f64; D]; D]; B]; B],
 }
 
@@ -271,13 +275,13 @@ impl<const B: usize, const D: usize, Solver: Default> Default for FiniteVolumes<
     }
 }
 
-/// One face in one half of a time step: g/2, its derivatives, and the weights of u_b − u_a in it, of each unknown in
-/// each equation.
+/// One face in one half of a time step: the flux g/2 with its derivatives, and its derivatives by u_b − u_a, of each
+/// equation by each unknown.
 #[derive(Debug, Clone, Copy)]
 struct Face<const B: usize> {
     crossing: Crossing<B>,
     tangent: Block<B>,
-    /// What u_k − u_i of each unknown counts in its own g/2 by diffusion.
+    /// D of [`Damping`](damping::Damping): the factor of u_k − u_i of each unknown in its own g/2 by diffusion.
     diffusion: [f64; B],
 }
 
@@ -316,7 +320,7 @@ struct View<N, const B: usize, const D: usize> {
     faces: Vec<[Face<B>; D]>,
     /// Sources by gradients; empty where there are none.
     sloped: Vec<Sloped<B, D>>,
-    /// Empty where u itself is stored.
+    /// What is stored in place of u; empty where u itself is.
     stored: Vec<Stored<B>>,
 }
 

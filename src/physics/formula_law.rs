@@ -30,10 +30,10 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     names: [String; B],
     kinds: Kinds<B>,
     nodal: Program<P, K>,
-    /// Whether these take unknowns.
+    /// Whether each of the values of `nodal` depends on unknowns.
     of_unknowns: [bool; K],
     initial: Program<D, B>,
-    /// For each unknown and the lower and the upper end of each axis.
+    /// What holds for each unknown at the lower and the upper end of each axis.
     sides: [[[Open; 2]; D]; B],
     /// The exact solution, for the unknowns that have one.
     exact: Vec<(usize, Program<D, 1>)>,
@@ -43,16 +43,19 @@ pub(super) struct FormulaLaw<const D: usize, const B: usize, const P: usize, con
     terms: Terms<D, B>,
     layers: Layers<P, B>,
     loads: Loads<P, B>,
-    /// The sources that take time.
+    /// The sources that depend on time.
     timed: Loads<P, B>,
     cells: fn(&Mesh<D>) -> DualCells<D>,
     volumes: FiniteVolumes<B, D, Solver>,
 }
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Default> FormulaLaw<D, B, P, K, Solver> {
-    /// Indices of the quantities of an equation, in the order of [`Formulas::nodal`], in which fluxes come first.
+    /// Index of the diffusivity among the quantities of an equation, in the order of [`Formulas::nodal`]: after the
+    /// fluxes along all axes.
     const DIFFUSIVITY: usize = D;
+    /// Index of the source among the quantities of an equation.
     const SOURCE: usize = D + 1;
+    /// Number of quantities of an equation.
     const QUANTITIES: usize = D + 2;
 
     /// The equation of some formulas, integrated over dual cells.
@@ -145,7 +148,8 @@ where
     Solver: Default + Sync,
 {
     type Node = [f64; K];
-    /// Smaller than usual, since an error may grow exponentially, as in an unstable state ahead of a front.
+    /// Newton's method has converged once every residual is below this share of the size of its unknown: smaller than
+    /// usual, since an error may grow exponentially, as in an unstable state ahead of a front.
     const TOLERANCE: f64 = 1e-9;
 
     fn names(&self) -> [&'static str; B] {

@@ -115,7 +115,7 @@ pub enum Scheme {
 
 /// Largest number of unknowns of a [`FormulaPde`] in the plane.
 pub const MAX_UNKNOWNS: usize = 4;
-/// The same on a line.
+/// Largest number of unknowns of a [`FormulaPde`] on a line.
 pub const MAX_UNKNOWNS_ON_A_LINE: usize = 8;
 
 impl<const D: usize> FormulaPde<D> {

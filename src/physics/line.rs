@@ -31,7 +31,7 @@ pub type LineFormulaPde = FormulaPde<1>;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Coordinates {
-    /// x.
+    /// The Cartesian coordinate x.
     #[default]
     Cartesian,
     /// The distance r from an axis: volumes have the weight r.
@@ -188,7 +188,7 @@ impl Law<1, 1> for LineBurgers {
         Crossing { value: [self.viscosity], by_below: [[0.0]], by_above: [[0.0]] }
     }
 
-    /// The product flux balances A u: what both are wrong by where cells grow is the same for u = x/t.
+    /// No coupled mass: for u = x/t the errors of the product flux and of A u on growing cells cancel.
     fn shares_mass(&self) -> [bool; 1] {
         [false]
     }

@@ -47,11 +47,11 @@ pub struct Motion<'a, const D: usize = 2> {
 /// What is prescribed in time for an unknown at a place; 0 where nothing is.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Forcing {
-    /// Its source.
+    /// The source of the unknown.
     pub source: f64,
-    /// What flows in through sides there.
+    /// The inflow through the sides at this place.
     pub inflow: f64,
-    /// Its value on a side.
+    /// The value that is given on a side.
     pub value: f64,
 }
 

@@ -59,12 +59,12 @@ impl Prescribed {
 pub enum PrescribedField<const D: usize = 2> {
     /// A solution and its gradient.
     Solution {
-        /// u.
+        /// The solution u.
         u: Program<D, 1>,
-        /// ∇u.
+        /// The gradient ∇u.
         gradient: Program<D, D>,
     },
-    /// ρ.
+    /// The density ρ.
     Density(Program<D, 1>),
 }
 

@@ -19,7 +19,7 @@ const OUTFLOW: &str = "outflow";
 /// What holds on a side for one unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Condition {
-    /// u is given: a formula of place and time.
+    /// The value of u: a formula of place and time.
     Value(String),
     /// Nothing flows through: F·N − D ∇u·N = 0.
     NoFlux,
@@ -42,9 +42,9 @@ impl Condition {
 /// The conditions of one unknown: one for all sides, or each by the name of its side.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Conditions {
-    /// For all sides.
+    /// One condition for all sides.
     All(Condition),
-    /// By side: `left`, `right`, `bottom`, `top`.
+    /// A condition for each side by its name: `left`, `right`, `bottom`, `top`.
     Each(BTreeMap<String, Condition>),
 }
 

@@ -6,8 +6,8 @@ use crate::formula::{Formula, Program};
 use crate::geometry::Mesh;
 use crate::parallel;
 
-/// The values at a place that formulas take: coordinates, unknowns, their derivatives along all axes, one unknown after
-/// the other, and t in all places that are left.
+/// Number of values that formulas of terms take at a place: coordinates, unknowns, their derivatives along all axes,
+/// one unknown after the other, and t in all places that are left.
 const PLACES: usize = 20;
 
 /// A formula, and which entry of a result it gives.
@@ -40,11 +40,11 @@ enum OfStorage {
     ByValue(usize, usize),
 }
 
-/// The formulas of such terms, of coordinates, unknowns, their derivatives and t; none where an unknown has no such
-/// term.
+/// The formulas of terms that depend on gradients, and of storages: of coordinates, unknowns, their derivatives and t;
+/// none where an unknown has no such term.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TermFormulas<const D: usize> {
-    /// For each unknown, the flux along each axis.
+    /// The flux of each unknown along each axis.
     pub fluxes: Vec<Option<[Formula; D]>>,
     pub sources: Vec<Option<Formula>>,
     pub storage: Vec<Option<Formula>>,
@@ -67,7 +67,7 @@ impl<const D: usize> TermFormulas<D> {
     }
 }
 
-/// The same, compiled with their derivatives.
+/// Terms that depend on gradients, and storages, compiled with their derivatives.
 pub(super) struct Terms<const D: usize, const B: usize> {
     fluxes: Vec<Term<OfFlux>>,
     sources: Vec<Term<OfSource>>,
@@ -161,7 +161,7 @@ impl<const D: usize, const B: usize> Terms<D, B> {
         evaluated(&self.fluxes, Steep::NONE, put, (t, points), mesh, node)
     }
 
-    /// Sources likewise.
+    /// Sources at places with values of the unknowns and their gradients.
     ///
     /// # Errors
     /// As [`fluxes`](Self::fluxes).

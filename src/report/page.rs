@@ -8,7 +8,8 @@ use serde_json::Value;
 
 /// Files of `assets/report` that make up the page.
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
-const STYLE: &str = include_str!("../../assets/report/style.css");
+const STYLE: &str =
+    concat!(include_str!("../../assets/report/style.css"), include_str!("../../assets/report/viewer.css"));
 const SCRIPT: &str = concat!(
     include_str!("../../assets/report/parts.js"),
     include_str!("../../assets/report/paint.js"),

@@ -11,14 +11,14 @@ use serde::{Deserialize, Serialize};
 /// and back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Benefit {
-    /// On this mesh.
+    /// Error of interpolation on this mesh.
     pub mesh: f64,
-    /// On equal cells, as many.
+    /// Error of interpolation on as many equal cells.
     pub uniform: f64,
 }
 
 impl Benefit {
-    /// Of nodal values on a mesh.
+    /// The benefit of a mesh for nodal values on it.
     ///
     /// # Errors
     /// Where the box makes no mesh of equal cells.

@@ -19,17 +19,17 @@ pub(crate) trait Keeper<const D: usize = 2> {
     /// Keeps one, which may be that after the last step.
     ///
     /// # Errors
-    /// What hinders that.
+    /// Whatever keeps the checkpoint from being written.
     fn keep(&mut self, checkpoint: &Checkpoint<D>, last: bool) -> Result<()>;
 }
 
-/// What the loop carries from step to step beside state and record.
+/// Memory of the time loop beside state and record.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Course {
     pub at_start: AtStart,
     pub pace: Pace,
     pub forced: Forced,
-    /// Since the run began, over all its parts.
+    /// Seconds of the steps since the run began, over all its parts.
     pub seconds: f64,
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct Checkpoint<const D: usize = 2> {
     own_change: f64,
     pub record: Record,
     pub course: Course,
-    /// What generator and observers carry.
+    /// Memory of the generator and the observers.
     pub kept: Kept,
 }
 

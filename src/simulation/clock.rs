@@ -5,7 +5,7 @@ use crate::stopwatch::Stopwatch;
 /// The time that a run takes, over all its parts.
 pub(super) struct Clock {
     all: Stopwatch,
-    /// Of the steps alone.
+    /// Time of the steps alone.
     steps: Stopwatch,
 }
 

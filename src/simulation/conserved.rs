@@ -11,11 +11,11 @@ use serde::{Deserialize, Serialize};
 /// unknown that is itself called `mass` or `drift` is there as `unknown mass` or `unknown drift`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Conserved {
-    /// ∫u dA of the first unknown.
+    /// The integral ∫u dA of the first unknown.
     pub mass: f64,
-    /// Its change since the start over its size there (its change itself where it was 0 but for rounding).
+    /// Change of `mass` since the start, over its size there (the change itself where it was 0 but for rounding).
     pub drift: f64,
-    /// The same of each unknown by name, in the order of the unknowns.
+    /// Integral and drift of each unknown by name, in the order of the unknowns.
     #[serde(flatten, with = "by_name")]
     pub unknowns: Vec<(String, Amount)>,
 }
@@ -23,13 +23,14 @@ pub struct Conserved {
 /// How much there is of an unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Amount {
-    /// Its integral.
+    /// The integral of the unknown.
     pub mass: f64,
-    /// The change of that since the start over its size there (the change itself where it was 0 but for rounding).
+    /// Change of `mass` since the start, over its size there (the change itself where it was 0 but for rounding).
     pub drift: f64,
 }
 
-/// An integral at the start that is so small a share of what it could be is of rounding.
+/// An integral at the start is made of rounding where it is below this share of the largest value times the area of the
+/// box.
 const ROUNDING: f64 = 1e-12;
 
 /// Integrals at the start of a run, and the largest value of each unknown there.
@@ -53,7 +54,7 @@ impl AtStart {
         [masses.len(), largest.len()] == [unknowns; 2] && masses.iter().chain(largest).all(|value| value.is_finite())
     }
 
-    /// What became of them.
+    /// The integrals now, and how far they have drifted since the start.
     pub fn conserved<const D: usize>(&self, physics: &dyn Physics<D>, mesh: &Mesh<D>, u: &Field) -> Conserved
     where
         Mesh<D>: Cells<D>,

@@ -22,14 +22,17 @@ pub(super) struct Control {
     refused: bool,
 }
 
+/// Order of the error of a step in its length.
 const ORDER: f64 = 3.0;
+/// Weight of the newest error in the exponent of the next step length.
 const NEWEST: f64 = 0.7;
+/// Weight of the error before in the exponent of the next step length.
 const BEFORE: f64 = 0.4;
-/// What steps aim at, as a share of the tolerance, so that few are refused.
+/// Error of a step at which steps aim, as a share of the tolerance, so that few are refused.
 const AIM: f64 = 0.8;
-/// A step is at most so much shorter and longer than the one before.
+/// Factors by which a step is at most shorter and longer than the one before it.
 const GROWTH: [f64; 2] = [0.2, 2.0];
-/// e of steps in which nothing happens.
+/// Smallest e that counts: steps in which nothing happens have an error of 0.
 const LEAST: f64 = 1e-4;
 
 impl Control {

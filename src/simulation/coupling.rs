@@ -25,11 +25,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Coupling {
-    /// k ≥ 1.
+    /// Number of sub-steps of the mesh in a time step; with a tolerance, the most.
     pub mesh_steps: usize,
-    /// l ≥ 1.
+    /// How often mesh and solution are computed in a time step; with a tolerance, the most.
     pub iterations: usize,
-    /// ε ≥ 0; 0 for exactly k and l.
+    /// Sub-steps are doubled, and mesh and solution computed again, until the mesh changes by at most this share of the
+    /// longest side of the box; 0 for exactly `mesh_steps` and `iterations`.
     pub tolerance: f64,
 }
 
@@ -61,7 +62,7 @@ impl Coupling {
         self.tolerance > 0.0 && self.mesh_steps > 1
     }
 
-    /// The mesh of a step, in as many sub-steps as it says; `record` adds up tries and seconds.
+    /// Moves the mesh over a step, in as many sub-steps as the coupling says; adds tries and seconds to `record`.
     fn move_mesh<const D: usize>(
         &self,
         mover: &mut Mover<D>,
@@ -98,7 +99,7 @@ impl Coupling {
         Ok(Moved { work, ..moved })
     }
 
-    /// Whether two meshes are the same for its tolerance.
+    /// Whether two meshes are the same within the tolerance of the coupling.
     fn same<const D: usize>(&self, a: &Mesh<D>, b: &Mesh<D>) -> bool {
         let longest = a.extent().into_iter().fold(0.0, f64::max);
         let off = |(a, b): (&[f64; D], &[f64; D])| (0..D).fold(0.0, |m, d| larger(m, a[d] - b[d]));
@@ -106,32 +107,32 @@ impl Coupling {
     }
 }
 
-/// One step, and what it cost.
+/// A finished step and its cost.
 pub(super) struct Advanced<const D: usize> {
     pub state: State<D>,
     pub work: Work,
     pub interface: Option<Interface>,
-    /// Error of the step in each unknown, where it was asked for.
+    /// Estimated error of the step in each unknown, where the estimate was asked for.
     pub errors: Option<Vec<f64>>,
 }
 
-/// What a step goes over, from the time of a state.
+/// The time step to be done from a state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
-    /// Time at its end.
+    /// Time at the end of the step.
     pub t: f64,
-    /// Its length.
+    /// Length of the step.
     pub dt: f64,
-    /// The step that τ is measured in.
+    /// The time step of which τ is a multiple.
     pub scale: f64,
-    /// Whether its error is estimated.
+    /// Whether the error of the step is to be estimated.
     pub estimated: bool,
 }
 
 /// One step: mesh, then physics, as often as the coupling says; `record` adds up tries of the mesh and seconds.
 ///
 /// # Errors
-/// What the mesh failed with at first, when all that safety allows was tried, or what the physics failed with.
+/// The first failure of the mesh, after all that safety allows was tried, or a failure of the physics.
 pub(super) fn attempt<const D: usize>(
     simulation: &mut Simulation<D>,
     state: &State<D>,
@@ -182,7 +183,7 @@ where
     Ok(Advanced { state, work, interface, errors })
 }
 
-/// The mesh as far on its way as is good for the solution, and which share of the way that is.
+/// The mesh moved only as far as [`journey::allowed`] says, and that share of the way.
 fn held_back<const D: usize>(
     state: &State<D>,
     predicted: &Predicted<D>,

@@ -5,14 +5,16 @@ use crate::density::{NOISE_WORTH_A_WARNING, noise};
 use crate::geometry::{Cells, Field, Lattice, Mesh, node_areas};
 use crate::numerics::{ends, larger, sum};
 
-/// Share of the content of an unknown whose loss is told.
+/// A loss of more than this share of the content of an unknown at the start is warned of.
 const LOSS: f64 = 0.2;
-/// Share of the range of an unknown by which its data go beyond the corners of a cell, which is told.
+/// Data within a cell that exceed those at the nodes around it by more than this share of the range of the unknown are
+/// warned of.
 const HIDDEN: f64 = 0.25;
-/// Content below this share of the largest value times the area of the box is of rounding.
+/// A content below this share of the largest value times the area of the box is made of rounding.
 const ROUNDING: f64 = 1e-9;
-/// Cells of the reference for a cell of the mesh, along an axis, and the most of its nodes.
+/// Largest number of cells of the reference, along an axis, for a cell of the mesh.
 const FINER: usize = 8;
+/// Largest number of nodes of the reference.
 const MOST_NODES: usize = 1 << 20;
 
 /// Warnings of a density that is noise at the cell scale, and of each unknown of which the mesh misses something at the
@@ -40,7 +42,8 @@ fn noisy<const D: usize>(simulation: &Simulation<D>, state: &State<D>) -> Option
     })
 }
 
-/// What the mesh misses of each unknown at the start: of its content, or of what is too small to matter for that.
+/// What the mesh misses of each unknown at the start: a share of its content, or, where that is seen, something too
+/// small to matter for it.
 fn missed<const D: usize>(simulation: &Simulation<D>, state: &State<D>) -> Vec<String>
 where
     Mesh<D>: Cells<D>,
@@ -71,8 +74,9 @@ where
         Some(Self { finer: at(finer)?, coarser: at(finer / 2)? })
     }
 
-    /// The content of an unknown is ∫|u − m|, m its median over the domain. Where it on the finer cells and on the
-    /// coarser ones differ as much as it and that of the mesh do, nothing is known.
+    /// Says that the mesh misses a share of an unknown's content ∫|u − m|, with m the median of u over the domain.
+    /// Nothing is said where the content on the coarser cells differs from that on the finer ones by half as much as
+    /// that on the mesh does, or more: no reference is known then.
     fn lost(&self, simulation: &Simulation<D>, state: &State<D>, c: usize, name: &str) -> Option<String> {
         let nodal: Vec<f64> = state.u.component(c).collect();
         let values: Vec<f64> = self.finer.1.component(c).collect();
@@ -96,8 +100,8 @@ where
     }
 }
 
-/// What is small and lies between the nodes: a value within a cell that is far outside of those at the nodes around it.
-/// It is looked for within every cell, and on equal cells, since a blob may be smaller than what divides a wide cell.
+/// Something small between the nodes: a value within a cell that is far outside of those at the nodes around it. It is
+/// looked for within every cell, and on equal cells, since a blob may be smaller than what divides a wide cell.
 fn hidden<const D: usize>(simulation: &Simulation<D>, state: &State<D>, finer: usize) -> Vec<Option<String>>
 where
     Mesh<D>: Cells<D>,

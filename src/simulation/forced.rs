@@ -7,34 +7,39 @@ use crate::numerics::{ends, larger};
 use crate::physics::Forcing;
 use serde::{Deserialize, Serialize};
 
-/// Moments of a run, and of a step at least, at which is looked.
+/// Number of moments of a run at which prescribed formulas are sampled.
 const MOMENTS: f64 = 2048.0;
+/// Smallest number of moments of a step at which prescribed formulas are sampled.
 const A_STEP: f64 = 4.0;
-/// Places at which is looked.
+/// Largest number of nodes at which prescribed formulas are sampled: half of them anywhere, half on sides.
 const PLACES: usize = 128;
-/// Share of what a source or an inflow brings during the run, or of the range of its unknown if that is more, that a
-/// step may miss.
+/// A step may miss this share of what a source or an inflow brings in the run, or of the range of its unknown if that
+/// is larger.
 const MISSED: f64 = 1e-3;
-/// Share of the change of a value on a side during the run, or of the range of its unknown if that is more, by which it
-/// may bend between stages of a step; and how long it may do so, as a share of the run times that change.
+/// A side value may differ from its straight lines between the stages of a step by this share of its change in the run,
+/// or of the range of its unknown if that is larger.
 const BENDS: f64 = 0.05;
+/// A side value may differ by more than [`BENDS`] allows if the integral of that difference over the step is below this
+/// share of the length of the run times its change.
 const FOR_LONG: f64 = 5e-5;
-/// Where the stages of TR-BDF2 lie within a step, and their weights in what a step takes of a source: γ = 2 − √2.
+/// Places of the stages of TR-BDF2 within a step, as shares of it: γ = 2 − √2.
 const STAGES: [f64; 3] = [0.0, 2.0 - std::f64::consts::SQRT_2, 1.0];
+/// Weights of the stages of TR-BDF2 in what a step takes of a source.
 const WEIGHTS: [f64; 3] =
     [0.25 * std::f64::consts::SQRT_2, 0.25 * std::f64::consts::SQRT_2, 1.0 - 0.5 * std::f64::consts::SQRT_2];
 const SOURCE: usize = 0;
 const INFLOW: usize = 1;
 const VALUE: usize = 2;
 
-/// What formulas that take time bring about during a run: of each unknown the most that its source and its inflow add
-/// up to at a place, and by how much its values on sides change. Empty where no formula takes time.
+/// Totals of what time-dependent formulas bring in a run: for each unknown, the largest values that the integrals of
+/// its source and of its inflow reach at a place, and the largest change of its side values. Empty where no formula
+/// takes time.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Forced {
     most: Vec<[f64; 3]>,
 }
 
-/// Something prescribed that a step does not see.
+/// Something prescribed that happens between the stages of a step.
 pub(crate) struct Hidden {
     pub what: &'static str,
     pub unknown: usize,
@@ -71,13 +76,13 @@ impl Forced {
         Self { most }
     }
 
-    /// The size that each unknown may come to by that.
+    /// The size that each unknown may reach by what is prescribed.
     pub fn sizes<const D: usize>(&self, mesh: &Mesh<D>) -> impl Iterator<Item = f64> {
         let extent = mesh.extent().into_iter().fold(0.0, f64::max);
         self.most.iter().map(move |most| most[SOURCE].max(most[INFLOW] / extent).max(most[VALUE]))
     }
 
-    /// What is prescribed along the ways of the nodes during a step that its stages do not see, if there is something.
+    /// The first thing prescribed along the ways of the nodes that the stages of a step do not see, if there is one.
     pub fn hidden<const D: usize>(
         &self,
         simulation: &Simulation<D>,
@@ -120,16 +125,18 @@ impl Forced {
 /// What the stages of a step miss of what is prescribed for an unknown at a place.
 #[derive(Debug, Clone, Copy, Default)]
 struct Missed {
-    /// The integrals over the step of source and inflow, less what the stages make of them.
+    /// Integral of the source over the step, less what the stages make of it.
     source: f64,
+    /// Integral of the inflow over the step, less what the stages make of it.
     inflow: f64,
-    /// How far a value on a side is off the straight lines between the stages: at most, and integrated over the step.
+    /// Largest difference of a side value from the straight lines between the stages.
     bend: f64,
+    /// Integral of that difference over the step.
     bent: f64,
 }
 
 impl Missed {
-    /// For all places that are looked at, and each unknown there.
+    /// What a step misses at all places that are looked at, for each unknown there.
     fn in_step<const D: usize>(simulation: &Simulation<D>, before: &State<D>, after: &State<D>, run: f64) -> Vec<Self>
     where
         Mesh<D>: Movable<D>,

@@ -6,17 +6,19 @@ use crate::geometry::{Cells, Mesh, node_areas};
 use crate::meshing::Movable;
 use crate::numerics::{ends, larger, sum};
 
-/// Where w is less than the width of equal cells, cells are asked to be this many times as wide as equal ones: narrower
-/// ones there would take the nodes of the front.
+/// Where w is less than the width of equal cells, cells may be this many times as wide as equal ones: narrower ones
+/// would take nodes from the front.
 const WIDER: f64 = 1.05;
-/// Iterations of Newton's method for the mean, whose equation is piecewise linear and convex.
+/// Number of iterations of Newton's method for the mean of the narrowed density, whose equation is piecewise linear and
+/// convex.
 const MEANS: usize = 10;
 
-/// A front changes by more than this share of the range of an unknown over the width of an equal cell.
+/// An unknown has a front where it changes by more than this share of its range over the width of an equal cell.
 const FRONT: f64 = 0.18;
-/// A state is where an unknown is within this share of its range from an end of it.
+/// A node is ahead of a front, or behind it, where its value is within this share of the range from an end of the
+/// range.
 const AHEAD: f64 = 1e-3;
-/// Cells that are wider than this many √(D/k) let what is in them grow faster than a front crosses them.
+/// Cells wider than this multiple of w = √(D/k) are warned of: values in them grow before the front arrives.
 const OUTRUNS: f64 = 2.0;
 const GROWS: &str = "small values grow in cells that are too wide";
 

@@ -6,33 +6,45 @@ use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
-/// What moving the nodes through a solution may add to its error over a whole run, as a share of its range: at most
-/// this,
+/// Moving the nodes through a solution may add at most this share of its range to its error over a whole run.
 const MOST: f64 = 3e-3;
-/// and at most so much of the error with which equal cells interpolate it.
+/// Moving the nodes may add over a whole run at most this share of the error with which equal cells interpolate the
+/// solution, where that is less than `MOST` allows: a moving mesh is to be better than equal cells.
 const OF_UNIFORM: f64 = 0.25;
-/// Likewise in each step, as a share of what the solution changes by itself.
+/// Moving the nodes in a step may add this share of what the solution changes by itself.
 const OF_CHANGE: f64 = 0.2;
-/// The same where the mesh itself does not resolve the solution, as while a layer forms: where an edge of the mesh
-/// holds more than the first of these shares of the range, and all of it from the second on. Layers that the mesh is
-/// at rest around have a third of the range on an edge where cells are few.
+/// Moving the nodes in a step may add this share of what the solution changes by itself where the mesh does not resolve
+/// it, as while a layer forms.
 const WHERE_UNRESOLVED: f64 = 0.5;
+/// A mesh begins not to resolve an unknown where an edge holds more than the first of these shares of its range, and
+/// does not from the second on. Layers that the mesh is at rest around have a third of the range on an edge where cells
+/// are few.
 const UNRESOLVED: [f64; 2] = [0.5, 0.7];
-/// Linear interpolation of a layer that changes by the share g of its range over a cell is off by this times g².
+/// Linear interpolation of a layer that changes by the share g of its range over a cell has an error of this times g²,
+/// as a share of the range.
 const INTERPOLATION: f64 = 0.2;
 
-/// How far the mesh may go on the way from where it is predicted to where the mesh equation takes it: 1 for all of it
+/// The share of the way of the mesh, from where it is predicted to where the mesh equation takes it, that keeps the
+/// error that it adds to the solution within a budget: 1 for all of the way
 ///
-/// A face that sweeps the area s over the solution brings in s (u_i + u_k)/2, and is off by s e with
+/// A face that sweeps the area s over the solution transports s (u_i + u_k)/2, with an error of s e,
 ///
 /// ```text
 /// e = (δ²u_i + δ²u_k)/16,   δ² the second difference along the lattice
 /// ```
 ///
-/// Where the solution stands still nothing heals what that adds up to, so a mesh that starts far from where it wants to
-/// be takes its time: over a run it adds no more than a share of the error that equal cells have. Where the solution
-/// changes by itself, a mesh that follows may add a share of that change, unless equal cells resolve it. On the way back to
-/// these it may add what it interpolates worse than they do.
+/// Where the solution stands still nothing removes these errors, and they add up. In a step Δt of a run of length T
+/// they may therefore change an unknown by at most this share of its range:
+///
+/// ```text
+/// min(0.003, E₀/4) Δt/T + c n U Δt + max(E − E₀, 0)
+/// ```
+///
+/// E₀ and E are the errors with which equal cells and this mesh interpolate the unknown, so that over a run the error
+/// stays below a quarter of the one of equal cells. U is what the solution changes by itself in a unit of time, of
+/// which a mesh that follows may add the share c, from 0.2 to 0.5; n is the [`need`], which is 0 where equal cells
+/// resolve all unknowns. The last term is for the way back to equal cells, where these have become better than this
+/// mesh.
 pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
 where
     Mesh<D>: Cells<D>,
@@ -86,7 +98,7 @@ where
     share
 }
 
-/// The largest change of an unknown at a fixed place in a step, as a share of its range, over the time that it took.
+/// The largest change of an unknown at a fixed place in a step, as a share of its range, over the length of the step.
 pub(super) fn own_change<const D: usize>(before: &State<D>, mesh: &Mesh<D>, u: &Field, dt: f64) -> f64
 where
     Mesh<D>: Cells<D>,
@@ -129,7 +141,7 @@ where
     changes.fold(0.0, larger)
 }
 
-/// The range of an unknown; 0 where it is of rounding.
+/// The range of an unknown; 0 where it is made of rounding.
 pub(super) fn range(u: &Field, c: usize) -> f64 {
     let extremes = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = u.component(c).fold(extremes, |(low, high), u| (low.min(u), high.max(u)));

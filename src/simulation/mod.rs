@@ -60,7 +60,7 @@ pub struct State<const D: usize = 2> {
     pub u: Field,
     /// The density that follows from both: what moves the mesh next.
     pub rho: Vec<f64>,
-    /// How the mesh was going.
+    /// The mover's memory of the last steps: velocity of the nodes, τ, and how the mesh was going.
     pub gait: Gait<D>,
     /// How fast the solution changes by itself: the largest change at a fixed place in the last step, as a share of its
     /// range, over the time that it took; 0 before the first step.
@@ -101,12 +101,14 @@ pub struct Simulation<const D: usize = 2> {
     pub coupling: Coupling,
     /// How far a step that fails is tried again.
     pub safety: Safety,
-    /// When.
+    /// Start, end, steps and report times of the run.
     pub schedule: Schedule,
 }
 
-/// Standard error of interface values, as a share of the shortest edge, above which a run says so.
-pub const NOISE_WORTH_A_WARNING: f64 = 0.05;
+/// Standard error of the nodes on interfaces between subdomains, as a share of the shortest edge of the mesh, above
+/// which a run warns that they are noisy.
+pub const INTERFACE_NOISE_WORTH_A_WARNING: f64 = 0.05;
+
 impl<const D: usize> Simulation<D>
 where
     Mesh<D>: Movable<D>,
@@ -182,7 +184,7 @@ where
         self.run_on(state, record, observers, None, None)
     }
 
-    /// The same with checkpoints, and from where the one left off that the state is of.
+    /// Runs to the end with checkpoints; with a `course` it goes on from the checkpoint to which the state belongs.
     pub(crate) fn run_on(
         &mut self,
         state: &mut State<D>,

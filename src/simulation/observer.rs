@@ -93,7 +93,7 @@ pub trait Observer {
     /// disk.
     ///
     /// # Errors
-    /// What hinders that.
+    /// Whatever keeps the observer from doing so, such as a full disk.
     fn keep(&mut self, _kept: &mut Kept) -> Result<()> {
         Ok(())
     }

@@ -16,7 +16,7 @@ use crate::physics::Motion;
 use change::{at_rest, change_at_nodes, relative, share};
 use serde::{Deserialize, Serialize};
 
-/// How long steps are, and what is remembered for the next
+/// How long time steps are, and what is remembered for the next.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) enum Pace {
     /// As the schedule says; the last step was done in 2^`halvings` parts.
@@ -63,7 +63,8 @@ impl Pace {
         }
     }
 
-    /// Tells what is to come: sizes of the unknowns beside which, while they are still much smaller, nothing has begun.
+    /// Sets the sizes that prescribed formulas will give to the unknowns: while values are far below them, their
+    /// changes do not shorten steps.
     pub fn foresee(&mut self, sizes: impl Iterator<Item = f64>) {
         if let Self::Free(free) = self {
             free.foreseen.iter_mut().zip(sizes).for_each(|(foreseen, size)| *foreseen = size);
@@ -88,7 +89,7 @@ impl Pace {
     /// Tries the next step; none is returned where it is refused.
     ///
     /// # Errors
-    /// What it failed with when all was tried.
+    /// The failure of the step, after all that may be tried was tried.
     pub(super) fn step<const D: usize>(
         &mut self,
         simulation: &mut Simulation<D>,
@@ -130,50 +131,59 @@ pub(crate) struct Free {
     ranges: Vec<f64>,
     /// The largest size of each unknown so far.
     sizes: Vec<f64>,
-    /// The size that each may come to by what is prescribed in time.
+    /// The size that prescribed formulas will give to each unknown in the run.
     foreseen: Vec<f64>,
-    /// Where errors decide, not changes.
+    /// The controller of the error, where errors decide how long steps are, not changes.
     control: Option<Control>,
-    /// Steps that failed since the last one that did not.
+    /// Number of steps that failed since the last one that did not.
     failures: usize,
-    /// Steps in a row that were very short.
+    /// Number of very short steps in a row.
     short: usize,
 }
 
-/// Change in a step, as a share of the range.
+/// Change of the first unknown at a moving node in a step, as a share of its range, at which steps aim where no
+/// tolerance is given.
 const CHANGE: f64 = 0.03;
-/// A step with so many times that change is refused.
+/// A step is refused whose change is more than this multiple of the one at which steps aim.
 const TOO_MUCH: f64 = 2.0;
-/// A step is at most so much longer and shorter than the one before.
+/// Factors by which a step is at most shorter and longer than the one before it.
 const GROWTH: [f64; 2] = [0.5, 1.2];
-/// A share of the longest step below which the run would take millions of steps, and how many such steps there may be
-/// in a row: what jumps at the start, or from one moment to the next, takes some.
+/// A step shorter than this share of the longest counts as very short: a run of such steps would take millions.
 const SHORT: f64 = 1e-5;
+/// After more than this number of very short steps in a row a run ends with vanishing-step. Jumps at the start, or from
+/// one moment to the next, take some.
 const MOST_SHORT: usize = 1000;
-/// A share of the longest step that is lost in rounding.
+/// A step shorter than this share of the longest is lost in rounding, and ends the run.
 const SHORTEST: f64 = 1e-12;
-/// What a first step that fails is multiplied by.
+/// Factor by which the first step is shortened where it fails: it is a guess, and may be far too long.
 const FIRST_AGAIN: f64 = 0.1;
-/// The same below which no step is where the solution is given.
+/// Where the solution is prescribed, no step is shorter than this share of the longest: nothing is lost where nodes
+/// pass a jump in it.
 const GIVEN: f64 = 0.02;
-/// Steps in a run in which nothing changes.
+/// Number of steps in a run in which nothing changes: the longest step is the whole run over this.
 const FEWEST: f64 = 20.0;
-/// The time in which the mesh follows may halve from one step to the next without a doubt; where the solution seems to
-/// change faster, the change is measured again on a mesh that does not move.
+/// The time of which τ is a multiple may be halved from one step to the next. Where the change at fixed places asks for
+/// more, it is measured again on a mesh that rests. Short steps are due to the moving mesh if the solution would change
+/// on a mesh that rests by less than this share of what it does.
 const DOUBTED: f64 = 0.5;
-/// Share of the change in a step above which what widens the range is growth.
+/// Steps are short because of a blow-up if the range of the first unknown grows by more than this share of its largest
+/// change at a node.
 const GROWS: f64 = 0.5;
-/// Share of the run that is its start.
+/// Steps are short because of the start up to this share of the run.
 const AT_START: f64 = 1e-3;
-/// The first trial, as a share of the longest step, and how many there may be, each a hundredth of the one before; more
-/// where these fail.
+/// Length of the first trial step on the resting mesh, as a share of the longest step; each further trial is a
+/// hundredth of the one before.
 const TRIAL: f64 = 1e-2;
+/// Largest number of trial steps because of their change; there may be more where trials fail.
 const TRIALS: usize = 3;
-/// An unknown whose range is so small beside the largest of all is of rounding.
+/// An unknown whose range is below this share of the largest of all ranges is made of rounding, and its error does not
+/// count.
 const OF_ROUNDING: f64 = 1e-9;
-/// Share of what is to come above which something has begun.
+/// A solution has begun to change once it exceeds this share of the size that prescribed formulas will give to it:
+/// below that, changes are measured by this share.
 const BEGUN: f64 = 1e-4;
-/// An unknown whose range is so small beside its size is the same everywhere.
+/// An unknown whose range is below this share of its size is the same everywhere but for rounding, and its changes are
+/// measured by its size.
 const ALIKE: f64 = 1e-13;
 
 impl Free {
@@ -235,7 +245,7 @@ impl Free {
     /// Learns from a step; none is returned where it is refused.
     ///
     /// # Errors
-    /// What a step failed with once it was halved as often as may be, or [`Failure::VanishingStep`], where the next
+    /// The failure of a step that was halved as often as may be, or [`Failure::VanishingStep`] where the next step
     /// would be too short.
     fn judge<const D: usize>(
         &mut self,
@@ -291,7 +301,7 @@ impl Free {
         Ok(Some(step))
     }
 
-    /// After a step that failed: half of its length, or what it failed with where that is no use.
+    /// After a step that failed, halves its length; fails as that step did where a shorter one is of no use.
     fn try_shorter<const D: usize>(
         &mut self,
         before: &State<D>,
@@ -310,10 +320,10 @@ impl Free {
         Ok(())
     }
 
-    /// The time that τ is measured in after a step of length `dt`
+    /// The time step of which τ is a multiple, after a step of length `dt`
     ///
-    /// A mesh that sweeps its nodes through a front shortens the steps; were τ shortened with them, it would sweep
-    /// faster: it keeps to the time in which the solution changes as much at a fixed place.
+    /// A mesh that sweeps its nodes through a front shortens the steps. Were τ shortened with them, the mesh would
+    /// sweep faster: τ keeps to the time in which the solution changes as much at a fixed place.
     fn scale_after<const D: usize>(
         &self,
         simulation: &mut Simulation<D>,
@@ -336,7 +346,7 @@ impl Free {
         self.dt.max(in_place.min(self.scale))
     }
 
-    /// What makes steps as short as this one.
+    /// The cause of steps that are too short.
     fn cause<const D: usize>(
         &self,
         simulation: &mut Simulation<D>,
@@ -363,8 +373,8 @@ impl Free {
         }
     }
 
-    /// What a change of each unknown is measured by: its range, or its largest size so far where it is the same
-    /// everywhere; and not much less than it will come to.
+    /// What the change of each unknown is measured by: its range, or its largest size so far where it is the same
+    /// everywhere; but at least a small share of the size that prescribed formulas will give to it.
     fn scales(&self) -> Vec<f64> {
         let scale = |c: usize| {
             let (range, size) = (self.ranges[c], self.sizes[c]);

@@ -7,7 +7,7 @@ use crate::stopwatch::Stopwatch;
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
-/// What a run did so far.
+/// The record of a run so far.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Record {
     /// Steps and their cost.
@@ -41,19 +41,19 @@ impl Record {
 /// Seconds by part.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct Seconds {
-    /// By the clock.
+    /// Seconds by the clock.
     pub wall: f64,
-    /// Of all threads.
+    /// Processor seconds of all threads.
     pub cpu: f64,
-    /// Computing the density.
+    /// Seconds of computing the density.
     pub monitor: f64,
-    /// Estimating interface values.
+    /// Seconds of estimating interface values.
     pub interface: f64,
-    /// Solving the mesh equation, `interface` not included.
+    /// Seconds of solving the mesh equation, `interface` not included.
     pub mesh: f64,
-    /// Solving the physics.
+    /// Seconds of solving the physics.
     pub pde: f64,
-    /// Observers: history, frames, progress.
+    /// Seconds of observers: history, frames, progress.
     pub output: f64,
 }
 
@@ -64,7 +64,7 @@ pub struct WorkTotal {
     pub steps: usize,
     /// Time steps tried in vain.
     pub rejected_steps: usize,
-    /// What all of them cost.
+    /// Cost of the accepted steps.
     #[serde(flatten)]
     pub work: Work,
 }
@@ -74,28 +74,28 @@ pub struct WorkTotal {
 pub struct Report {
     /// Time.
     pub t: f64,
-    /// Where an exact solution is known.
+    /// Error of the solution, where an exact one is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorNorms>,
-    /// Of the mesh.
+    /// Quality of the mesh.
     pub quality: Quality,
     /// Integrals of the solution.
     pub conserved: Conserved,
-    /// Where there are subdomains.
+    /// What the last step knows about the interfaces between subdomains, where there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface: Option<Interface>,
-    /// Where the study compares with another generator.
+    /// Difference to the mesh of another generator, where the study compares with one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub comparison: Option<Comparison>,
-    /// What adaptation brought.
+    /// How well this mesh and equal cells interpolate the solution.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub benefit: Option<Benefit>,
 }
 
-/// Error against the exact solution.
+/// Error of the solution against the exact one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ErrorNorms {
-    /// Largest over the nodes.
+    /// Largest error at a node.
     pub linf: f64,
     /// √(Σ e²·area / Σ area), a node's area being a quarter of its cells'.
     pub l2: f64,

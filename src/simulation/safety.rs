@@ -28,22 +28,23 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Safety {
-    /// Most parts that a step of the mesh is divided in; 1 for none.
+    /// Largest number of parts into which a step of the mesh is divided where it fails, from 1, for none, to 64.
     pub substeps: usize,
-    /// Most further passes of the filter of ρ; 0 for none.
+    /// Largest number of further smoothing passes over the density ρ where a step of the mesh fails, from 0, for none,
+    /// to 1000.
     pub smoothing: usize,
-    /// How often a time step is halved at most; 0 for never.
+    /// How often a time step that fails is halved at most, from 0, for never, to 30.
     pub halvings: usize,
 }
 
 /// Steps that were tried again, by what was tried.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Retries {
-    /// With the mesh in more parts.
+    /// Steps tried again with the mesh in more parts.
     pub substeps: usize,
-    /// With a smoother density.
+    /// Steps tried again with a smoother density.
     pub smoothed: usize,
-    /// With a shorter time step.
+    /// Steps tried again with a shorter time step.
     pub shortened: usize,
 }
 
@@ -61,7 +62,7 @@ impl Default for Safety {
 }
 
 impl Safety {
-    /// The first failure ends a run.
+    /// Nothing is tried again: the first failure ends a run.
     pub const OFF: Self = Self { substeps: 1, smoothing: 0, halvings: 0 };
 
     /// Refuses settings out of range.
@@ -90,7 +91,8 @@ impl Safety {
 
 /// One step in 2^`parts` parts, or in as many as it takes; with the halvings that it took.
 ///
-/// What it fails with is what its last part failed with.
+/// # Errors
+/// The failure of the last part that was tried.
 pub(super) fn divided<const D: usize>(
     simulation: &mut Simulation<D>,
     state: &State<D>,

@@ -51,8 +51,10 @@ pub(super) enum Steps {
     },
 }
 
+/// Largest number of steps of a run: at a millisecond each these take twelve days.
 const MAX_STEPS: f64 = 1e9;
-/// Errors of a step that the solvers of the equations do not drown.
+/// Tolerances of the error of a step that may be set, as shares of the range of the solution: below the smallest, what
+/// the solvers of the equations leave would count.
 const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-5..=0.1;
 
 impl Schedule {

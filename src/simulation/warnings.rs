@@ -2,20 +2,20 @@
 
 use super::doubts::named;
 use super::forced::Hidden;
-use super::{NOISE_WORTH_A_WARNING, Record, Simulation, State};
+use super::{INTERFACE_NOISE_WORTH_A_WARNING, Record, Simulation, State};
 use crate::geometry::Mesh;
 use crate::meshing::{Movable, Relaxation};
 use crate::mover;
 use crate::numerics::ends;
 
-/// More time steps in τ than any layer needs: what a mesh moves by then is little more than noise.
+/// τ above this many time steps is warned of: the mesh then hardly moves.
 const HARDLY_FOLLOWS: f64 = 2e3;
 const HASTY: &str = "`mesh.relaxation` is short";
 const RESTLESS: &str = "the mesh hardly follows its density any more";
 const NOISY: &str = "interface values are noisy";
-/// How far beyond its data an unknown may be, as a share of their range, before that is said.
+/// How far an unknown may leave the range of its data, as a share of that range, before a run warns of it.
 const BEYOND: f64 = 0.05;
-/// What is smaller beside the size of an unknown is of rounding and of Newton's method.
+/// Excesses below this share of the size of an unknown are left by rounding and by Newton's method.
 const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
 const WIDE: &str = "changes within cells that are too wide for central fluxes";
@@ -137,7 +137,7 @@ where
     /// Says once in a run that interface values are noisy, or that nobody knows.
     fn warn_of_noise(&self, state: &State<D>, record: &mut Record) {
         let Some(interface) = record.interface.filter(|i| i.walks > 0) else { return };
-        let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * NOISE_WORTH_A_WARNING);
+        let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * INTERFACE_NOISE_WORTH_A_WARNING);
         let warning = match percent {
             None => format!(
                 "{UNKNOWN}: at t = {} it cannot be told from these samples; it takes two or more a point",

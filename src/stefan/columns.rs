@@ -30,7 +30,7 @@ impl Columns {
     /// Columns from x\[0\] to x\[1\]; `walls` gives the bottom and the top.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for `cells` below \[2, 3, 3\] or a power that is not between 1 and 4.
+    /// [`Error::Invalid`] for fewer than 4 cells across or 3 in a phase, or a power that is not between 1 and 4.
     pub fn new(x: [f64; 2], walls: [&dyn Fn(f64) -> f64; 2], cells: [usize; 3], power: f64) -> Result<Self> {
         if cells[0] < 4 || cells[1] < 3 || cells[2] < 3 {
             let rule = "needs at least 4 cells across and 3 in each phase";

@@ -13,15 +13,15 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 #[allow(clippy::large_enum_variant)] // one value a run
 pub enum Study {
-    /// Of kind `moving-mesh`, in two dimensions.
+    /// A study of kind `moving-mesh` in two dimensions.
     MovingMesh(MovingMesh),
-    /// Of kind `moving-mesh`, in one dimension.
+    /// A study of kind `moving-mesh` in one dimension.
     MovingLine(MovingLine),
-    /// Of kind `poisson`.
+    /// A study of kind `poisson`.
     Poisson(PoissonStudy),
-    /// Of kind `stefan`.
+    /// A study of kind `stefan`.
     Stefan(StefanStudy),
-    /// Of kind `equidistribution`.
+    /// A study of kind `equidistribution`.
     Equidistribution(EquidistributionStudy),
 }
 

@@ -6,13 +6,13 @@ use crate::simulation::Schedule;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[study]`.
+/// `[study]`: name and kind of the study.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
-    /// Letters, digits, `-`, `_` and `.`; names the run directory.
+    /// Name of the study and of its run directory: letters, digits, `-`, `_` and `.`.
     pub name: String,
-    /// What is studied.
+    /// What the study is about, which decides what other tables it has.
     pub kind: StudyKind,
 }
 
@@ -36,7 +36,7 @@ impl Header {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyKind {
-    /// A PDE in two dimensions on a moving mesh.
+    /// A PDE in one or two dimensions on a moving mesh.
     MovingMesh,
     /// Poisson's equation on a mesh of any shape.
     Poisson,
@@ -58,7 +58,7 @@ impl StudyKind {
     }
 }
 
-/// `[output]`.
+/// `[output]`: what a run leaves behind in its directory.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {

@@ -12,31 +12,32 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EquidistributionStudy {
-    /// `[study]`.
+    /// Name and kind of the study.
     pub study: Header,
-    /// `[domain]`.
+    /// The ends of the line; 0 and 1 where nothing is said.
     #[serde(default)]
     pub domain: LineDomain,
-    /// `[grid]`.
+    /// The number of cells of the line.
     pub grid: LineGrid,
-    /// `[density]`.
+    /// The density M > 0 of the mesh: every cell gets the same ∫M dx.
     pub density: LineDensityKind,
-    /// `[equidistribution]`.
+    /// How the equidistribution of the density M is discretised.
     #[serde(default)]
     pub equidistribution: Discretization,
-    /// `[schwarz]`; one solve on the whole line where it is left out.
+    /// Schwarz's method: how the line is divided into subdomains and what they exchange; one solve on the whole line
+    /// where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schwarz: Option<SchwarzTable>,
-    /// `[start]`.
+    /// The mesh from which the iteration begins.
     #[serde(default)]
     pub start: Start,
-    /// `[stop]`.
+    /// When the iteration between subdomains ends.
     #[serde(default)]
     pub stop: StopTable,
-    /// `[time]`: the mesh moves.
+    /// Times of a mesh that moves by x_t = (1/τ)(M x_ξ)_ξ; where it is left out the mesh is steady.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<LineTime>,
-    /// `[output]`.
+    /// What a run leaves behind in its directory.
     #[serde(default)]
     pub output: Output,
 }
@@ -45,10 +46,10 @@ pub struct EquidistributionStudy {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LineDomain {
-    /// Where it begins.
+    /// The left end of the line.
     #[serde(deserialize_with = "fixed")]
     pub lower: [f64; 1],
-    /// Where it ends.
+    /// The right end of the line.
     #[serde(deserialize_with = "fixed")]
     pub upper: [f64; 1],
 }
@@ -59,11 +60,11 @@ impl Default for LineDomain {
     }
 }
 
-/// `[grid]`.
+/// `[grid]`: the number of cells of the line.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineGrid {
-    /// Cells of the line.
+    /// Number of cells of the line, of equal width in ξ.
     #[serde(deserialize_with = "fixed")]
     pub cells: [usize; 1],
 }
@@ -80,7 +81,7 @@ kinds! {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineFormula {
-    /// M.
+    /// The density M > 0, a formula of x and t; cells get equal ∫M dx.
     pub value: String,
 }
 
@@ -88,7 +89,7 @@ pub struct LineFormula {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineArclength {
-    /// u.
+    /// The function u, a formula of x and t, whose arc length √(1 + u_x²) is the density.
     pub of: String,
 }
 
@@ -112,11 +113,12 @@ impl LineDensityKind {
     }
 }
 
-/// `[equidistribution]`.
+/// `[equidistribution]`: how the equidistribution of the density M is discretised.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Discretization {
-    /// Mean of M over a cell.
+    /// How the density M is averaged over a cell: by the trapezoidal rule, by the midpoint rule, or exactly by its
+    /// integral.
     pub face_density: FaceDensity,
     /// Places where M may have spikes that are too thin to be found among a few thousand equal parts of the line.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -140,39 +142,45 @@ impl Discretization {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SchwarzTable {
-    /// What is exchanged.
+    /// What neighbouring subdomains exchange: the positions of their end nodes (classical), the flux of the rest of the
+    /// line (optimal), or Robin conditions (optimized).
     pub method: MethodName,
-    /// In which order; classical.
+    /// Order in which subdomains are solved: all at once (parallel), or from left to right (alternating). Only with the
+    /// method classical.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<Sweep>,
-    /// M of the last iterate; classical.
+    /// Takes the density M from the previous iterate, so that a subdomain costs one linear solve. Only with the method
+    /// classical; false where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linearized: Option<bool>,
-    /// Between sweeps; classical.
+    /// A correction of all subdomains at once after each iteration: "integral" of ∫M, "galerkin" of x, or "none". Only
+    /// with the method classical.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarse: Option<Coarse>,
-    /// p; optimized.
+    /// Parameter p > 0 of the Robin conditions F ± p x, with the flux F = M x_ξ: a number, "auto" or "lagged". Only
+    /// with the method optimized.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robin: Option<Robin>,
-    /// Of S₁ and S₂; optimal.
+    /// How ∫M over the rest of the line is computed, exactly or by trapezoids. Only with the method optimal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integral: Option<Integral>,
-    /// Two subdomains, \[0, β\] and \[α, 1\], as \[α, β\].
+    /// Divides the line into two subdomains, `[0, β]` and `[α, 1]` in ξ, given as `[α, β]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overlap: Option<Interval>,
-    /// Any that overlap.
+    /// Divides the line into any number of overlapping subdomains, given as intervals of ξ from left to right.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intervals: Option<Vec<Interval>>,
-    /// Two that meet.
+    /// Divides the line into two subdomains that meet at this ξ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cut: Option<f64>,
-    /// Any that meet.
+    /// Divides the line into subdomains that meet at these values of ξ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cuts: Option<Vec<f64>>,
-    /// So many of equal width.
+    /// Divides the line into this number of subdomains of equal width in ξ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subdomains: Option<usize>,
-    /// What these overlap by.
+    /// Number of cells that neighbouring subdomains of equal width share; 0, so that they meet, where nothing is said.
+    /// Only with `subdomains`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overlap_cells: Option<usize>,
 }
@@ -185,12 +193,12 @@ pub struct Interval(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum MethodName {
-    /// Values.
+    /// Positions of the end nodes of subdomains that overlap.
     #[default]
     Classical,
-    /// The flux of the rest of the domain.
+    /// The flux of the rest of the line, at cuts where subdomains meet.
     Optimal,
-    /// F ± p x.
+    /// F ± p x at cuts where subdomains meet, with the flux F = M x_ξ.
     Optimized,
 }
 
@@ -203,27 +211,28 @@ impl MethodName {
     ];
 }
 
-/// How S₁ and S₂ are integrated.
+/// How ∫M over the rest of the line on either side of a cut is computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Integral {
     /// To round-off.
     #[default]
     Exact,
-    /// By so many panels.
+    /// By the trapezoidal rule with this number of panels.
     Trapezoid(usize),
 }
 
-/// `[start]`.
+/// `[start]`: the mesh from which the iteration begins.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Start {
-    /// The first mesh; equidistributed where the mesh moves, else uniform.
+    /// The mesh from which the iteration begins: "uniform", "equidistributed" or a formula. Where nothing is said it is
+    /// equidistributed if the mesh moves in time, else uniform.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<FirstMesh>,
 }
 
-/// The first mesh.
+/// The mesh from which the iteration begins.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FirstMesh {
@@ -231,21 +240,23 @@ pub enum FirstMesh {
     Uniform,
     /// The discrete solution on the whole line, at the first time.
     Equidistributed,
-    /// A formula of xi from 0 to 1, between the ends of the line.
+    /// A formula of xi that rises from 0 at xi = 0 to 1 at xi = 1: the place of a node as a share of the line.
     Formula(String),
 }
 
-/// `[stop]`.
+/// `[stop]`: when the iteration between subdomains ends.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StopTable {
-    /// So many; at most so many where there is a tolerance.
+    /// Number of iterations; the most, where a tolerance is given. 500 where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<usize>,
-    /// Of what is measured.
+    /// The iterations end once `measure` is at most this share of the length of the line. 1e-10 where neither this nor
+    /// `iterations` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// What is measured.
+    /// What `tolerance` is compared with: "error", the largest distance of a node from its place in the mesh of the
+    /// whole line, or "increment", the largest change of a node in an iteration.
     pub measure: Measure,
 }
 
@@ -255,10 +266,10 @@ pub struct StopTable {
 pub struct LineTime {
     /// Time of the first mesh.
     pub start: f64,
-    /// Time of the last.
+    /// Time of the last mesh.
     pub end: f64,
-    /// Longest step; steps are equal.
+    /// Longest time step; the run is divided into equal steps.
     pub step: f64,
-    /// τ.
+    /// Relaxation time τ > 0 in x_t = (1/τ)(M x_ξ)_ξ: how long the mesh takes to follow its density.
     pub relaxation: f64,
 }

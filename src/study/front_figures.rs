@@ -34,25 +34,25 @@ impl Figures for FrontSummary {
 pub struct FrontReport {
     /// Time.
     pub t: f64,
-    /// Of the front.
+    /// Position of the front.
     pub front: FrontFigures,
-    /// Of the temperature, where an exact solution is known.
+    /// Error of the temperature, where an exact solution is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<FrontError>,
     /// |ΔE − ∫F dt| / |ΔE| with fluxes by weighted residual; none before anything changed.
     pub energy_imbalance: Option<f64>,
-    /// The same with fluxes by differences over three rows.
+    /// |ΔE − ∫F dt| / |ΔE| with fluxes by differences over three rows.
     pub energy_imbalance_by_differences: Option<f64>,
     /// The longest stable explicit step, as estimated; none where the front is at rest.
     pub step_limit: Option<f64>,
 }
 
-/// Of the front.
+/// Position of the front.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FrontFigures {
-    /// Mean height over the width.
+    /// Mean height of the front over the width of the box.
     pub mean: f64,
-    /// Lowest and highest point.
+    /// Lowest and highest point of the front.
     pub range: [f64; 2],
     /// Largest error of its height, where an exact solution is known.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -62,12 +62,12 @@ pub struct FrontFigures {
 /// Error of the temperature.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FrontError {
-    /// Largest over the nodes.
+    /// Largest error at a node.
     pub linf: f64,
 }
 
 impl FrontReport {
-    /// Of a state.
+    /// The report of a state.
     pub(super) fn of(front: &Front, given: &dyn Problem, state: &FrontState) -> Self {
         let (h, last) = (&state.front, state.front.len() - 1);
         let inner: f64 = h[1..last].iter().sum();

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct LineFigures {
     /// What it cost.
     pub work: LineWork,
-    /// Of the last mesh.
+    /// Quality of the last mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<LineQuality>,
     /// The start and every iterate; in time those of the last step.
@@ -22,9 +22,9 @@ pub struct LineFigures {
     pub rate: Rate,
     /// Whether the tolerance was met, in time in every step; null where none is asked for.
     pub converged: Option<bool>,
-    /// The first iterate that meets it.
+    /// Number of the first iterate that meets the tolerance.
     pub iterations_to_tolerance: Option<usize>,
-    /// In time.
+    /// Numbers of iterations in a time step, where the mesh moves in time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations_per_step: Option<PerStep>,
     /// The last mesh, glued from the subdomains.
@@ -53,7 +53,7 @@ pub struct LineWork {
     pub linear_solves: usize,
 }
 
-/// Of a mesh.
+/// Quality of a mesh.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct LineQuality {
     /// max/mean of ∫M over the cells, by trapezoids.
@@ -76,22 +76,22 @@ pub struct NumberedIterate {
     pub increment: Option<f64>,
     /// Largest error of linear interpolation on the glued mesh.
     pub interpolation_error: Option<f64>,
-    /// 2 max |u_i − u_{i−1}| of it.
+    /// 2 max |u_i − u_{i−1}| on the glued mesh.
     pub largest_jump: Option<f64>,
-    /// So far.
+    /// Linear solves up to this iterate.
     pub linear_solves: usize,
 }
 
 /// Contraction of the error.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Rate {
-    /// As the iterates show it.
+    /// Contraction that the iterates show.
     pub observed: Option<f64>,
-    /// By theory.
+    /// Contraction that theory predicts.
     pub predicted: Option<f64>,
-    /// By theory at most.
+    /// Largest contraction that theory allows.
     pub bound: Option<f64>,
-    /// Iterations that it is of.
+    /// Number of iterations over which the error contracts by these factors.
     pub stride: usize,
 }
 
@@ -104,11 +104,11 @@ impl Default for Rate {
 /// Iterations in a time step.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct PerStep {
-    /// Mean over the steps.
+    /// Mean number of iterations over the steps.
     pub mean: f64,
-    /// Fewest.
+    /// Smallest number of iterations in a step.
     pub min: usize,
-    /// Most.
+    /// Largest number of iterations in a step.
     pub max: usize,
 }
 
@@ -123,7 +123,7 @@ pub struct StepRow {
     pub error_linf: Option<f64>,
     /// Contraction in two iterations.
     pub observed_rate: Option<f64>,
-    /// By theory at most.
+    /// Largest contraction in two iterations that theory allows.
     pub bound: Option<f64>,
     /// max/mean of ∫M over the cells.
     pub equidistribution: f64,
@@ -131,7 +131,7 @@ pub struct StepRow {
     pub shortest_cell: f64,
 }
 
-/// Nodes that are compared with the continuous mesh, at most.
+/// Largest number of nodes that are compared with the continuous mesh.
 const COMPARED: usize = 1000;
 /// Cells of a line up to which M is integrated to round-off; in more of them the trapezoidal rule is as good.
 const EXACTLY: usize = 100_000;

@@ -92,7 +92,7 @@ pub(super) fn write_history(
 /// first subdomain that a cell lies in and how many more it lies in.
 pub(super) fn scene(line: &Line, shown: (usize, f64), t: f64, mesh: &[f64], ranges: &[[usize; 2]]) -> Scene {
     let [a, b] = line.ends;
-    // an iterate that is none may leave the line, where nothing need be known
+    // a folded mesh (nodes out of order) may leave the line, where nothing need be known
     let places: Vec<f64> = mesh.iter().map(|x| x.clamp(a, b)).collect();
     let known = |v: &f64| v.is_finite();
     let u = line.density.followed(t, &places).filter(|u| u.iter().all(known));
@@ -136,7 +136,7 @@ pub(super) fn thinned(count: usize, most: usize) -> impl Iterator<Item = usize> 
     (0..count).filter(move |i| i % every == 0 || i + 1 == count)
 }
 
-/// What a title says of a mesh that is none.
+/// What a title says of a folded mesh, whose nodes are out of order.
 fn folded(mesh: &[f64]) -> &'static str {
     if mesh.is_sorted_by(|a, b| a < b) { "" } else { ", folded: nodes have changed their order" }
 }
@@ -186,7 +186,7 @@ fn paths(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> F
 /// M over x, and where the nodes stand on it; nothing where M has no value.
 fn density(study: &EquidistributionStudy, line: &Line, evolution: &Evolution) -> Figure {
     let (mesh, t) = (evolution.mesh(), *evolution.times.last().unwrap_or(&0.0));
-    // an iterate that is none may leave the line, where M need not be known
+    // a folded mesh (nodes out of order) may leave the line, where M need not be known
     let place = |x: f64| {
         let [m, _] = line.density.at(t, x).ok()?;
         (line.ends[0]..=line.ends[1]).contains(&x).then_some([x, m])

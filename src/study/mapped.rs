@@ -11,24 +11,24 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MappedDomain {
-    /// From the left to the right side, with `bottom` and `top`.
+    /// x at the left and at the right side of a domain between the curves `bottom` and `top`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x: Option<Ends>,
-    /// The curve below, a formula of x.
+    /// Lower curve of the domain, a formula of x.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bottom: Option<String>,
-    /// The curve above, a formula of x.
+    /// Upper curve of the domain, a formula of x.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top: Option<String>,
-    /// In their place a mapping.
+    /// A mapping of the unit square (s, r), in place of `x`, `bottom` and `top`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<Mapping>,
-    /// What is done to the mesh before it is graded and mapped.
+    /// How nodes of the unit square are displaced before it is graded and mapped: at random, or by a shear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distort: Option<Distort>,
 }
 
-/// Two numbers, the lower one first.
+/// The lower and the upper of two numbers.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 pub struct Ends(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 
@@ -36,9 +36,9 @@ pub struct Ends(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table such as { x = \"s\", y = \"r*(1 + s)\" }")]
 pub struct Mapping {
-    /// x(s, r).
+    /// x of the image of a point, a formula of its coordinates s and r in the unit square.
     pub x: String,
-    /// y(s, r).
+    /// y of the image of a point, a formula of its coordinates s and r in the unit square.
     pub y: String,
 }
 
@@ -46,13 +46,13 @@ pub struct Mapping {
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, expecting = "a table such as { perturb = 0.2, seed = 1 }")]
 pub struct Distort {
-    /// Each node inside moves by up to this share of a cell along each axis, at random.
+    /// Each node inside is displaced at random along each axis, by up to this share of a cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturb: Option<f64>,
-    /// Of the random numbers; 0 where nothing is said.
+    /// Seed of the random numbers of `perturb`; 0 where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// c of s ← s + c sin(2πr) sin(πs).
+    /// Amplitude c of the distortion s ← s + c sin(2πr) sin(πs) of the unit square.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shear: Option<f64>,
 }
@@ -61,13 +61,13 @@ pub struct Distort {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// s = 0.
+    /// The side s = 0.
     Left,
-    /// s = 1.
+    /// The side s = 1.
     Right,
-    /// r = 0.
+    /// The side r = 0.
     Bottom,
-    /// r = 1.
+    /// The side r = 1.
     Top,
 }
 
@@ -87,12 +87,14 @@ impl Side {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table such as { toward = \"top\", power = 1.5 }")]
 pub struct Grading {
-    /// Where cells are smallest.
+    /// The side toward which cells get smaller.
     pub toward: Side,
-    /// p of 1 − (1 − s)^p, s counted toward the side.
+    /// Power p of 1 − (1 − s)^p, where s is the share of the lattice toward the side: above 0 and at most 10, and above
+    /// 1 for smaller cells there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub power: Option<f64>,
-    /// p of (1 − p^s)/(1 − p): the spacing at the side over that at the other end.
+    /// Spacing at the side over that at the opposite one, above 1e-6 and at most 1: the p of (1 − p^s)/(1 − p), where s
+    /// is the share of the lattice toward the side.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ratio: Option<f64>,
 }

@@ -22,31 +22,31 @@ pub struct MovingStudy<const D: usize>
 where
     Mesh<D>: Studied<D>,
 {
-    /// `[study]`.
+    /// Name and kind of the study.
     pub study: Header,
-    /// `[domain]`.
+    /// The box in which the equation is solved, its periodic axes, and the coordinate along a line.
     #[serde(default)]
     pub domain: Domain<D>,
-    /// `[grid]`.
+    /// The number of cells along each axis.
     pub grid: Grid<D>,
-    /// `[time]`.
+    /// Start, end, steps and report times of the run.
     pub time: Time,
-    /// `[pde]`.
+    /// The equation that is solved on the mesh.
     pub pde: Pde<D>,
     /// `[monitor]`. Left out, it is `auto`; `given` where `pde.rho` prescribes the density; `arclength` where the mesh
     /// does not move, since no mesh follows it and it is the cheapest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub monitor: Option<MonitorKind>,
-    /// `[mesh]`.
+    /// How the mesh follows its density.
     #[serde(default)]
     pub mesh: MeshTable<Generator<D>>,
-    /// `[safety]`.
+    /// How far a step that fails is tried again.
     #[serde(default)]
     pub safety: Safety,
-    /// `[compare]`.
+    /// A second run with another mesh generator, with whose meshes those of the run are compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compare: Option<Compare<Generator<D>>>,
-    /// `[output]`.
+    /// What a run leaves behind in its directory.
     #[serde(default)]
     pub output: Output,
 }
@@ -69,7 +69,7 @@ pub struct Compare<G = GeneratorKind> {
     pub generator: G,
 }
 
-/// `[domain]`.
+/// `[domain]`: the box in which the equation is solved.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Domain")]
@@ -80,7 +80,7 @@ pub struct Domain<const D: usize = 2> {
     /// Upper corner of the box.
     #[serde(default = "ones::<D>")]
     pub upper: Axes<f64, D>,
-    /// Axes that wrap around.
+    /// Which axes are periodic, so that their ends are the same place.
     #[serde(default = "bounded::<D>")]
     pub periodic: Axes<bool, D>,
     /// The coordinate along a line: with `cylindrical` and `spherical` it is the distance r from an axis or a point, 0
@@ -107,16 +107,16 @@ fn bounded<const D: usize>() -> Axes<bool, D> {
     Axes([false; D])
 }
 
-/// `[grid]`.
+/// `[grid]`: the number of cells along each axis.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Grid")]
 pub struct Grid<const D: usize = 2> {
-    /// Cells along each axis.
+    /// Number of cells along each axis.
     pub cells: Axes<usize, D>,
 }
 
-/// `[time]`.
+/// `[time]`: start, end, steps and report times of the run.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
@@ -124,8 +124,8 @@ pub struct Time {
     pub start: f64,
     /// Time of the last state.
     pub end: f64,
-    /// Longest step, or as the solution allows; steps are shortened evenly such that reports and end are met exactly.
-    /// Where there is a tolerance, the first step too.
+    /// Longest time step, or "auto" for steps that the solution decides, the default. Steps are shortened evenly so
+    /// that report times and the end are met exactly. With a tolerance this is the first step as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step: Option<Auto<f64>>,
     /// Error that a step may make in time, as a share of the range of the solution: steps are as long as that allows.
@@ -157,20 +157,21 @@ pub enum Stepper {
     Rk4,
 }
 
-/// `[mesh]`.
+/// `[mesh]`: how the mesh follows its density.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable<G: Default = GeneratorKind> {
-    /// τ of the mesh equation.
+    /// How long the mesh takes to follow its density: "auto", a time τ, or `{ steps = n }` for n time steps.
     pub relaxation: Relaxation,
-    /// Form of the mesh equation.
+    /// How the mesh equation is discretised: "conservative", by fluxes, or "gradient", as published.
     pub form: MeshForm,
-    /// The mesh at the start; adapted where nothing is said, but uniform where the mesh does not move.
+    /// The mesh at the start: "adapted" to the initial solution, or "uniform". Where nothing is said it is adapted if
+    /// the mesh moves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start: Option<StartMesh>,
-    /// How the mesh moves.
+    /// How the mesh equation is solved: on the whole domain, by subdomains, or not at all for a mesh that stays.
     pub generator: G,
-    /// How mesh and physics alternate.
+    /// How mesh and solution alternate within a time step.
     pub coupling: Coupling,
 }
 
@@ -186,7 +187,7 @@ impl<G: Default> Default for MeshTable<G> {
     }
 }
 
-/// Form of the mesh equation.
+/// How the mesh equation is discretised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum MeshForm {

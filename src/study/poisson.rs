@@ -17,49 +17,49 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoissonStudy {
-    /// `[study]`.
+    /// Name and kind of the study.
     pub study: Header,
-    /// `[domain]`.
+    /// The shape of the domain, and how its mesh is distorted.
     pub domain: MappedDomain,
-    /// `[grid]`.
+    /// The number of cells, and a side toward which they get smaller.
     pub grid: GradedGrid,
-    /// `[exact]`: gives whatever `[equation]` does not.
+    /// The exact solution, against which errors are reported; it gives whatever `[equation]` does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<ExactSolution>,
-    /// `[equation]`.
+    /// The right-hand side of Δu = f, and what holds on the sides.
     #[serde(default)]
     pub equation: Equation,
-    /// `[sides]`.
+    /// The sides on which the normal derivative is given.
     #[serde(default)]
     pub sides: Sides,
-    /// `[laplacian]`.
+    /// The discrete Laplacian, whose weights follow from the positions of the neighbours of a node.
     #[serde(default)]
     pub laplacian: LaplacianTable,
-    /// `[solver]`.
+    /// How the linear system is solved.
     #[serde(default)]
     pub solver: SolverTable,
-    /// `[output]`.
+    /// What a run leaves behind in its directory.
     #[serde(default)]
     pub output: Output,
 }
 
-/// `[grid]`.
+/// `[grid]`: the number of cells, and a side toward which they get smaller.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GradedGrid {
-    /// Cells along s and r.
+    /// Number of cells along s and along r, the coordinates of the unit square.
     #[serde(deserialize_with = "pair")]
     pub cells: [usize; 2],
-    /// Smaller cells toward a side.
+    /// Makes cells smaller toward a side; equal cells of the unit square where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grading: Option<Grading>,
 }
 
-/// `[exact]`.
+/// `[exact]`: the exact solution.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExactSolution {
-    /// The solution, a formula of x and y.
+    /// The exact solution, a formula of x and y; it gives the values on the sides, the right-hand side and the error.
     pub u: String,
 }
 
@@ -67,34 +67,37 @@ pub struct ExactSolution {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Equation {
-    /// f of Δu = f.
+    /// Right-hand side f of Δu = f, a formula of x and y; the Laplacian of `exact.u` where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
-    /// u on the sides.
+    /// u on the sides, a formula of x and y; `exact.u` where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub boundary: Option<String>,
-    /// n·∇u on Neumann sides, n outward.
+    /// The outward normal derivative n·∇u on the sides of `sides.neumann`, a formula of x and y; that of `exact.u`
+    /// where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flux: Option<String>,
 }
 
-/// `[sides]`.
+/// `[sides]`: the sides on which the normal derivative is given.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sides {
-    /// Sides where the normal derivative is given instead of the value.
+    /// Sides on which the normal derivative of u is given instead of its value: any of left, right, bottom and top, but
+    /// not all.
     pub neumann: Vec<Side>,
 }
 
-/// `[solver]`.
+/// `[solver]`: how the linear system is solved.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverTable {
-    /// How the system is solved.
+    /// How the linear system is solved: by sparse LU ("lu"), or by BiCGSTAB with incomplete factors ("krylov", for
+    /// nine-point stencils and values on all sides).
     pub kind: SolverKind,
 }
 
-/// How the system is solved.
+/// How the linear system is solved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SolverKind {
@@ -105,16 +108,19 @@ pub enum SolverKind {
     Krylov,
 }
 
-/// `[laplacian]`.
+/// `[laplacian]`: the discrete Laplacian.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LaplacianTable {
-    /// One of [`Laplacian::KINDS`].
+    /// How the weights of a node are found: "optimised", "harmonic", "compact25", "published" or "mapped".
     pub kind: String,
-    /// Of kind `published`.
+    /// Which polynomials the published kind fits: "printed", as its source has them, or "harmonic", with the misprints
+    /// corrected. Only with the kind published.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polynomials: Option<Polynomials>,
-    /// Of kind `published`.
+    /// Unit of length of the polynomials that the published kind fits: "none", that of the coordinates, "global", the
+    /// spacing of the lattice, or "local", the distance to the farthest neighbour along an axis. Only with the kind
+    /// published.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scaling: Option<Scaling>,
 }

@@ -21,10 +21,10 @@ use std::time::Instant;
 pub struct PoissonFigures {
     /// What it cost.
     pub work: Work,
-    /// Where the exact solution is known.
+    /// Error of the solution, where an exact one is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<PoissonError>,
-    /// Of the discrete Laplacian.
+    /// Properties of the discrete Laplacian.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stencil: Option<StencilReport>,
 }
@@ -54,7 +54,7 @@ impl Figures for PoissonFigures {
 /// Error against the exact solution, a node's area being a quarter of its cells'.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PoissonError {
-    /// Largest over the nodes.
+    /// Largest error at a node.
     pub linf: f64,
     /// √(Σ e²·area / Σ area).
     pub l2: f64,
@@ -62,7 +62,7 @@ pub struct PoissonError {
     pub l2_integral: f64,
 }
 
-/// What is known of the stencils.
+/// Properties of the stencils of the discrete Laplacian.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct StencilReport {
     /// Stencils a second, on all threads.

@@ -7,15 +7,15 @@ use crate::geometry::Mesh;
 use crate::meshing::{Form, Mmpde, Movable, Relaxation};
 use crate::simulation::{Record, Simulation, State};
 
-/// How close that step is solved, as a share of the shortest edge.
+/// The mesh step that measures what the density asks for is solved to this share of the shortest edge.
 const CLOSE: f64 = 1e-2;
-/// A mesh of which no node went so many cells in a whole run does not move.
+/// A mesh whose nodes all moved by less than this many cells in a whole run counts as at rest.
 const MOVES: f64 = 0.25;
-/// A density by which a node should go so many cells asks the mesh to move.
+/// The density asks for motion where one mesh step would move a node by more than this many cells.
 const ASKS: f64 = 0.5;
-/// Largest over smallest value of a density that is flat.
+/// A density is flat where its largest value over its smallest is below this after smoothing.
 const FLAT: f64 = 1.1;
-/// The same of a density that is not, before it was smoothed.
+/// A density was not flat where its largest value over its smallest is above this before smoothing.
 const NOT_FLAT: f64 = 1.5;
 
 /// Why a mesh did not move in a run that ended, where it did not although something asked for it

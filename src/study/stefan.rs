@@ -13,57 +13,59 @@ use std::fmt;
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StefanStudy {
-    /// `[study]`.
+    /// Name and kind of the study.
     pub study: Header,
-    /// `[domain]`.
+    /// The box with its two walls, and the front at the start.
     pub domain: FrontDomain,
-    /// `[grid]`.
+    /// The number of cells, and how close their rows lie near the front.
     pub grid: FrontGrid,
-    /// `[phase.lower]` and `[phase.upper]`.
+    /// Diffusivity, initial and wall temperatures of both phases.
     #[serde(default)]
     pub phase: Phases,
-    /// `[front]`.
+    /// How the front between the phases moves.
     #[serde(default)]
     pub front: FrontTable,
-    /// `[walls]`.
+    /// What holds on the left and the right side of the box.
     #[serde(default)]
     pub walls: Walls,
-    /// `[laplacian]`: the discrete Laplacian, of nine points.
+    /// The discrete Laplacian of the heat equation: any kind of nine points.
     #[serde(default)]
     pub laplacian: LaplacianTable,
-    /// `[exact]`: in place of the formulas of initial state, walls and front.
+    /// An exact solution, which takes the place of the formulas of initial state, walls and front, and against which
+    /// errors are reported.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<ExactFront>,
-    /// `[time]`.
+    /// Start, end, steps and report times of the run.
     pub time: FrontTime,
-    /// `[output]`.
+    /// What a run leaves behind in its directory.
     #[serde(default)]
     pub output: Output,
 }
 
-/// `[domain]`.
+/// `[domain]`: the box with its two walls, and the front at the start.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrontDomain {
-    /// From the left to the right side.
+    /// x of the left and of the right side of the box.
     pub x: Ends,
     /// The wall below, a formula of x.
     pub bottom: String,
     /// The wall above, a formula of x.
     pub top: String,
-    /// The front at the start, a formula of x; from `[exact]` where there is one.
+    /// The height of the front at the start, a formula of x; left out where `[exact]` gives it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub front: Option<String>,
 }
 
-/// `[grid]`.
+/// `[grid]`: the number of cells, and how close their rows lie near the front.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrontGrid {
-    /// Cells across, in the lower and in the upper phase.
+    /// Number of cells across the box, in the lower phase and in the upper phase: at least 4, 3 and 3.
     #[serde(deserialize_with = "fixed")]
     pub cells: [usize; 3],
-    /// Power by which rows are closer near the front.
+    /// How much closer rows lie near the front: the power p, from 1 to 4, of 1 − (1 − s)^p, where s is the share of the
+    /// rows between the wall and the front. 1 for equal rows.
     #[serde(default = "grading")]
     pub grading: f64,
 }
@@ -72,21 +74,21 @@ fn grading() -> f64 {
     1.5
 }
 
-/// `[phase]`.
+/// `[phase]`: the two phases, below and above the front.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Phases {
-    /// Below the front, warm.
+    /// The phase below the front, with temperatures at or above the melting temperature 0.
     pub lower: PhaseTable,
-    /// Above it, cold.
+    /// The phase above the front, with temperatures at or below the melting temperature 0.
     pub upper: PhaseTable,
 }
 
-/// `[phase.lower]` or `[phase.upper]`.
+/// `[phase.lower]` or `[phase.upper]`: one of the two phases.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhaseTable {
-    /// D.
+    /// Thermal diffusivity D of this phase, above 0.
     pub diffusivity: f64,
     /// Temperature at the start, a formula of x and y.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -102,22 +104,26 @@ impl Default for PhaseTable {
     }
 }
 
-/// `[front]`.
+/// `[front]`: how the front between the phases moves.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FrontTable {
-    /// L, the inverse of the latent heat.
+    /// L in h_t = L (1 + h_x²)(D₀ ∂u₀/∂y − D₁ ∂u₁/∂y), where h is the height of the front, 0 the upper and 1 the lower
+    /// phase: the inverse of the latent heat.
     pub mobility: f64,
-    /// How the front is moved.
+    /// How the front is moved: column by column as a graph over x, or by segments along their normals, as published and
+    /// less accurate.
     pub method: Method,
-    /// How temperatures get to the new mesh.
+    /// How temperatures get from the mesh of a step to the next: by a term with the velocity of the nodes ("ale"), or
+    /// by interpolation along the columns, which is less accurate.
     pub transfer: Transfer,
-    /// Smoothing of the front's heights over neighbouring columns of the grid after every step: three weights, or
-    /// "none".
+    /// Weights `[a, b, a]` over three neighbouring columns of the grid, which smooth the velocity of the front in every
+    /// step; "none" for no smoothing.
     #[serde(serialize_with = "write_filter", deserialize_with = "read_filter")]
     #[schemars(schema_with = "filter_schema")]
     pub filter: Filter,
-    /// From which temperatures the front moves.
+    /// Whether a step of the front uses the temperatures at its start ("explicit", with a longest stable step) or at
+    /// its end ("implicit", without).
     pub stepping: Stepping,
 }
 
@@ -165,73 +171,77 @@ fn read_filter<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Filter, D::
     deserializer.deserialize_any(Visitor)
 }
 
-/// `[walls]`.
+/// `[walls]`: what holds on the left and the right side of the box.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Walls {
-    /// What holds on the sides.
+    /// What holds on the left and right sides: no flux ("neumann"), or the exact solution ("exact", only with
+    /// `[exact]`).
     pub sides: crate::stefan::Sides,
 }
 
-/// `[exact]`: an exact solution.
+/// `[exact]`: an exact solution of the equations on both sides of a moving front.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExactFront {
-    /// Which one.
+    /// Which exact solution: "planar", a flat front that moves away from a warm wall, or "line-source", melting around
+    /// a line that gives off heat.
     pub kind: ExactKind,
-    /// Temperature far away, at most 0.
+    /// Temperature of the upper phase far away from the front, at most 0.
     pub far: f64,
-    /// `planar`: temperature of the wall.
+    /// Temperature of the warm wall, above 0. Only with `planar`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wall: Option<f64>,
-    /// `planar`: distance of the front from the wall at the start.
+    /// Distance of the front from the wall at the start. Only with `planar`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_front: Option<f64>,
-    /// `planar`: angle by which it rises to the right, in degrees; 0 where nothing is said.
+    /// Angle by which the front rises to the right, from -60 to 60 degrees; 0 where nothing is said. Only with
+    /// `planar`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tilt: Option<f64>,
-    /// `planar`: distance of the wall from the origin; 0 where nothing is said.
+    /// Distance of the wall from the origin; 0 where nothing is said. Only with `planar`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
-    /// `line-source`: heat given off.
+    /// Heat given off by the line source, per length and time, above 0. Only with `line-source`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<f64>,
-    /// `line-source`: distance of the front at the start.
+    /// Distance of the front from the line source at the start. Only with `line-source`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_radius: Option<f64>,
-    /// `line-source`: where it is.
+    /// Place of the line source, x and y, outside the box. Only with `line-source`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre: Option<Centre>,
 }
 
-/// A point.
+/// A point, as x and y.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 pub struct Centre(#[serde(deserialize_with = "pair")] pub [f64; 2]);
 
-/// An exact solution.
+/// Which exact solution of a front between two phases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExactKind {
-    /// Neumann's similarity solution.
+    /// Neumann's similarity solution: a flat front that moves away from a warm wall.
     Planar,
-    /// Melting around a line.
+    /// Melting around a line that gives off heat.
     LineSource,
 }
 
-/// `[time]`.
+/// `[time]`: start, end, steps and report times of the run.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrontTime {
-    /// Time of the initial state; 0 where nothing is said, and from `[exact]` where there is one.
+    /// Time of the initial state; 0 where nothing is said. Left out where `[exact]` gives it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<f64>,
-    /// Time of the last state; or `duration`.
+    /// Time of the last state; in its place `duration` may be given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<f64>,
-    /// From start to end.
+    /// Length of the run, from its start to its end; instead of `end`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duration: Option<f64>,
-    /// Longest step; or half of what is stable, and at most a fiftieth of the run.
+    /// Longest time step. "auto" takes half of the stable step, but at most a fiftieth of the run; with an implicit
+    /// front, a hundredth of the run.
     #[serde(default)]
     pub step: Auto<f64>,
     /// Times at which `summary.json` reports; the end where none are given.

@@ -1,6 +1,5 @@
 //! A. Bihlo, R. D. Haynes and E. J. Walsh, *Stochastic domain decomposition for time dependent adaptive mesh
-//! generation*
-//! (2015): its tables, figures and claims.
+//! generation* (2015): its tables, figures and claims.
 
 mod coupling;
 mod errata;

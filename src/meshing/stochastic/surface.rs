@@ -70,7 +70,6 @@ impl Grid {
 ///
 /// It stores one more line of nodes around the lattice, with images on periodic axes and extrapolated positions beyond
 /// bounded sides.
-/// Stored with one more line of nodes around: images on periodic axes, extrapolated ones beyond bounded sides.
 pub(super) struct Surface {
     values: Vec<[f64; 2]>,
     width: usize,

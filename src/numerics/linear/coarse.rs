@@ -9,14 +9,14 @@ use crate::numerics::larger;
 /// carries what diffuses through many cells in a step
 ///
 /// Along both axes every second node is kept, and values are linear between them; on a bounded side the last node is
-/// kept, too. The coarse matrix is the Galerkin product R A P with the interpolation P and means R over the nodes around,
-/// so that the identity keeps its weight of one and nine points remain nine. A cycle restricts the residual, corrects by
-/// the coarse solution, and smooths by [`Ilu`] once, which is robust where cells are flat. Unknowns whose rows are those
-/// of the identity, such as values given on sides, are not corrected.
+/// kept, too. The coarse matrix is the Galerkin product R A P with the interpolation P and means R over the nodes
+/// around, so that the identity keeps its weight of one and nine points remain nine. A cycle restricts the residual,
+/// corrects by the coarse solution, and smooths by [`Ilu`] once, which is robust where cells are flat. Unknowns whose
+/// rows are those of the identity, such as values given on sides, are not corrected.
 ///
-/// Levels end where elimination alone is as good: where no row's own coefficient is above [`LOOSE`], or where there are
-/// [few](FEWEST) nodes along both axes. A matrix that is so from the start has none but its own. Each coarse level is
-/// gone through twice: where convection outweighs diffusion on wide cells, once leaves too much.
+/// Levels end where elimination alone is as good: where no coefficient of a node by itself is above [`LOOSE`], or where
+/// there are [few](FEWEST) nodes along both axes. A matrix that is so from the start has no coarse level. Each coarse
+/// level is gone through twice: where convection outweighs diffusion on wide cells, once leaves too much.
 ///
 /// # Source
 /// Trottenberg, Oosterlee, Schüller, *Multigrid*, Academic Press (2001), 2.4, 2.8.4 and 7.5.
@@ -28,9 +28,10 @@ pub(super) struct Cycle<const B: usize> {
     count: usize,
 }
 
-/// Elimination alone is enough where no row's own coefficient is larger: a step then couples a node to few others.
+/// Elimination alone is enough where no diagonal coefficient of a row is larger than this: a step then couples a node
+/// to few others.
 const LOOSE: f64 = 4.0;
-/// An axis is not halved with fewer nodes.
+/// An axis with fewer nodes than this is not halved.
 const FEWEST: usize = 8;
 
 /// The factors of a level, and what it takes to improve values there.
@@ -57,7 +58,8 @@ struct Level<const B: usize> {
 }
 
 impl<const B: usize> Cycle<B> {
-    /// Builds all levels below a matrix; false where its elimination has no pivot.
+    /// Builds all levels below a matrix; false if the elimination of the matrix itself has no pivot. Coarse levels end
+    /// before one without pivots.
     pub fn build(&mut self, a: &BlockMatrix<2, 9, B>) -> bool {
         if !self.finest.build(a) {
             return false;

@@ -3,8 +3,8 @@ use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalle
 use crate::error::Failure;
 use crate::work::Work;
 
-/// BiCGSTAB preconditioned by a cycle of multigrid with incomplete elimination, for B coupled unknowns a node on the nine
-/// points of two dimensions
+/// BiCGSTAB preconditioned by a cycle of multigrid with incomplete elimination, for B coupled unknowns a node on the
+/// nine points of two dimensions
 ///
 /// For implicit steps of convection and diffusion, whose matrices are neither symmetric nor dominated by their star.
 /// Couplings around periodic axes are left to the iteration on each level. The iterations counted are products with the

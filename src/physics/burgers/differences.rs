@@ -12,7 +12,7 @@ use crate::work::Work;
 
 /// Newton's method has converged once the largest residual is below this; u is of size one.
 const TOLERANCE: f64 = 1e-10;
-/// Newton steps after which a time step is given up.
+/// Number of Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
 
 /// R at one node: the coefficients of its linear part on the nine points, and those of ∂_x + ∂_y for the convection.

@@ -6,28 +6,36 @@ use crate::geometry::{Patch, length};
 use crate::numerics::{ends, larger};
 use crate::parallel;
 
-/// By how much diffusion through faces is raised, each stored with the node below it, for each unknown
+/// Diffusion κ that is added at each face and for each unknown so that a central flux makes no new extremum; stored
+/// with the node below the face
 ///
 /// ```text
 /// κ = w θ max(a/2 − D, 0),   −½ ≤ θ = 1 − 2 (u₋ − u_i)/(u_k − u_i) ≤ 1
 /// ```
 ///
-/// D (u_k − u_i) is what diffusion brings through a face in half a step, and a the largest absolute eigenvalue of
-/// ½ Δt F′·N − ½ s at both nodes and, where a flux is a function of its unknown alone, of the secant between them: a
-/// central flux creates no extremum where a ≤ 2 D, which is to say where the cell Péclet number is at most 2. It is at
-/// most four times the largest ½ Δt F′·N along the axis: what the mesh alone would sweep over the solution is bounded
-/// elsewhere, however short the step is; but for diffusion that [vanishes](Law::vanishing_diffusion) all of it counts. w is that of [`wide`]. u₋ is the limited value at the face on the side of i,
-/// from where the flow comes ([`increments`](super::reconstruction::increments)), which passes where D is 0. Where the
-/// flow comes from both sides, the larger of both θ counts.
+/// for the face between the nodes i and k. D (u_k − u_i) is what diffusion brings through the face in half a step. a is
+/// the largest absolute eigenvalue of ½ Δt F′·N − ½ s at both nodes, with the normal N of the face and the area s that
+/// it sweeps; where a flux is a function of its unknown alone, that of the secant between the nodes counts, too. A
+/// central flux makes no extremum where a ≤ 2 D, that is, where the cell Péclet number a/D is at most 2.
+///
+/// a counts at most four times the largest ½ Δt F′·N of the flow itself along the axis, since what the mesh alone
+/// sweeps over the solution is bounded elsewhere, however short the step is. For diffusion that
+/// [vanishes](Law::vanishing_diffusion) all of a counts.
+///
+/// w, from 0 to 1, is that of [`wide`]. u₋ is the [limited](super::reconstruction::increments) value at the face on the
+/// side from where the flow comes; it is what passes where D is 0. Where the flow comes from both sides the larger θ
+/// counts.
 pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[f64; B]; D]>);
 
-/// The mesh may sweep over the solution so many times as fast as this flows.
+/// a is limited to this multiple of the largest speed of the flow itself along the axis: else a mesh that moves at the
+/// start, however short the step is, would smear what rests.
 const SWEEPS: f64 = 4.0;
-/// The least θ: less would take away more than half of the diffusion that upwind fluxes have.
+/// Smallest θ: less would take away more than half of the diffusion that upwind fluxes have.
 const LEAST: f64 = -0.5;
 
-/// How far a cell is too wide for a central flux, from 0 to 1, by its Péclet number a/D, the share of the range of u
-/// that its face holds, and the shares that [count](Law::COUNTING).
+/// w, from 0 for cells that are fine enough for central fluxes to 1 for those in which they are limited in full: by the
+/// cell Péclet number a/D, by the share of the range of u that the face holds, and by the shares from which that
+/// [counts](Law::COUNTING).
 fn wide(peclet: f64, share: f64, counting: Option<[f64; 2]>) -> f64 {
     let between = |[low, high]: [f64; 2], value: f64| ((value - low) / (high - low)).clamp(0.0, 1.0);
     let steep = if peclet > PECLET { between(STEEP, share) } else { 0.0 };
@@ -35,26 +43,28 @@ fn wide(peclet: f64, share: f64, counting: Option<[f64; 2]>) -> f64 {
     steep.max(counts * between(WIDE, peclet))
 }
 
-/// Cell Péclet number above which a central flux may create extrema.
+/// Cell Péclet number above which a central flux may make extrema.
 const PECLET: f64 = 2.0;
-/// Shares of the range on a face where fluxes begin to be limited and are, if its Péclet number is above that.
+/// Change of u over a face, as a share of its range, from which its flux begins to be limited, and from which it is
+/// limited in full, if the Péclet number is above [`PECLET`].
 const STEEP: [f64; 2] = [0.2, 0.4];
-/// Péclet numbers where fluxes begin to be limited and are, however little the face holds.
+/// Péclet numbers from which a flux begins to be limited, and from which it is limited in full, however little its face
+/// holds.
 const WIDE: [f64; 2] = [3.0, 9.0];
-/// Differences of u below this share of its size are rounding.
+/// Differences of u below this share of its size are made of rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// How fast an unknown is carried through a face, in units of [`Damping`].
+/// Speeds with which an unknown is carried through a face, in units of D of [`Damping`].
 #[derive(Debug, Clone, Copy, Default)]
 struct Speed {
-    /// Seen from a face that stays, by the area of the face.
+    /// Speed through a face at rest, divided by the area of the face.
     flow: f64,
-    /// Seen from the face.
+    /// Speed through the moving face.
     relative: f64,
-    /// What u_k − u_i counts in g/2 by the law's own flux less the mean of the fluxes of both nodes: where it is
-    /// negative, the flux of the law steepens what passes.
+    /// Diffusion that the law's own flux has beside the mean of the fluxes of both nodes: where it is negative, the
+    /// law's own flux steepens what passes.
     own: f64,
-    /// Whether anything comes from below, and from above.
+    /// Whether the flow comes from the node below, and from the node above.
     from: [bool; 2],
 }
 
@@ -173,7 +183,7 @@ impl<const D: usize> Half<'_, D> {
 }
 
 impl Speed {
-    /// κ, from a/2 − D, a, and (u₋ − u_i)/(u_k − u_i) and (u_k − u₊)/(u_k − u_i).
+    /// κ from a/2 − D, a, and (u₋ − u_i)/(u_k − u_i) and (u_k − u₊)/(u_k − u_i).
     fn damping(&self, excess: f64, a: f64, towards: [f64; 2]) -> f64 {
         let theta = |end: usize| if self.from[end] { 1.0 - 2.0 * towards[end] } else { LEAST };
         let steepening = (-self.own).max(0.0) * (2.0 * excess / a).min(1.0);
@@ -186,7 +196,7 @@ impl<const B: usize, const D: usize> Damping<B, D> {
         Self(Vec::new())
     }
 
-    /// Adds what it takes away from fluxes with values at all places.
+    /// Adds the diffusion to the fluxes of values at all places.
     pub fn add_to<N>(&self, view: &mut View<N, B, D>, patch: &Patch<D>, u: &[[f64; B]]) {
         let strides = patch.padded_strides();
         for (k, (faces, damping)) in view.faces.iter_mut().zip(&self.0).enumerate() {

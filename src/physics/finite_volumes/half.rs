@@ -8,10 +8,10 @@ use crate::numerics::linear::BlockMatrix;
 use crate::parallel;
 
 impl<const D: usize> Half<'_, D> {
-    /// What a law makes of values at all places.
+    /// The fluxes, sources and stored quantities of a law for values at all places.
     ///
     /// # Errors
-    /// What the law refuses.
+    /// Values that the law refuses.
     pub(super) fn view<const S: usize, const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
@@ -372,7 +372,7 @@ impl<const D: usize> Half<'_, D> {
         }
     }
 
-    /// From one place to another.
+    /// The vector from one place to another.
     #[inline(always)]
     pub(super) fn way(&self, i: usize, k: usize) -> [f64; D] {
         std::array::from_fn(|c| self.x[k][c] - self.x[i][c])

@@ -8,24 +8,25 @@ use crate::geometry::{Cells, Mesh, determinant, strides};
 /// Gauss points along each axis of a cell, on (0, 1), and their weights.
 const POINTS: [(f64, f64); 3] = [(0.1127016653792583, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.8872983346207417, 5.0 / 18.0)];
 
-/// Where σ is less, cells are equal but for rounding.
+/// Where σ is below this, cells are equal but for rounding.
 const EQUAL: f64 = 1e-9;
 
 impl<const D: usize> Half<'_, D>
 where
     Mesh<D>: Cells<D>,
 {
-    /// ½ Δt of what a source of place f brings to each node beyond M f; empty where a law has none
+    /// ½ Δt times what integrating a source f of place over cells adds to its nodal value times the mass; empty where a
+    /// law has no such source
     ///
     /// ```text
     /// Σ_cells σ ∫ (f − I f) φ_i,   σ = the largest 1 − (h_min/h)² of both axes
     /// ```
     ///
     /// I f is linear between nodes along the axes, φ_i the hat function of node i, and h_min the smallest cell of a
-    /// lattice line, as in [`Excess`]. M f adds up to the trapezoid rule, which is accurate for smooth f on equal
-    /// cells, but not where cells grow: what sources and fluxes should balance would not. With σ = 1 this and M f are ∫
-    /// f φ_i, for which diffusion is exact at the nodes of a line; with σ = 0 nothing is added, since on equal cells
-    /// time derivatives are taken at the nodes, too, and both errors cancel.
+    /// lattice line, as in [`Excess`](super::Excess). M f adds up to the trapezoid rule, which is accurate for smooth f
+    /// on equal cells, but not where cells grow: sources and fluxes that should balance would not. With σ = 1 this and
+    /// M f are ∫ f φ_i, for which diffusion is exact at the nodes of a line; with σ = 0 nothing is added, since on
+    /// equal cells time derivatives are taken at the nodes, too, and both errors cancel.
     ///
     /// # Source
     /// Strang and Fix, *An Analysis of the Finite Element Method* (1973), 1.6.
@@ -92,7 +93,7 @@ impl<const D: usize> Corners<D> {
 /// A Gauss point of a cell.
 struct Gauss<const D: usize> {
     x: [f64; D],
-    /// With the Jacobian of the cell.
+    /// Weight of the point, times the Jacobian of the cell there.
     weight: f64,
     /// The hat functions of the corners there.
     shapes: [f64; 8],

@@ -4,7 +4,7 @@ use super::{Block, Law};
 use crate::geometry::{Cells, DualCells, Mesh, Patch, dot, strides};
 use crate::numerics::linear::LatticeMatrix;
 
-/// What neighbours add to A u where cells grow
+/// The part C of the mass matrix of linear elements that couples neighbours where cells grow, less that of equal cells
 ///
 /// Between nodes u is linear along the axes, and its integral against the hat function of node i is A u plus a share of
 /// the differences to the neighbours. On a line
@@ -14,28 +14,28 @@ use crate::numerics::linear::LatticeMatrix;
 /// ```
 ///
 /// with the lengths h of the cells on both sides of i. Without C a function that is linear around a node is integrated
-/// as if the node was in the middle of its dual cell, which is wrong by the first order of h₊ − h₋. With h_min = 0 this
+/// as if the node was in the middle of its dual cell, with an error of the first order of h₊ − h₋. With h_min = 0 this
 /// would be the mass matrix of linear elements, which overshoots at jumps; but only the differences of w h count, so
 /// that nothing need be added where cells are smallest or equal: in the layers that the mesh resolves. In the plane C
 /// is the product over both axes in each mesh cell. Its columns add up to 0, so that Σ A u stays what is conserved.
 ///
 /// M = A + s C with a weight s, which is 1 but for fronts between two states that a source of u alone keeps stable
-/// ([`BISTABLE`]).
+/// ([`BISTABLE`]) and fronts into states that grow.
 ///
 /// # Source
 /// Strang and Fix, *An Analysis of the Finite Element Method* (1973), for the mass matrix.
 #[derive(Debug, Clone)]
 pub(super) struct Excess<const B: usize, const D: usize, const S: usize> {
-    /// C.
+    /// The matrix C.
     matrix: LatticeMatrix<D, S>,
     offsets: [isize; S],
-    /// s, for each unknown.
+    /// The weight s of C for each unknown.
     weights: [f64; B],
 }
 
 /// The weight s of C for a front u(x − ct) of u_t = (D u')' + f(u) between two stable states
 ///
-/// With cells whose lengths h change slowly, what the scheme is wrong by is, up to parts that do not move a front,
+/// With cells whose lengths h change slowly, the truncation error is, up to parts that do not move a front,
 ///
 /// ```text
 /// τ = −(1/12) h² g″ − (1/6) (h²)′ g′ + (s/6) (h² g′)′,   g = f(u) − u_t = −D u″
@@ -46,7 +46,7 @@ pub(super) struct Excess<const B: usize, const D: usize, const S: usize> {
 pub(in crate::physics) const BISTABLE: f64 = -0.5;
 
 impl<const B: usize, const D: usize, const S: usize> Excess<B, D, S> {
-    /// Of a mesh, with a weight for each unknown.
+    /// The coupling C of a mesh, with a weight for each unknown.
     pub fn of(mesh: &Mesh<D>, weights: [f64; B]) -> Self
     where
         Mesh<D>: Cells<D>,

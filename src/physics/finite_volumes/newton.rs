@@ -8,31 +8,33 @@ use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver};
 use crate::work::Work;
 
-/// Newton steps after which a time step is given up.
+/// Number of Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
-/// How often a correction is halved that leads to where a formula has no value, such as a root below 0.
+/// Largest number of halvings of a correction that leads to where a formula has no value, such as a root below 0.
 const RETREATS: usize = 8;
-/// Newton steps up to which the damping is that of the newest values.
+/// The damping is computed anew up to this number of Newton steps done, and then frozen, so that the iteration
+/// converges. From the values at the start alone the step would be of first order.
 const DAMPED_ANEW: usize = 1;
 /// Newton's method is given up once residuals are larger than this multiple of those at its start.
 const DIVERGED: f64 = 10.0;
-/// Residuals below so many roundings of the largest terms are rounding.
+/// Residuals below this number of roundings of the largest terms are made of rounding.
 const ROUNDINGS: f64 = 16.0;
 
 /// Where Newton's method ended.
 pub(super) struct Solved<const B: usize> {
+    /// Residuals that are left, node by node.
     pub residual: Vec<[f64; B]>,
     pub work: Work,
-    /// Why it did not converge, where it did not.
+    /// Why the method did not converge, where it did not.
     pub stalled: Option<Failure>,
 }
 
 impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
     /// Newton's method for the padded values `u` at the end of a time step, from what is `known` of its beginning
     ///
-    /// Where a value has bounds, the equation holds between them, and at a bound what it would take to leave it:
-    /// min(−R, u − lower) = 0 with the residual R, and likewise above. Its derivative is that of the smaller term, so
-    /// that Newton's method finds in a few steps which values lie on their bounds.
+    /// With bounds it solves min(−R, u − lower) = 0, and likewise above, with the residual R: within its bounds a value
+    /// satisfies the equation, and at a bound the equation holds but for what keeps the value there. The derivative is
+    /// that of the smaller term, so that the method finds in a few steps which values lie on their bounds.
     ///
     /// # Source
     /// Hintermüller, Ito and Kunisch, *The primal-dual active set strategy as a semismooth Newton method* (2002).
@@ -118,7 +120,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
     }
 }
 
-/// Nothing has to be done for values that are given.
+/// Sets the residuals of given values to 0: they need not be solved for.
 fn leave_given<const B: usize>(sides: &[Side<B>], residual: &mut [[f64; B]]) {
     for side in sides {
         for (residual, given) in residual[side.i].iter_mut().zip(side.given) {
@@ -127,7 +129,7 @@ fn leave_given<const B: usize>(sides: &[Side<B>], residual: &mut [[f64; B]]) {
     }
 }
 
-/// The rows of values that lie on their bounds say that these do not change.
+/// Replaces the rows of values that lie on their bounds by those of the identity.
 fn fix<const D: usize, const S: usize, const B: usize>(bound: Vec<(usize, usize)>, matrix: &mut BlockMatrix<D, S, B>) {
     for (i, c) in bound {
         matrix.rows[i].iter_mut().for_each(|block| block[c] = [0.0; B]);
@@ -135,7 +137,7 @@ fn fix<const D: usize, const S: usize, const B: usize>(bound: Vec<(usize, usize)
     }
 }
 
-/// That of the unknown which is farthest from what is wanted.
+/// The failure of an iteration, with the residual of the unknown that is farthest from its tolerance.
 fn stalled_at<const B: usize>(largest: [f64; B], wanted: [f64; B], iterations: usize) -> Failure {
     let over = |c: &usize| largest[*c] / wanted[*c];
     let c = (0..B).max_by(|a, b| over(a).total_cmp(&over(b))).unwrap_or(0);
@@ -150,8 +152,7 @@ fn go_back_half<const B: usize>(correction: &mut [[f64; B]], u: &mut [[f64; B]])
     }
 }
 
-/// Replaces the residuals of values that lie on their bounds by the way to these, and returns which these are, as
-/// (node, unknown).
+/// For values at a bound replaces the residual by the distance to the bound; returns their (node, unknown).
 fn hold<const B: usize, const D: usize>(
     bounds: &[[[f64; 2]; B]],
     u: &[[f64; B]],
@@ -171,11 +172,11 @@ fn hold<const B: usize, const D: usize>(
     held
 }
 
-/// How large unknowns and residuals are.
+/// Sizes of unknowns and residuals, which decide when an iteration ends.
 struct Scale<const B: usize> {
-    /// Of each unknown: unknowns may differ much in size, and one that is 0 takes the size of its first change.
+    /// Size of each unknown: unknowns may differ much in size, and one that is 0 takes the size of its first change.
     sizes: [f64; B],
-    /// The largest of these.
+    /// The largest of these sizes.
     size: f64,
     /// The largest residual at the start, in units of `sizes`.
     at_first: f64,
@@ -199,9 +200,9 @@ impl<const B: usize> Scale<B> {
         ROUNDINGS * f64::EPSILON * self.stiffest
     }
 
-    /// Residuals that are small enough after some iterations, as a share of each unknown; none below the smallest normal
-    /// number, beneath which products lose all digits. At least one iteration is done: small changes, if left out,
-    /// would add up over many time steps.
+    /// Residual of each unknown at which the iteration ends; none is below the smallest normal number, beneath which
+    /// products lose all digits. At least one iteration is done: small changes, if left out, would add up over many
+    /// time steps.
     fn wanted(&mut self, iterations: usize, largest: [f64; B], tolerance: f64) -> [f64; B] {
         if iterations == 0 {
             self.size = largest.into_iter().fold(self.size, larger);

@@ -5,8 +5,8 @@ use crate::geometry::{Lattice, Patch, length};
 use crate::numerics::{ends, larger};
 use crate::parallel;
 
-/// How far the values at the faces below and above a node differ from its own, along one axis: by the differences to
-/// the nodes below and above, and the distances to these
+/// Limited increments from a node to its two faces along an axis, from the differences to the nodes below and above and
+/// the distances to these
 ///
 /// ```text
 /// Δ₊ = min(½ h₊ |2 g₊ + g₋| / 3, 2 |d₋|, |d₊|),   g = d/h
@@ -14,7 +14,8 @@ use crate::parallel;
 ///
 /// with the sign of both differences, and Δ₋ likewise; 0 where their signs differ, but for [smooth](smoothness)
 /// extrema, which have Δ₊ without bounds. A smooth profile has two thirds of the slope on its own side and one third of
-/// the other, which is of the third order on equal cells; the bounds keep what stands at a face between the nodes.
+/// the other, which is of the third order on equal cells; the bounds keep the value at a face between those of the
+/// nodes.
 ///
 /// # Source
 /// Koren, *A robust upwind discretization method for advection, diffusion and source terms* (1993).
@@ -184,7 +185,8 @@ pub(super) fn spectral_radius<const B: usize>(matrix: &Block<B>, taken: [bool; B
     bound * norm(&power).powf(share)
 }
 
-/// The bound of [`spectral_radius`] is at most a hundredth too large for a symmetric matrix of eight rows.
+/// Number of squarings in [`spectral_radius`]: its bound is then at most a hundredth too large for a symmetric matrix
+/// of eight rows.
 const SQUARINGS: usize = 6;
 
 #[cfg(test)]

@@ -1,20 +1,21 @@
-//! What is set right after an implicit step: what Newton's method left, and values beyond those at which their diffusion
-//! vanishes.
+//! Corrections after an implicit step: residuals of Newton's method are spread over the nodes, and values beyond the
+//! end of their range are set to it.
 
 use super::Side;
 use crate::geometry::{DualCells, Patch, strides};
 use crate::numerics::sum;
 
-/// How many nodes away there may be what a node lacks.
+/// Largest distance, in nodes along each axis, in which a node that lacks something searches for it before all nodes
+/// are asked.
 const REACH: usize = 8;
 
-/// Moves values that are beyond some ends, a lower and an upper one for each unknown, onto these, and takes what that
-/// adds from the nodes around in proportion to what each has beyond the end: Σ A u stays
+/// Sets values that are beyond an end of their range, a lower and an upper one for each unknown, to that end, and takes
+/// the amount that this adds from the nodes around, in proportion to what each has beyond the end: Σ A u is unchanged
 ///
 /// Where a front leaves a node within a step, second-order steps in time go beyond the empty state by a share of what
-/// was there, as for any function of time with a kink, and nothing diffuses back what is missing. Where the nodes around
-/// have too little, those around these are asked, too, and at last all nodes; what these do not have either is left.
-/// Values that are given on sides stay.
+/// was there, as for any function of time with a kink, and nothing diffuses back what is missing. Where the nodes
+/// around have too little, those farther away are asked, up to [`REACH`] nodes, and at last all nodes; a lack that
+/// these cannot fill either is left. Values that are given on sides stay.
 ///
 /// # Source
 /// Kucharik, Shashkov and Wendroff, *An efficient linearity-and-bound-preserving remapping method* (2003).

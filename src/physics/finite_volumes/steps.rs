@@ -18,7 +18,7 @@ struct Level<'a, const B: usize, const D: usize, const S: usize> {
     cells: DualCells<D>,
     /// Positions, padded.
     x: Vec<[f64; D]>,
-    /// With the weights of all unknowns.
+    /// Coupling of the mass of neighbours, with the weights of all unknowns.
     excess: Option<Excess<B, D, S>>,
     weights: [f64; B],
     /// Whether values given on sides are others than those that the solution has there.
@@ -68,7 +68,8 @@ where
     }
 }
 
-/// Differences between initial and side values below this share of an unknown's size are rounding.
+/// Side values jump at the start of a step where they differ from the values there by more than this share of the size
+/// of the unknown; less is rounding.
 const JUMP: f64 = 1e-6;
 /// γ, the share of a step that the trapezoid does: with it both stages have the same matrix.
 const FIRST_STAGE: f64 = 2.0 - std::f64::consts::SQRT_2;

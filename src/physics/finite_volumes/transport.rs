@@ -46,19 +46,19 @@ struct Stage<const B: usize, const D: usize> {
     sides: Vec<Side<B>>,
 }
 
-/// What passes through faces, each stored with the node below it, and half of the sum of a around each node as a share
-/// of its dual cell.
+/// What passes through faces, each stored with the node below it, and the largest Courant number.
 struct Passing<const B: usize, const D: usize> {
     faces: Vec<[[f64; B]; D]>,
+    /// Largest Courant number of a node: half of the sum of a over its faces, as a share of its dual cell.
     courant: f64,
     /// The largest a/|N|.
     fastest: f64,
 }
 
-/// Where the courant number is larger, an explicit step is divided: what leaves a cell brings in at most twice the
-/// difference to the node behind, so that a third of the cell may leave in a step.
+/// Largest Courant number of an explicit sub-step: what leaves a cell brings in at most twice the difference to the
+/// node behind, so that a third of the cell may leave.
 const LARGEST_COURANT: f64 = 0.3;
-/// Explicit steps that may be left in a step.
+/// Most explicit sub-steps of a time step; where more are needed the step fails.
 const MOST_SUBSTEPS: f64 = 2e4;
 
 impl<'a, const B: usize, const D: usize, L: Law<B, D>> Transport<'a, B, D, L>
@@ -252,7 +252,7 @@ where
         Ok(Passing { faces, courant, fastest })
     }
 
-    /// G of limited unknowns, and a.
+    /// G of the limited unknowns, and the largest a.
     fn flux(
         &self,
         [(below, left), (above, right)]: [(&L::Node, &[f64; B]); 2],

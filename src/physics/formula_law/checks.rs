@@ -5,10 +5,11 @@ use crate::error::Failure;
 use crate::geometry::Mesh;
 use crate::physics::prescribed::evaluate;
 
-/// A diffusivity may be negative by up to this share of its largest value, as it may be where it is a function of a
-/// solution that oscillates slightly around zero.
+/// A diffusivity may be negative by up to this share of its largest value, as where it is a function of a solution that
+/// oscillates slightly around zero.
 pub(super) const WIGGLES: f64 = 1e-3;
-/// The same after the start for those that vanish at some value of an unknown, which goes beyond it at a front.
+/// After the start, a diffusivity that vanishes at a value of an unknown may be negative by up to this share of its
+/// largest value: the solution overshoots that value at fronts.
 pub(super) const BEYOND: f64 = 0.1;
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Default> FormulaLaw<D, B, P, K, Solver> {

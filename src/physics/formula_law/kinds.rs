@@ -6,30 +6,33 @@ use crate::physics::finite_volumes::Limited;
 use crate::physics::formula_pde::{Formulas, Scheme};
 use crate::physics::sides::Open;
 
-/// What the unknowns of some equations are.
+/// Properties of the unknowns of some equations, as the formulas tell them.
 pub(super) struct Kinds<const B: usize> {
     pub limited: Limited<B>,
-    /// Those whose fluxes are limited where cells are too wide for central ones.
+    /// Unknowns with implicit fluxes that are limited where cells are too wide for central ones.
     pub damped: [bool; B],
-    /// Those whose flux is a function of themselves alone.
+    /// Unknowns whose flux is a function of themselves alone.
     pub has_own_flux: [bool; B],
-    /// Those whose diffusivity is 0 wherever some unknown has a certain value.
+    /// Unknowns whose diffusivity is 0 wherever some unknown has a certain value.
     pub vanishes: [bool; B],
-    /// The values of an unknown at which its own diffusivity is 0, where no term takes gradients or is stored.
+    /// Values of each unknown at which its own diffusivity is 0; empty for unknowns with terms that take gradients, or
+    /// with a storage.
     pub vanishing: [Vec<f64>; B],
-    /// Those that diffuse alike in all directions, in Cartesian coordinates: cells along a radius have another mass.
+    /// Unknowns whose mass neighbours share where cells grow: those with implicit fluxes, without a storage, and with a
+    /// diffusivity that is the same in all directions and vanishes at no value, unless the source is nonlinear. None in
+    /// other than Cartesian coordinates, where cells along a radius have another mass.
     pub shares: [bool; B],
-    /// Those of these whose source is not linear in it.
+    /// Unknowns in `shares` whose source is not linear in them.
     pub bends: [bool; B],
-    /// Those of these whose source is no function of place.
+    /// Unknowns in `bends` whose source does not depend on place.
     pub reacts_alike: [bool; B],
-    /// Those of these with a source that is the sum of a function of place and time and of one of unknowns and time.
+    /// Unknowns in `shares` whose source is the sum of a function of place and time and one of unknowns and time.
     pub loaded: [bool; B],
-    /// Those that are only carried and diffused.
+    /// Unknowns that are only carried and diffused, and so keep the range of their data.
     pub keeps_range: [bool; B],
-    /// Those that have a source, no term that takes gradients, and no flux that is given on a side.
+    /// Unknowns that have a source, no term that takes gradients, no storage, and no flux that is given on a side.
     pub reacts: [bool; B],
-    /// The sides through which something flows that is not given there.
+    /// Sides through which something flows that is not given there, as (axis, end).
     pub open: Vec<(usize, usize)>,
 }
 
@@ -96,7 +99,7 @@ impl<const B: usize> Kinds<B> {
     }
 }
 
-/// Whether a side brings no more of an unknown than there is, where a flux may carry it.
+/// Whether a side adds nothing to an unknown; `flows` says that a flux may carry it.
 fn adds_nothing(end: &Open, flows: bool) -> bool {
     match end {
         Open::Value(_) | Open::Outflow => true,
@@ -105,8 +108,8 @@ fn adds_nothing(end: &Open, flows: bool) -> bool {
     }
 }
 
-/// The values of a variable at which a diffusivity is 0 whatever the others are, of 0, the numbers that its formula
-/// names, and minus these.
+/// Values of a variable at which a diffusivity is 0 whatever the other variables are, sought among 0, the numbers that
+/// its formula names, and minus these.
 fn zeros(diffusivity: &Formula, variable: usize) -> Vec<f64> {
     let is_zero = |value: &f64| {
         let at = |sample: usize| diffusivity.eval(&sampled(diffusivity, sample, (variable, *value)));

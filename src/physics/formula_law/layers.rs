@@ -4,12 +4,13 @@ use crate::formula::{Formula, Program};
 use crate::geometry::Mesh;
 use crate::parallel;
 
-/// Those of B unknowns, each a formula of the P values at a node: place first, then unknowns.
+/// Diffusivities that are functions of place alone, of B unknowns, each a formula of the P values at a node: place
+/// first, then unknowns.
 pub(super) struct Layers<const P: usize, const B: usize> {
     of_place: [Option<Program<P, 1>>; B],
 }
 
-/// Places on an edge at which they are asked.
+/// Number of points on an edge at which a diffusivity is taken for its harmonic mean.
 const SAMPLES: usize = 8;
 
 impl<const P: usize, const B: usize> Layers<P, B> {
@@ -26,7 +27,7 @@ impl<const P: usize, const B: usize> Layers<P, B> {
         self.of_place.iter().any(Option::is_some)
     }
 
-    /// 1/⟨1/D⟩ along edges: what flows through layers in a row, as through resistances.
+    /// 1/⟨1/D⟩, the harmonic mean of D along each edge: what flows through layers in a row, as through resistances.
     pub fn through<const D: usize>(&self, t: f64, mesh: &Mesh<D>, edges: &[[[f64; D]; 2]]) -> Vec<[Option<f64>; B]> {
         let place = |[from, to]: &[[f64; D]; 2], sample: usize| -> [f64; P] {
             let share = (sample as f64 + 0.5) / SAMPLES as f64;

@@ -3,7 +3,8 @@
 use crate::formula::{Formula, Program};
 use crate::parallel;
 
-/// Those of B unknowns, each a formula of the P values at a node: place first, then unknowns.
+/// Sources of B unknowns, each a formula of the P values at a node, place first and then unknowns; none for an unknown
+/// without such a source.
 pub(super) struct Loads<const P: usize, const B: usize> {
     sources: [Option<Program<P, 1>>; B],
 }
@@ -17,7 +18,7 @@ impl<const P: usize, const B: usize> Loads<P, B> {
         self.sources.iter().any(Option::is_some)
     }
 
-    /// The sources at some places, at the k-th of which the unknowns are u(k); 0 for those that are not of this kind.
+    /// The sources at some places, at the k-th of which the unknowns are u(k); 0 for unknowns without such a source.
     pub fn at<const D: usize>(&self, t: f64, x: &[[f64; D]], u: impl Fn(usize) -> [f64; B] + Sync) -> Vec<[f64; B]> {
         let mut loads = vec![[0.0; B]; x.len()];
         parallel::for_each_piece(&mut loads, |begin, loads| {

@@ -17,7 +17,8 @@ where
         nodes.iter().all(|node| Self::value(node, Self::SOURCE, c) == 0.0 && flux(node) == flux(&nodes[0]))
     }
 
-    /// The states of each unknown that all its values are above or below of, and that it keeps.
+    /// For each unknown the states that it keeps and that all its values are above or below of, as a lower and an upper
+    /// end; ±∞ for none.
     pub(super) fn kept(
         &self,
         (t, x): (f64, &[[f64; D]]),

@@ -12,9 +12,10 @@ use crate::physics::sides::Open;
 use crate::physics::{Forcing, Motion, Physics, nodal};
 use crate::work::Work;
 
-/// A flux that outweighs diffusion by this over an edge, and a change over it, as a share of the range, from which a
-/// front is not resolved.
+/// A front is unresolved where the cell Péclet number of an edge exceeds this and the unknown changes by more than
+/// [`CHANGES`] over the edge.
 const WIDE: f64 = 10.0;
+/// Change of an unknown over an edge, as a share of its range, above which a front may be unresolved.
 const CHANGES: f64 = 0.3;
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver> Physics<D>

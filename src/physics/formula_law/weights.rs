@@ -4,13 +4,14 @@ use super::FormulaLaw;
 use crate::numerics::larger;
 use crate::physics::finite_volumes::BISTABLE;
 
-/// The weight where a state that grows by itself lies ahead of a front. With shared mass a node acts at once on others
-/// far ahead, as 0.27 to the power of the number of nodes between at weight 1, and a trace is enough where it grows;
-/// without it the front is late or early by the second order of wide cells.
+/// Weight s of the mass that neighbours share (`Excess`) where the state ahead of a front is unstable, so that small
+/// values pull the front: full coupling (1) reaches 0.27ⁿ of n nodes ahead at once and starts growth there, none makes
+/// the speed of the front wrong to second order in wide cells.
 const PULLED: f64 = 0.5;
-/// No mass is shared if D is below this share of the largest D in that state: nothing would damp what overshoots there.
+/// No mass is shared where D in the unstable state ahead of a front is below this share of the largest D: nothing would
+/// damp what overshoots there.
 const DAMPS: f64 = 0.5;
-/// A state rests where the source is at most this share of the largest.
+/// A state rests where the source is at most this share of the largest source.
 const RESTS: f64 = 1e-3;
 
 impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Default> FormulaLaw<D, B, P, K, Solver> {

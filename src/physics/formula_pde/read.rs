@@ -14,13 +14,13 @@ pub(in crate::physics) struct Formulas<const D: usize> {
     /// Formulas of x, y, the unknowns and t: F along x of all unknowns, then F along y, D and S; then the derivatives
     /// of all of these by the first unknown, by the second, and so on.
     pub nodal: Vec<Formula>,
-    /// Formulas of x, y and t, as all that follow.
+    /// Initial values: formulas of x, y and t.
     pub initial: Vec<Formula>,
     pub exact: Vec<Option<Formula>>,
-    /// For each unknown and the lower and the upper end of each axis.
+    /// What holds for each unknown at the lower and the upper end of each axis.
     pub sides: Vec<[[Open; 2]; D]>,
     pub scheme: Option<Scheme>,
-    /// What depends on gradients, and storage. Fluxes and sources of these unknowns are 0 in `nodal`.
+    /// Terms that depend on gradients, and storages. Fluxes and sources of these unknowns are 0 in `nodal`.
     pub terms: TermFormulas<D>,
     /// The lower and the upper bound of each unknown.
     pub bounds: Vec<[Option<Formula>; 2]>,

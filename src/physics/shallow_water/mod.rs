@@ -119,7 +119,7 @@ trait Scheme: Sync {
 /// Newton's method has converged once every residual is below this share of the size of its equation. It is near
 /// round-off, since the remaining error is advanced explicitly and may grow.
 const TOLERANCE: f64 = 1e-13;
-/// Newton steps after which a time step is given up.
+/// Number of Newton steps after which a time step is given up.
 const MAX_NEWTON: usize = 20;
 
 impl ShallowWater {
@@ -229,7 +229,7 @@ impl Physics for ShallowWater {
         DualCells::new(mesh).areas().to_vec()
     }
 
-    /// Of the water, and of its momentum along both axes.
+    /// The integrals of the depth, and of the momentum along both axes.
     fn integrals(&self, mesh: &Mesh<2>, w: &Field) -> Vec<f64> {
         let areas = self.areas(mesh);
         let momentum = |c: usize| {

@@ -8,7 +8,8 @@ use crate::physics::Motion;
 use crate::simulation::journey::range;
 use crate::simulation::{Simulation, State};
 
-/// The change in a step of length `dt` if the mesh rested, and what it would lead to; none where that fails.
+/// The change in a step of length `dt` if the mesh rested, and the solution that this would lead to; none where that
+/// fails.
 pub(super) fn at_rest<const D: usize>(
     simulation: &mut Simulation<D>,
     State { t, mesh, u, .. }: &State<D>,
@@ -22,8 +23,8 @@ where
     Some((change_at_nodes(mesh.lattice(), u, &after), after))
 }
 
-/// True where more happens in a step at the nodes of a mesh that is to follow by itself than in any step of automatic
-/// length.
+/// True where the solution changes by more in a step than any automatic step allows, at the nodes of a mesh whose
+/// relaxation is chosen automatically.
 pub(crate) fn rushed<const D: usize>(simulation: &Simulation<D>, before: &State<D>, after: &State<D>) -> bool
 where
     Mesh<D>: Movable<D>,
@@ -42,8 +43,8 @@ pub(super) fn relative(errors: &[f64], ranges: &[f64]) -> f64 {
     counted.fold(0.0, |m, (error, range)| larger(m, error / range))
 }
 
-/// The largest change of the first unknown at a node inside. On sides, where values are
-/// given, nothing has to be solved for.
+/// The largest change of the first unknown at a node inside. On sides, where values are given, nothing has to be solved
+/// for.
 pub(super) fn change_at_nodes<const D: usize>(lattice: &Lattice<D>, before: &Field, after: &Field) -> f64 {
     let changes = before.component(0).zip(after.component(0)).map(|(before, after)| after - before);
     let inside = changes.enumerate().filter(|(k, _)| lattice.beyond(*k) == [[false; 2]; D]);
