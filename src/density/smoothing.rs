@@ -91,7 +91,7 @@ fn along<const D: usize>(size: [usize; D], axis: usize, values: &mut [f64], mut 
     }
 }
 
-/// One pass (1 2 1)/4, or the share of it that has so much of its variance.
+/// One pass (1 2 1)/4, or one with this share of its variance.
 fn pass(lines: &mut [Row], wraps: bool, share: f64) {
     let (own, beside) = (4.0 / share - 2.0, 0.25 * share);
     let (first, last) = (lines[0], lines[lines.len() - 1]);

@@ -218,7 +218,7 @@ impl<const D: usize> Gait<D> {
         })
     }
 
-    /// Refuses what is none of a mesh with so many nodes.
+    /// Refuses the gait of another mesh than one with this number of nodes.
     ///
     /// # Errors
     /// [`Unfit::Damaged`].

@@ -138,7 +138,7 @@ where
     Ok(Start { mesh, end, steps: gait.steps() })
 }
 
-/// True where an edge shorter than so many uniform cells holds more than a share of the range of u.
+/// True where an edge shorter than `thin` uniform cells holds more than the share `most` of the range of u.
 fn holds<const D: usize>(mesh: &Mesh<D>, u: &[f64], most: f64, thin: f64) -> bool {
     let lattice = mesh.lattice();
     let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 pub enum CheckpointsAt {
     /// Every n steps.
     Steps(usize),
-    /// After the first step that ends so many seconds after the last checkpoint.
+    /// After the first step that ends at least this number of seconds after the last checkpoint.
     Seconds(f64),
 }
 

@@ -207,7 +207,7 @@ pub enum Standing {
     Unfinished,
     /// A run that came to its end.
     Complete,
-    /// The same, where the study that is asked about ends later.
+    /// A run that came to its end, where the study that is asked about ends later.
     Shorter,
 }
 

@@ -127,7 +127,7 @@ struct KeptFrames {
 }
 
 impl Frames {
-    /// Starts the series in a run directory, of a mesh with so many subdomains along each axis.
+    /// Starts the series in a run directory, of a mesh with this number of subdomains along each axis.
     pub fn create(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Self {
         Self::named(directory, at, subdomains, ["frames", "run.pvd"])
     }
@@ -159,7 +159,7 @@ impl Frames {
         write_file(&self.directory.join(self.names[1]), self.series().as_bytes())
     }
 
-    /// The same with one scene, compressed and written by a thread beside the run.
+    /// Enters one scene in the series; a thread beside the run compresses and writes it.
     fn start(&mut self, scene: Scene) -> Result<()> {
         self.wait()?;
         if let (Some(scene), Some(grid)) = (self.entered(scene)?, self.grid.clone()) {

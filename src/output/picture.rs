@@ -11,7 +11,7 @@ use std::sync::{Arc, LazyLock};
 pub struct Picture {
     /// The drawing.
     pub svg: String,
-    /// The same at twice its size in pixels.
+    /// The drawing at twice its size in pixels.
     pub png: Vec<u8>,
 }
 
@@ -86,7 +86,7 @@ impl Canvas {
         Pixels { size: [painted.width(), painted.height()], rgba: painted.data().to_vec() }
     }
 
-    /// A drawing as pixels, so many times its size.
+    /// A drawing as pixels, at this multiple of its size.
     fn paint(&mut self, svg: &str, times: u32) -> &tiny_skia::Pixmap {
         static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
             let mut fonts = usvg::fontdb::Database::new();

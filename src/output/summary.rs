@@ -58,7 +58,7 @@ pub trait Figures: Clone + Default + Serialize {
     /// Seconds of the parts of a run.
     type Parts: std::fmt::Debug + Copy + Default + Serialize;
 
-    /// The name under which a failure is told.
+    /// The name under which `summary.json` has a failure.
     const ENDED: fn(Failed) -> Ended = Ended::Error;
 }
 
@@ -66,9 +66,9 @@ pub trait Figures: Clone + Default + Serialize {
 #[derive(Debug, Clone, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ended {
-    /// Where the errors of the solution are told report by report.
+    /// `error`, of kinds that tell the errors of the solution report by report.
     Error(Failed),
-    /// Where `error` is, or could be taken for, an error of the solution.
+    /// `failure`, of kinds whose `error` is, or could be taken for, an error of the solution.
     Failure(Failed),
 }
 
@@ -106,7 +106,7 @@ pub struct Failed {
 }
 
 impl Failed {
-    /// What is told of an error, with the remedy in the words of the study.
+    /// The entry for an error, with the remedy in the words of the study.
     fn of(error: &Error, help: Option<String>) -> Self {
         let (kind, moment) = match error.cause() {
             Error::Failed { failure, moment } => (failure.name(), *moment),

@@ -16,11 +16,13 @@ const MOST_POWERS: i32 = 9;
 pub(super) struct Ticks {
     /// Each mark: its place, and its label, which is (place − `start`)/`size`.
     pub marks: Vec<(f64, String)>,
-    /// The number from which labels count, 0 unless they would be long, and the power of ten that is their unit.
+    /// The number from which labels count; 0 unless they would be long.
     start: f64,
+    /// The power of ten that is the unit of labels.
     size: f64,
-    /// The same as text, where they are not 0 and 1.
+    /// `start` as text, where it is not 0.
     less: Option<String>,
+    /// `size` as text, where it is not 1.
     unit: Option<String>,
 }
 

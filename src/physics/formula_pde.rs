@@ -155,8 +155,8 @@ impl<const D: usize> FormulaPde<D> {
         }
     }
 
-    /// How it is stepped where nothing is said: with [`Stepper::TrBdf2`] where something diffuses or has a source,
-    /// which may decay faster than any step is short.
+    /// The default stepper: [`Stepper::TrBdf2`] where something diffuses or has a source, which may decay faster than
+    /// any step is short, and where a flux takes gradients or there is a storage; else the trapezoid.
     pub fn stepper(&self) -> Stepper {
         let diffuses = self.diffusivity.values().any(|of| !of.is_zero());
         let has_source = self.source.values().any(|text| text != "0");
@@ -207,7 +207,7 @@ impl FormulaPde {
         self.stepped(stepper)
     }
 
-    /// The same, stepped as is said here.
+    /// The equation, ready to step with this stepper.
     ///
     /// # Errors
     /// As [`FormulaPde::check`].

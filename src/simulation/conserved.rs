@@ -48,7 +48,7 @@ impl AtStart {
         Self { masses: physics.integrals(mesh, u), largest: largest_of(u) }
     }
 
-    /// True where a run of so many unknowns can have begun so.
+    /// True where a run of this number of unknowns can have begun so.
     pub fn is_sound(&self, unknowns: usize) -> bool {
         let Self { masses, largest } = self;
         [masses.len(), largest.len()] == [unknowns; 2] && masses.iter().chain(largest).all(|value| value.is_finite())

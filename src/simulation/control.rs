@@ -44,8 +44,8 @@ impl Control {
         self.tolerance == tolerance && self.before.is_finite() && self.before >= LEAST
     }
 
-    /// Whether a step is taken, and how much longer the next is than it would have been had it not been `cut` so many
-    /// times shorter.
+    /// Whether a step with this error is taken, and the factor by which the next is longer than the whole step, of
+    /// which this one was the part 1/`cut`.
     pub fn judge(&mut self, error: f64, cut: f64) -> (bool, f64) {
         // not `>`: an error that is no number is too large
         let taken = error <= self.tolerance;

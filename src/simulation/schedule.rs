@@ -126,8 +126,8 @@ impl Schedule {
         Past { end: self.end(), reports: self.reports.clone(), met: self.met.clone() }
     }
 
-    /// Goes on behind a run that was at its end after so many steps: the steps up to there stay as they were. True
-    /// where this schedule ends later.
+    /// Goes on behind a run that was at its end after `step` steps: the steps up to there stay as they were. True where
+    /// this schedule ends later.
     ///
     /// # Errors
     /// [`Unfit::Earlier`] where it ends earlier, [`Unfit::Study`] where it has other reports up to there.

@@ -12,9 +12,9 @@ use crate::setting::Auto;
 use crate::simulation::Schedule;
 use crate::stefan::{Columns, Front, FrontState, INITIAL, LOWER, Problem, Sides, Similarity, UPPER};
 
-/// Memory for each node: nodal arrays, the sparse matrix and its factors.
+/// Bytes of memory that a run needs for each node: nodal arrays, the sparse matrix and its factors.
 const BYTES_PER_NODE: u128 = 6000;
-/// A difference, as a share of the largest value, that is not of rounding.
+/// Differences above this share of the largest value are not made of rounding.
 const NOT_ROUNDING: f64 = 1e-9;
 
 impl Kind for StefanStudy {

@@ -15,13 +15,16 @@ use crate::formula::Formula;
 use crate::output::FramesAt;
 use crate::simulation::Schedule;
 
+/// Largest number of iterations where a study gives none.
 const ITERATIONS: usize = 500;
+/// Tolerance of the iterations, as a share of the length of the line, where a study gives neither this nor a number of
+/// iterations.
 const TOLERANCE: f64 = 1e-10;
-/// Memory for each cell, measured at a million of them, and a reserve.
+/// Bytes of memory that a run needs for each cell: measured at a million of them, with a reserve.
 const BYTES_PER_CELL: u128 = 1000;
-/// Meshes kept of a run in time where nothing is said.
+/// Number of meshes that are kept of a run in time where a study does not say how many.
 const FRAMES_BY_DEFAULT: usize = 100;
-/// Panels of an integral.
+/// Largest number of panels by which an integral may be computed.
 const MOST_PANELS: usize = 1_000_000;
 
 impl Kind for EquidistributionStudy {

@@ -78,7 +78,7 @@ impl LineRun {
         })
     }
 
-    /// The time after so many steps; 0 where the mesh does not move.
+    /// The time after a number of steps; 0 where the mesh does not move.
     fn time(&self, step: usize) -> f64 {
         self.schedule.as_ref().map_or(0.0, |schedule| schedule.time(step))
     }

@@ -123,7 +123,7 @@ impl Grading {
         }
     }
 
-    /// Names what makes a mesh fold that is none without grading.
+    /// The error that names the grading that makes a mesh fold, which does not without it.
     fn blame(&self, failure: &Failure) -> Error {
         let (key, value, cure) = match (self.power, self.ratio) {
             (Some(power), _) => ("power", power, "bring it nearer to 1"),

@@ -17,7 +17,7 @@ pub fn check_memory(nodes: u128, bytes_per_node: u128, cells: &[usize]) -> Resul
     }
 }
 
-/// So many bytes, and who allows no more.
+/// The largest number of bytes, and who allows no more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Limit {
     bytes: u128,

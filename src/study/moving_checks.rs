@@ -15,9 +15,9 @@ use crate::setting::Auto;
 /// Memory that a run needs for each node: 2250 bytes measured at 600 × 600 cells with subdomains and a reference, and a
 /// reserve.
 const BYTES_PER_NODE: u128 = 2600;
-/// Places along an axis at which formulas are looked at.
+/// Number of places along an axis at which formulas are sampled.
 const SAMPLES: usize = 100;
-/// A difference, as a share of the largest value, that is not of rounding.
+/// Differences above this share of the largest value are not made of rounding.
 const NOT_ROUNDING: f64 = 1e-9;
 
 impl<const D: usize> Kind for MovingStudy<D>

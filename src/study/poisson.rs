@@ -143,7 +143,7 @@ impl LaplacianTable {
 
 /// Formulas of x and y.
 const VARIABLES: [&str; 2] = ["x", "y"];
-/// Memory for each node: rows, the sparse matrix and its factors.
+/// Bytes of memory that a run needs for each node: rows, the sparse matrix and its factors.
 const BYTES_PER_NODE: u128 = 6000;
 
 impl Kind for PoissonStudy {

@@ -66,7 +66,7 @@ impl<'a> Stage<'a> {
         self.parts().0
     }
 
-    /// The same, and the checkpoints beside them.
+    /// Frames and watchers, and the checkpoints beside them.
     pub(super) fn parts(&mut self) -> (Vec<&mut dyn Observer>, Option<&mut Checkpoints>) {
         let mut observers: Vec<&mut dyn Observer> = Vec::new();
         self.frames.iter_mut().for_each(|frames| observers.push(frames));
