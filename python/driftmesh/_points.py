@@ -38,8 +38,9 @@ def interpolate(mesh: Mesh, u: ArrayLike, coordinates: Sequence[ArrayLike], orde
     if values is None:
         index = tuple(int(k) for k in np.unravel_index(outside, shape))
         place = ", ".join(f"{value}" for value in rows[outside])
+        where = f" at index {index}" if index else ""
         raise ValueError(
-            f"the point ({place}) at index {index} lies outside of the mesh, from {mesh.lower} to {mesh.upper}"
+            f"the point ({place}){where} lies outside of the mesh, which extends from {mesh.lower} to {mesh.upper}"
         )
     found: Floats = values.reshape(leading + shape)[()]
     return found

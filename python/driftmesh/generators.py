@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _driftmesh, _toml
-from ._arrays import Floats, count, finite, positive, scalar
+from ._arrays import Floats, count, finite, positive, real, scalar
 from ._arrays import threads as _threads
 from ._boxes import check_box, images, periodic_values
 from ._toml import Kind
@@ -166,8 +166,9 @@ class MeshGenerator:
     def density(self, mesh: Mesh, u: ArrayLike | None) -> Floats:
         """ρ at the nodes: where the monitor wants the mesh to be fine.
 
-        It is what a study computes from its solution, smoothed as the monitor says. A step from rest follows it; later
-        ones follow a mean with the density that moved the mesh last.
+        It is what a study computes from the unknown that it follows, smoothed as the monitor says; a study whose fronts
+        run into states that grow by themselves bounds the cells ahead of them, too. A step from rest follows this
+        density, later ones a mean with the density that moved the mesh last.
 
         Args:
             mesh: The mesh, of any shape.
@@ -195,7 +196,8 @@ class MeshGenerator:
 
         It does steps from the mesh, each with the data at the nodes that the last one led to, until no node moves by
         more than a small share of the shortest edge. ``method`` and ``relaxation`` do not matter. Meshes with more than
-        100 cells along an axis are adapted on half as many first.
+        100 cells along an axis are adapted on half as many first. A study whose side values differ from its initial
+        solution starts with these on its sides: a ``u0`` that has them there gives the same mesh.
 
         Args:
             mesh: Where to begin, of a box or a line; a study begins with equal cells.
@@ -224,7 +226,7 @@ class MeshGenerator:
         check_box(*mesh._given())
         if not callable(u0):
             # looked at here, so that mistakes are named before anything is computed
-            self._followed(mesh, u0)
+            self._followed(mesh, u0, mesh)
 
         def follow(nodes: Floats) -> Floats:
             on = Mesh._of(nodes, mesh)
@@ -265,7 +267,8 @@ class MeshGenerator:
         if isinstance(self.monitor, Kind):
             if u is None:
                 raise ValueError(f"`u` is None, but the monitor {self.monitor} looks at it")
-            name, values = "u", finite("u", u, mesh.shape)
+            name = "u" if start is None else "u0"
+            values = finite(name, u, mesh.shape)
         elif callable(self.monitor):
             name, values = "density", finite("density", self.monitor(mesh, u), mesh.shape)
         else:
@@ -307,7 +310,8 @@ def _values(u: Any, start: Mesh, on: Mesh) -> Any:
     if u is None or on is start:
         return u
     if callable(u):
-        return np.broadcast_to(np.asarray(u(*images(*on._given()))), on.shape)
+        values = real("u0", u(*images(*on._given())))
+        return np.full(on.shape, values) if values.shape == () else values
     return start.interpolate(finite("u0", u, start.shape), *np.moveaxis(on._nodes, -1, 0))
 
 

@@ -119,7 +119,7 @@ class Mesh:
         >>> Mesh.uniform(cells=80, upper=2.0).x[:3]
         array([0.   , 0.025, 0.05 ])
         """
-        dimensions = 1 if np.ndim(cells) == 0 else 2
+        dimensions = 1 if np.size(cells) == 1 else 2
         numbers = [count("cells", n) for n in _boxes.each_axis("cells", cells, dimensions)]
         low, high = _boxes.corner("lower", lower, dimensions), _boxes.corner("upper", upper, dimensions)
         wraps = _boxes.flags(periodic, dimensions)

@@ -35,6 +35,8 @@ struct Last<const D: usize> {
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+const OURS: &str = "must be what a generator of this version remembered; make a new one";
+
 fn unfit(value: impl std::fmt::Display, rule: &str) -> Error {
     Error::invalid("state", value, rule)
 }
@@ -53,11 +55,11 @@ impl Memory {
         struct Head {
             version: String,
         }
-        let damaged = |error| unfit(error, "is no state of a generator");
+        let damaged = |error| unfit(error, OURS);
         let Head { version } = rmp_serde::from_slice(bytes).map_err(damaged)?;
         if version != VERSION {
-            let rule = format!("is the version that wrote this generator, but {VERSION} is to read it; make a new one");
-            return Err(unfit(version, &rule));
+            let rule = format!("must be of version {VERSION}; make a new one");
+            return Err(unfit(format!("of version {version}"), &rule));
         }
         rmp_serde::from_slice(bytes).map_err(damaged)
     }
@@ -90,7 +92,7 @@ impl<const D: usize> Part<D> {
         let mesh = Lattice::new(fixed(&cells)?, fixed(&periodic)?)
             .and_then(|lattice| Mesh::uniform(lattice, fixed(&lower)?, fixed(&upper)?))
             .and_then(|mesh| Ok(mesh.moved(x.as_chunks::<D>().0.to_vec())?))?;
-        let damaged = |error| unfit(format!("{error:?}"), "is no state of a generator");
+        let damaged = |error| unfit(format!("{error:?}"), OURS);
         gait.check(mesh.x().len()).map_err(damaged)?;
         parts.mover.generator.resume(&mesh, &self.generator).map_err(damaged)?;
         parts.last = Some((mesh, gait));

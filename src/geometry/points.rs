@@ -1,7 +1,6 @@
 //! Values of nodal fields at any points.
 
 use super::determinant::{cofactors, determinant};
-use super::lattice::diagonal;
 use super::{Cells, Lattice, Mesh};
 use crate::parallel;
 
@@ -104,8 +103,10 @@ where
         let mut values = vec![0.0; self.places.len()];
         parallel::for_each_piece(&mut values, |first, piece| {
             for (value, &(place, nodes)) in piece.iter_mut().zip(&self.places[first..]) {
-                let axes = std::array::from_fn(|d| Axis::new(&self.lattice, d, place, nodes));
-                each_node(&self.lattice, &axes, |k, _, weight, _| *value += weight * u[k]);
+                let axes: [Axis; D] = std::array::from_fn(|d| Axis::new(&self.lattice, d, place, nodes));
+                each_node(&self.lattice, &axes, |k, at| {
+                    *value += (0..D).map(|d| axes[d].weights[at[d]]).product::<f64>() * u[k];
+                });
             }
         });
         values
@@ -143,14 +144,17 @@ fn refined<const D: usize>(mesh: &Mesh<D>, place: Place<D>, point: [f64; D]) -> 
 
 /// x at a place, and ∂x/∂ξ_d of the map through so many nodes along an axis.
 fn mapped<const D: usize>(mesh: &Mesh<D>, place: Place<D>, nodes: usize) -> ([f64; D], [[f64; D]; D]) {
-    let (lattice, jump) = (mesh.lattice(), diagonal(mesh.extent()));
-    let axes = std::array::from_fn(|d| Axis::new(lattice, d, place, nodes));
+    let (lattice, extent) = (mesh.lattice(), mesh.extent());
+    let axes: [Axis; D] = std::array::from_fn(|d| Axis::new(lattice, d, place, nodes));
     let (mut x, mut derivatives) = ([0.0; D], [[0.0; D]; D]);
-    each_node(lattice, &axes, |k, turns, weight, slopes| {
+    each_node(lattice, &axes, |k, at| {
+        let weights = std::array::from_fn::<f64, D, _>(|d| axes[d].weights[at[d]]);
+        let along = |d: usize| (0..D).map(|e| if e == d { axes[d].slopes[at[d]] } else { weights[e] }).product::<f64>();
+        let (weight, slopes) = (weights.iter().product::<f64>(), std::array::from_fn::<f64, D, _>(along));
         for c in 0..D {
-            let at = mesh.x()[k][c] + turns[c] * jump[c][c];
-            x[c] += weight * at;
-            (0..D).for_each(|d| derivatives[d][c] += slopes[d] * at);
+            let there = mesh.x()[k][c] + axes[c].turns[at[c]] * extent[c];
+            x[c] += weight * there;
+            (0..D).for_each(|d| derivatives[d][c] += slopes[d] * there);
         }
     });
     (x, derivatives)
@@ -195,12 +199,8 @@ fn lagrange(count: usize, k: usize, at: f64) -> (f64, f64) {
     (value, slope)
 }
 
-/// Calls `f(index, turns, weight, derivatives of the weight)` for each node that some axes reach.
-fn each_node<const D: usize>(
-    lattice: &Lattice<D>,
-    axes: &[Axis; D],
-    mut f: impl FnMut(usize, [f64; D], f64, [f64; D]),
-) {
+/// Calls `f(index, at)` for each node that some axes reach, the `at[d]`-th of axis d.
+fn each_node<const D: usize>(lattice: &Lattice<D>, axes: &[Axis; D], mut f: impl FnMut(usize, [usize; D])) {
     let all = axes.iter().map(|axis| axis.count).product();
     for number in 0..all {
         let mut rest: usize = number;
@@ -209,13 +209,7 @@ fn each_node<const D: usize>(
             rest /= axes[d].count;
             k
         });
-        let index = lattice.index(std::array::from_fn(|d| axes[d].nodes[at[d]]));
-        let product = |of: &dyn Fn(usize) -> f64| (0..D).map(of).product::<f64>();
-        let weight = product(&|d| axes[d].weights[at[d]]);
-        let slopes = std::array::from_fn(|along| {
-            product(&|d| if d == along { axes[d].slopes[at[d]] } else { axes[d].weights[at[d]] })
-        });
-        f(index, std::array::from_fn(|d| axes[d].turns[at[d]]), weight, slopes);
+        f(lattice.index(std::array::from_fn(|d| axes[d].nodes[at[d]])), at);
     }
 }
 
