@@ -211,7 +211,7 @@ def test_safety_says_how_far_a_step_that_folds_is_tried_again():
     [
         MeshGenerator,
         lambda: MeshGenerator(Arclength(), Stochastic(subdomains=(2, 2), seed=3), {"steps": 30}, prediction=0.2),
-        lambda: MeshGenerator(Arclength(), Schwarz(subdomains=(2, 2)), threads=1),
+        lambda: MeshGenerator(Arclength(), Schwarz(subdomains=(2, 2)), safety={"substeps": 4}, threads=1),
         lambda: MeshGenerator(method=Fixed()),
     ],
 )
@@ -224,6 +224,8 @@ def test_copies_go_on_to_the_bit(make, again):
         mesh = follow(generator, Mesh.uniform(cells=cells), 0, 6)
         other = again(generator)
         assert other.last == generator.last
+        for name in ("relaxation", "prediction", "form", "safety", "threads"):
+            assert getattr(other, name) == getattr(generator, name)
         on = follow(generator, mesh, 6, 4)
         assert follow(other, mesh, 6, 4) == on
         # one that begins anew goes another way

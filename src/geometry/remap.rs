@@ -263,6 +263,28 @@ mod tests {
         }
     }
 
+    /// On a line: the integral to round-off, second order in the mean, and periods.
+    #[test]
+    fn fields_of_lines_are_carried() {
+        let bent = |n: usize, wraps: bool, amount: f64, shift: f64| {
+            let mesh = Mesh::uniform(Lattice::new([n], [wraps]).unwrap(), [0.0], [1.0]).unwrap();
+            mesh.moved(mesh.x().iter().map(|[x]| [x + amount * (2.0 * PI * x).sin() + shift]).collect()).unwrap()
+        };
+        let wave = |mesh: &Mesh<1>| -> Vec<f64> { mesh.x().iter().map(|[x]| (2.0 * PI * x).cos()).collect() };
+        let sum =
+            |mesh: &Mesh<1>, u: &[f64]| DualCells::new(mesh).areas().iter().zip(u).map(|(a, u)| a * u).sum::<f64>();
+        for (wraps, shift) in [(false, 0.0), (true, 0.0), (true, -3.3)] {
+            let error = |n: usize| {
+                let (from, to) = (bent(n, wraps, -0.05, 0.0), bent(n, wraps, 0.05, shift));
+                let v = remap(&from, &wave(&from), &to).unwrap();
+                assert!((sum(&from, &wave(&from)) - sum(&to, &v)).abs() < 1e-13);
+                v.iter().zip(wave(&to)).map(|(v, e)| (v - e).abs()).sum::<f64>() / v.len() as f64
+            };
+            let order = (error(32) / error(128)).log(4.0);
+            assert!((1.5..2.5).contains(&order), "observed order {order:.2}, expected 2, after {shift}");
+        }
+    }
+
     /// Meshes that are no meshes are named instead of being carried to.
     #[test]
     fn a_folded_mesh_is_refused() {
