@@ -2,24 +2,27 @@
 
 Three ways in:
 
-* move a mesh to the data of your own solver: :class:`Mesh`, :class:`MeshGenerator`, :func:`transfer`;
+* move a mesh to the data of your own solver: :class:`Mesh`, :class:`MeshGenerator`, :func:`transfer`,
+  :func:`gradient`;
 * run a study: :func:`run`, :func:`load`;
 * the tools by themselves: :func:`laplacian_stencils`, :func:`equidistribute`, :func:`schwarz`.
 
-Arrays over a mesh have shape ``(nx + 1, ny + 1)``, first index along ξ; periodic axes repeat their first node at the
-end. Any real dtype, strides and order will do. Wrong shapes and values raise :class:`ValueError`, numerical failures
-:class:`MeshError` or the subclass of it that is named after the failure.
+Arrays over a mesh have shape ``(nx + 1, ny + 1)``, first index along ξ, over a line ``(nx + 1,)``; periodic axes
+repeat their first node at the end. Any real dtype, strides and order will do. Wrong shapes and values raise
+:class:`ValueError`, numerical failures :class:`MeshError` or the subclass of it that is named after the failure.
 """
 
 from ._driftmesh import VERSION as __version__
+from .differences import divergence, gradient
 from .errors import MeshError, StudyError
 from .frames import Frame
 from .generators import MeshGenerator
 from .laplacian import laplacian_stencils
 from .line import SchwarzResult, equidistribute, schwarz
-from .mesh import Mesh, Quality
+from .mesh import Mesh
 from .methods import Fixed, GridWalk, Interpolation, MonteCarlo, ResidualWalk, Schwarz, Stochastic, Strip, Whole
 from .monitors import Arclength, Given, RootGradient
+from .quality import Quality
 from .remap import transfer
 from .study import Run, load, run
 
@@ -45,7 +48,9 @@ __all__ = [
     "StudyError",
     "Whole",
     "__version__",
+    "divergence",
     "equidistribute",
+    "gradient",
     "laplacian_stencils",
     "load",
     "run",

@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
+#: More threads than this are a mistake on any machine.
+MOST_THREADS = 4096
+
 
 def real(name: str, values: ArrayLike) -> Floats:
     """Real numbers as a contiguous, aligned array of float64; no copy where it is one."""
@@ -62,6 +65,13 @@ def count(name: str, value: Any) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or not 0 <= value < 1 << 62:
         raise ValueError(f"`{name}` is {value!r}, but must be a whole number, 0 or more")
     return int(value)
+
+
+def threads(value: Any) -> int | None:
+    """A number of threads, 1 or more; None for all cores."""
+    if value is not None and not 1 <= count("threads", value) <= MOST_THREADS:
+        raise ValueError(f"`threads` is {value}, but must be between 1 and {MOST_THREADS}, or None for all cores")
+    return None if value is None else int(value)
 
 
 def pair(name: str, values: Sequence[Any] | NDArray[Any]) -> tuple[Any, Any]:

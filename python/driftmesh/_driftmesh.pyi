@@ -1,6 +1,6 @@
 """The native half of the package; private."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import final
 
@@ -15,6 +15,7 @@ __all__ = [
     "areas",
     "check",
     "equidistribute",
+    "interpolate",
     "quality",
     "run",
     "schwarz",
@@ -26,23 +27,28 @@ __all__ = [
 VERSION: str
 
 _Floats = NDArray[np.float64]
-_Mesh = tuple[_Floats, tuple[float, float], tuple[float, float], tuple[bool, bool]]
+_Mesh = tuple[_Floats, tuple[float, ...], tuple[float, ...], tuple[bool, ...]]
 _Density = tuple[str, str] | tuple[list[float], list[float]] | Callable[[_Floats], _Floats]
 
 @final
 class Generator:
-    def __new__(cls, settings: str) -> Generator: ...
+    def __new__(cls, settings: str, threads: int | None) -> Generator: ...
     def step(self, mesh: _Mesh, u: _Floats, dt: float) -> tuple[_Floats, str]: ...
+    def density(self, mesh: _Mesh, u: _Floats) -> _Floats: ...
+    def adapt(self, mesh: _Mesh, follow: Callable[[_Floats], _Floats]) -> tuple[_Floats, str]: ...
+    def memory(self) -> bytes: ...
+    def remember(self, memory: bytes) -> None: ...
 
 def uniform(
-    cells: tuple[int, int],
-    lower: tuple[float, float],
-    upper: tuple[float, float],
-    periodic: tuple[bool, bool],
+    cells: Sequence[int],
+    lower: Sequence[float],
+    upper: Sequence[float],
+    periodic: Sequence[bool],
 ) -> _Floats: ...
 def quality(mesh: _Mesh, density: _Floats) -> tuple[float, float, float, float]: ...
 def areas(mesh: _Mesh) -> _Floats: ...
-def transfer(values: _Floats, old: _Mesh, new: _Mesh, conservative: bool) -> _Floats: ...
+def transfer(values: _Floats, old: _Mesh, new: _Mesh, conservative: bool, threads: int | None) -> _Floats: ...
+def interpolate(mesh: _Mesh, fields: _Floats, points: _Floats, cubic: bool) -> tuple[_Floats | None, int]: ...
 def stencils(
     mesh: _Mesh,
     kind: str,
@@ -63,6 +69,7 @@ def run(
     set: list[str],
     out: Path,
     resume: bool,
+    threads: int | None,
     told: Callable[[float, float, int], None] | None,
 ) -> tuple[BaseException | None, bool]: ...
 def equidistribute(density: _Density, cells: int, ends: tuple[float, float], settings: str) -> _Floats: ...

@@ -71,8 +71,8 @@ class Frame:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh, of kinds in two dimensions, closing nodes of periodic axes included."""
-        return Mesh(self.x, self.y, **self._domain)
+        """The mesh, in the plane or of a line, closing nodes of periodic axes included."""
+        return Mesh(self.x, self.y if len(self.shape) == 2 else None, **self._domain)
 
     @property
     def names(self) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeAlias
 
@@ -10,15 +11,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _driftmesh, _toml
-from ._arrays import finite, positive
+from ._arrays import Floats, count, finite, positive, real, scalar
+from ._arrays import threads as _threads
+from ._boxes import check_box, images, periodic_values
 from ._toml import Kind
 from .mesh import Mesh
 from .methods import Fixed, Schwarz, Stochastic, Whole
 from .monitors import Arclength, Given, RootGradient
-from .remap import periodic_values
 
 #: Where a mesh should be fine: a monitor of u, the density itself, or a function of mesh and u that gives it.
 Monitor: TypeAlias = "Arclength | RootGradient | Given | ArrayLike | Callable[[Mesh, Any], ArrayLike]"
+
+#: τ in units of time or in time steps, or chosen.
+Relaxation: TypeAlias = "float | Mapping[str, float] | Literal['auto']"
+
+#: Why a mesh is not at rest on its data.
+_UNREST = {
+    "jump": "the data jump, and no mesh resolves a jump; the mesh has its thinnest cells there",
+    "restless": "the mesh does not come to rest on the data, which may be too thin for its cells or noisy; it is the "
+    "last one of many steps",
+}
+_READ_ONLY = ("method", "relaxation", "prediction", "form", "safety", "threads", "last")
 
 
 class MeshGenerator:
@@ -26,23 +39,28 @@ class MeshGenerator:
 
     Args:
         monitor: :class:`RootGradient` (the default, with nothing to set), :class:`Arclength` or :class:`Given`; or the
-            density itself, an array of shape (nx + 1, ny + 1); or a function of mesh and u that returns it. A density
+            density itself, an array of the shape of the mesh; or a function of mesh and u that returns it. A density
             is positive, and only its ratios matter.
-        method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`.
+        method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`. Meshes of lines
+            take :class:`Whole` and :class:`Fixed`.
         relaxation: τ, the time that the mesh takes to follow the density. ``"auto"`` chooses it from how the mesh
             moves. ``{"steps": 25}`` gives it in time steps; ``{"steps": 40, "prediction": 0.2}`` also starts each step
             from where the nodes would be if they went on, with a velocity that learns a fifth of each correction.
         form: ``"conservative"``, stable for any density, or ``"gradient"``, as published.
+        prediction: The share γ of each correction that the velocity of a node learns, from 0 to ½, beside
+            ``relaxation={"steps": …}``. With ``"auto"`` it is chosen, too; a τ in units of time has none.
+        safety: How far a step that would fold the mesh is tried again, as in ``[safety]`` of a study:
+            ``{"substeps": 8, "smoothing": 8}`` does it in 2, 4 and 8 parts, then with 2, 4 and 8 further passes of the
+            filter over the density. 1 substep and 0 passes try nothing.
+        threads: Number of threads; all cores where nothing is said. Meshes have the same bits for any number.
 
     Raises:
         ValueError: Settings out of range.
 
-    A step that would fold the mesh is done again in 2, 4 and 8 parts, then with a smoother density; ``last`` counts
-    these retries.
-
     Use one generator for each run: it remembers the velocity of the mesh for as long as each step starts from the mesh
     that the last one led to, and counts the steps for the random numbers of :class:`Stochastic`. A copy or an unpickled
-    generator begins anew. ``monitor`` may be set between steps; ``method``, ``relaxation`` and ``form`` are read-only.
+    generator goes on from there, and its steps have the same bits. ``monitor`` may be set between steps, which begins
+    anew; all else is read-only. ``last["retries"]`` counts steps that were tried again.
 
     >>> import numpy as np
     >>> from driftmesh import Arclength, Mesh, MeshGenerator
@@ -58,8 +76,12 @@ class MeshGenerator:
         self,
         monitor: Monitor | None = None,
         method: Whole | Stochastic | Schwarz | Fixed | None = None,
-        relaxation: float | Mapping[str, float] | Literal["auto"] = "auto",
+        relaxation: Relaxation = "auto",
         form: Literal["conservative", "gradient"] = "conservative",
+        *,
+        prediction: float | None = None,
+        safety: Mapping[str, int] | None = None,
+        threads: int | None = None,
     ) -> None:
         method = Whole() if method is None else method
         if not isinstance(method, (Whole, Stochastic, Schwarz, Fixed)):
@@ -71,12 +93,15 @@ class MeshGenerator:
         if relaxation is None:
             raise ValueError('`relaxation` is None, but must be "auto", a time, or {"steps": …}')
         self.monitor: Monitor = RootGradient() if monitor is None else monitor
-        self._method, self._relaxation, self._form = method, relaxation, form
+        self._method, self._form = method, form
+        self._relaxation = _relaxation(relaxation, prediction)
+        self._safety = _safety(safety)
+        self._threads = _threads(threads)
         self._begin()
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name != "monitor" and not name.startswith("_"):
-            kept = "can only be read" if name in ("method", "relaxation", "form", "last") else "is no attribute"
+            kept = "can only be read" if name in _READ_ONLY else "is no attribute"
             raise AttributeError(f"`{name}` {kept}; make a new MeshGenerator with other settings, or set `monitor`")
         super().__setattr__(name, value)
 
@@ -86,28 +111,38 @@ class MeshGenerator:
         return self._method
 
     @property
-    def relaxation(self) -> float | Mapping[str, float] | Literal["auto"]:
-        """How long the mesh takes to follow, as it was given."""
+    def relaxation(self) -> Relaxation:
+        """How long the mesh takes to follow; in steps, with the prediction."""
         return self._relaxation
+
+    @property
+    def prediction(self) -> float | None:
+        """γ, the share of each correction that the velocity of a node learns; None where it is chosen with τ."""
+        if isinstance(self._relaxation, Mapping):
+            return float(self._relaxation.get("prediction", 0.0))
+        return None if isinstance(self._relaxation, str) else 0.0
 
     @property
     def form(self) -> Literal["conservative", "gradient"]:
         """Form of the mesh equation."""
         return self._form
 
-    def _begin(self) -> None:
-        monitor = self.monitor if isinstance(self.monitor, Kind) else Given()
-        mesh = {"generator": self._method._table(), "relaxation": self._relaxation, "form": self._form}
-        self._native = _driftmesh.Generator(_toml.document({"monitor": monitor._table(), "mesh": mesh}))
-        self._made_for = monitor
-        self._told = "{}"
+    @property
+    def safety(self) -> dict[str, int]:
+        """How far a step that fails is tried again."""
+        return dict(self._safety)
+
+    @property
+    def threads(self) -> int | None:
+        """Number of threads; None for all cores."""
+        return self._threads
 
     def step(self, mesh: Mesh, u: ArrayLike | None, dt: float) -> Mesh:
         """The mesh at the end of a time step.
 
         Args:
-            mesh: The mesh now, of a box.
-            u: The solution on it, shape (nx + 1, ny + 1); None where the monitor is a density.
+            mesh: The mesh now, of a box or a line.
+            u: The solution on it, of its shape; None where the monitor is a density.
             dt: Length of the step, in the unit of ``relaxation``, above 0.
 
         Raises:
@@ -122,25 +157,84 @@ class MeshGenerator:
         >>> MeshGenerator(monitor=1 + mesh.x).step(mesh, None, dt=0.1).quality().min_scaled_jacobian < 1
         True
         """
-        if not isinstance(mesh, Mesh):
-            raise ValueError(f"`mesh` is of type {type(mesh).__name__}, but must be a driftmesh.Mesh")
+        _check(mesh)
         dt = positive("dt", dt)
-        mesh._check_box()
-        if isinstance(self.monitor, Kind):
-            if self.monitor != self._made_for:
-                self._begin()
-            if u is None:
-                raise ValueError(f"`u` is None, but the monitor {self.monitor} looks at it")
-            name, values = "u", finite("u", u, mesh.shape)
-        else:
-            if not isinstance(self._made_for, Given):
-                self._begin()
-            given = self.monitor(mesh, u) if callable(self.monitor) else self.monitor
-            name, values = "density", finite("density", given, mesh.shape)
-        if isinstance(self._made_for, Given) and not (values > 0).all():
-            place = tuple(int(k) for k in np.argwhere(~(values > 0))[0])
-            raise ValueError(f"the density is {values[place]} at index {place}, but must be above 0")
-        nodes, self._told = self._native.step(mesh._given(), periodic_values(name, values, mesh), dt)
+        check_box(*mesh._given())
+        nodes, self._told = self._ready().step(mesh._given(), self._followed(mesh, u), dt)
+        return Mesh._of(nodes, mesh)
+
+    def density(self, mesh: Mesh, u: ArrayLike | None) -> Floats:
+        """ρ at the nodes: where the monitor wants the mesh to be fine.
+
+        It is what a study computes from the unknown that it follows, smoothed as the monitor says; a study whose fronts
+        run into states that grow by themselves bounds the cells ahead of them, too. A step from rest follows this
+        density, later ones a mean with the density that moved the mesh last.
+
+        Args:
+            mesh: The mesh, of any shape.
+            u: The solution on it, of its shape; None where the monitor is a density.
+
+        Returns:
+            ρ above 0, of the shape of the mesh. Only its ratios matter.
+
+        Raises:
+            ValueError: Wrong shapes or values.
+            driftmesh.errors.MeshFolded: A cell is folded.
+
+        >>> from driftmesh import Arclength, Mesh, MeshGenerator
+        >>> mesh = Mesh.uniform(cells=(8, 8))
+        >>> monitor = Arclength(absolute=2, smoothing=0)
+        >>> rho = MeshGenerator(monitor=monitor).density(mesh, 2 * mesh.x)  # √(1 + 2·2²) = 3
+        >>> round(float(rho[4, 4]), 12)
+        3.0
+        """
+        _check(mesh)
+        return self._ready().density(mesh._given(), self._followed(mesh, u))
+
+    def adapt(self, mesh: Mesh, u0: ArrayLike | Callable[..., ArrayLike] | None) -> Mesh:
+        """A mesh that rests on given data, as a study has it at its start.
+
+        It does steps from the mesh, each with the data at the nodes that the last one led to, until no node moves by
+        more than a small share of the shortest edge. ``method`` and ``relaxation`` do not matter. Meshes with more than
+        100 cells along an axis are adapted on half as many first. A study whose side values differ from its initial
+        solution starts with these on its sides: a ``u0`` that has them there gives the same mesh.
+
+        Args:
+            mesh: Where to begin, of a box or a line; a study begins with equal cells.
+            u0: A function of x and y, arrays of the same shape, on a line of x alone, that returns its values there; it
+                is called with the nodes of each mesh, those that left a periodic box by their images. Or values at the
+                nodes of ``mesh``, which are interpolated linearly. None where the monitor is a density.
+
+        Returns:
+            The mesh, on the same lattice and box. The next step from it begins at rest.
+
+        Raises:
+            ValueError: Wrong shapes or values.
+            driftmesh.errors.MeshFolded: The mesh is folded.
+            RuntimeError: The generator is still at work.
+
+        Warns:
+            RuntimeWarning: The mesh does not come to rest, and why.
+
+        >>> import numpy as np
+        >>> from driftmesh import Mesh, MeshGenerator
+        >>> mesh = MeshGenerator().adapt(Mesh.uniform(cells=40), lambda x: np.tanh(50 * (x - 0.5)))
+        >>> bool(np.diff(mesh.x).min() < 0.3 / 40)
+        True
+        """
+        _check(mesh)
+        check_box(*mesh._given())
+        if not callable(u0):
+            # looked at here, so that mistakes are named before anything is computed
+            self._followed(mesh, u0, mesh)
+
+        def follow(nodes: Floats) -> Floats:
+            on = Mesh._of(nodes, mesh)
+            return self._followed(on, _values(u0, mesh, on), mesh)
+
+        nodes, end = self._ready().adapt(mesh._given(), follow)
+        if end in _UNREST:
+            warnings.warn(_UNREST[end], RuntimeWarning, stacklevel=2)
         return Mesh._of(nodes, mesh)
 
     @property
@@ -151,6 +245,39 @@ class MeshGenerator:
         told: dict[str, Any] = json.loads(self._told)
         return told
 
+    def _wanted(self) -> Kind:
+        """The monitor of the library: a density that is given or computed here is its own."""
+        return self.monitor if isinstance(self.monitor, Kind) else Given()
+
+    def _begin(self) -> None:
+        mesh = {"generator": self._method._table(), "relaxation": self._relaxation, "form": self._form}
+        tables = {"monitor": self._wanted()._table(), "mesh": mesh, "safety": self._safety}
+        self._native = _driftmesh.Generator(_toml.document(tables), self._threads)
+        self._made_for = self._wanted()
+        self._told = "{}"
+
+    def _ready(self) -> _driftmesh.Generator:
+        """The native generator, made anew where the monitor is another one now."""
+        if self._wanted() != self._made_for:
+            self._begin()
+        return self._native
+
+    def _followed(self, mesh: Mesh, u: Any, start: Mesh | None = None) -> Floats:
+        """What the monitor looks at on a mesh: u, or the density; an array of densities is that of the start."""
+        if isinstance(self.monitor, Kind):
+            if u is None:
+                raise ValueError(f"`u` is None, but the monitor {self.monitor} looks at it")
+            name = "u" if start is None else "u0"
+            values = finite(name, u, mesh.shape)
+        elif callable(self.monitor):
+            name, values = "density", finite("density", self.monitor(mesh, u), mesh.shape)
+        else:
+            name, values = "density", finite("density", _values(self.monitor, start or mesh, mesh), mesh.shape)
+        if isinstance(self._wanted(), Given) and not (values > 0).all():
+            place = tuple(int(k) for k in np.argwhere(~(values > 0))[0])
+            raise ValueError(f"the density is {values[place]} at index {place}, but must be above 0")
+        return periodic_values(name, values, mesh.periodic)
+
     def __repr__(self) -> str:
         monitor = self.monitor if isinstance(self.monitor, Kind) else "a density"
         return (
@@ -159,4 +286,53 @@ class MeshGenerator:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.monitor, self._method, self._relaxation, self._form)
+        settings = {"safety": self._safety, "threads": self._threads}
+        given = (self.monitor, self._method, self._relaxation, self._form)
+        return _made, (type(self), given, settings), (self._ready().memory(), self._told)
+
+    def __setstate__(self, state: tuple[bytes, str]) -> None:
+        memory, self._told = state
+        self._native.remember(memory)
+
+
+def _made(kind: type[MeshGenerator], given: tuple[Any, ...], settings: dict[str, Any]) -> MeshGenerator:
+    """A generator from its pickled settings."""
+    return kind(*given, **settings)
+
+
+def _check(mesh: Mesh) -> None:
+    if not isinstance(mesh, Mesh):
+        raise ValueError(f"`mesh` is of type {type(mesh).__name__}, but must be a driftmesh.Mesh")
+
+
+def _values(u: Any, start: Mesh, on: Mesh) -> Any:
+    """A function of the place, or values at the nodes of the mesh at the start, at the nodes of another one."""
+    if u is None or on is start:
+        return u
+    if callable(u):
+        values = real("u0", u(*images(*on._given())))
+        return np.full(on.shape, values) if values.shape == () else values
+    return start.interpolate(finite("u0", u, start.shape), *np.moveaxis(on._nodes, -1, 0))
+
+
+def _relaxation(relaxation: Relaxation, prediction: float | None) -> Relaxation:
+    """τ and γ as a study writes them."""
+    if prediction is None:
+        return relaxation
+    if not isinstance(relaxation, Mapping):
+        raise ValueError(f'`prediction` is {prediction}, but needs relaxation={{"steps": …}}, not {relaxation!r}')
+    if "prediction" in relaxation:
+        raise ValueError(f"`prediction` is {prediction}, but `relaxation` has one, too: {dict(relaxation)}")
+    return {**relaxation, "prediction": scalar("prediction", prediction)}
+
+
+def _safety(given: Mapping[str, int] | None) -> dict[str, int]:
+    """How far steps are tried again, with defaults in place of what is not said."""
+    limits = {"substeps": 8, "smoothing": 8}
+    if not isinstance(given, Mapping | None):
+        raise ValueError(f"`safety` is {given!r}, but must be a dict such as {limits}")
+    for name, value in (given or {}).items():
+        if name not in limits:
+            raise ValueError(f"`safety` has the key {name!r}, but must have substeps and smoothing alone")
+        limits[name] = count(f"safety.{name}", value)
+    return limits

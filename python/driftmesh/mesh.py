@@ -1,54 +1,30 @@
-"""Meshes and their quality."""
+"""Meshes of lines and of the plane, and their quality."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _driftmesh
-from ._arrays import Floats, count, finite, pair, scalar
+from . import _boxes, _driftmesh, _exchange, _points
+from ._arrays import Floats, count, finite
+from .quality import Quality
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: A distance below this share of the size of the box is taken for round-off of positions.
-ROUNDING = 1e-9
-
-
-@dataclass(frozen=True)
-class Quality:
-    """How good a mesh is.
-
-    Attributes:
-        q_max: Largest Q over the cells; Q = ½ tr(JᵀJ)/√det(JᵀJ) is 1 for a square and grows with stretching and shear.
-        q_mean: Mean Q over the cells.
-        min_scaled_jacobian: Smallest corner Jacobian over that of the uniform mesh; positive as long as no cell is
-            folded.
-        equidistribution: max/mean of density × area over the cells; 1 is perfect.
-
-    >>> from driftmesh import Mesh
-    >>> Mesh.uniform(cells=(4, 4)).quality()
-    Quality(q_max=1.0, q_mean=1.0, min_scaled_jacobian=1.0, equidistribution=1.0)
-    """
-
-    q_max: float
-    q_mean: float
-    min_scaled_jacobian: float
-    equidistribution: float
-
 
 class Mesh:
-    """A mesh of quadrilaterals over a box or another shape: the position of every node of a lattice.
+    """A mesh of intervals or quadrilaterals over a box or another shape: the position of every node of a lattice.
 
     Args:
-        x: Positions of the nodes, shape (nx + 1, ny + 1), nx and ny at least 2, first index along ξ.
-        y: The same.
-        lower: Lower corner of the box; by default that of the smallest box around the nodes. Give it where the first
-            nodes of a periodic axis have moved away from the corner.
+        x: Positions of the nodes, shape (nx + 1, ny + 1), nx and ny at least 2, first index along ξ; for a line shape
+            (nx + 1,), with x rising.
+        y: The same; left out for a line.
+        lower: Lower corner of the box, one number an axis; by default that of the smallest box around the nodes. Give
+            it where the first nodes of a periodic axis have moved away from the corner.
         upper: Upper corner of the box; by default that of the smallest box around the nodes, and along a periodic axis
             as far from ``lower`` as the last nodes are from the first.
         periodic: Which axes wrap around. The last node of such an axis is its first one, shifted by the box.
@@ -57,58 +33,56 @@ class Mesh:
         ValueError: Shapes that differ, values that are not finite, a box without extent, last nodes of a periodic axis
             that are not its first ones shifted by the box, or a mesh whose second index goes along x.
 
-    A mesh does not change; :meth:`moved` gives another one. It may have folded cells: :meth:`quality` tells, and
-    functions that need a mesh without them raise :class:`driftmesh.errors.MeshFolded`.
+    One number for ``lower``, ``upper`` or ``periodic`` stands for every axis. A mesh does not change; :meth:`moved`
+    gives another one. It may have folded cells: :meth:`quality` tells, and functions that need a mesh without them
+    raise :class:`driftmesh.errors.MeshFolded`.
 
     >>> from driftmesh import Mesh
     >>> mesh = Mesh.uniform(cells=(4, 2), upper=(1, 3))
     >>> mesh.x.shape, mesh.y[1, 1]
     ((5, 3), np.float64(1.5))
+    >>> Mesh([0, 0.5, 0.75, 1])
+    <Mesh of 3 cells, lower=(0.0,), upper=(1.0,)>
     """
 
     __slots__ = ("_lower", "_nodes", "_periodic", "_upper")
 
     _nodes: Floats
-    _lower: tuple[float, float]
-    _upper: tuple[float, float]
-    _periodic: tuple[bool, bool]
+    _lower: tuple[float, ...]
+    _upper: tuple[float, ...]
+    _periodic: tuple[bool, ...]
 
     def __init__(
         self,
         x: ArrayLike,
-        y: ArrayLike,
+        y: ArrayLike | None = None,
         *,
-        lower: Sequence[float] | None = None,
-        upper: Sequence[float] | None = None,
-        periodic: Sequence[bool] = (False, False),
+        lower: float | Sequence[float] | None = None,
+        upper: float | Sequence[float] | None = None,
+        periodic: bool | Sequence[bool] = False,
     ) -> None:
         first = finite("x", x)
-        if first.ndim != 2 or min(first.shape) < 3:
-            raise ValueError(
-                f"`x` has shape {first.shape}, but must have two axes of 3 nodes or more: (nx + 1, ny + 1)"
-            )
-        second = finite("y", y, first.shape, "`x`")
-        wraps = _flags(periodic)
-        nodes = np.stack([first, second], axis=-1)
-        low = tuple(nodes.min(axis=(0, 1)).tolist()) if lower is None else _corner("lower", lower)
-        high = tuple(nodes.max(axis=(0, 1)).tolist()) if upper is None else _corner("upper", upper)
-        for axis in range(2):
-            if wraps[axis]:
-                start, end = np.take(nodes, 0, axis)[:, axis], np.take(nodes, -1, axis)[:, axis]
-                low = _with(low, axis, float(start.min())) if lower is None else low
-                high = _with(high, axis, low[axis] + float((end - start).mean())) if upper is None else high
-        _refuse_mirrored(nodes)
-        _close(nodes, low, high, wraps)
+        dimensions = 1 if y is None else 2
+        if first.ndim != dimensions or min(first.shape) < 3:
+            axes = "one axis of 3 nodes or more: (nx + 1,), or `y` beside it"
+            axes = axes if y is None else "two axes of 3 nodes or more: (nx + 1, ny + 1); leave `y` out for a line"
+            raise ValueError(f"`x` has shape {first.shape}, but must have {axes}")
+        coordinates = [first] if y is None else [first, finite("y", y, first.shape, "`x`")]
+        wraps = _boxes.flags(periodic, dimensions)
+        nodes = np.stack(coordinates, axis=-1)
+        low, high = _boxes.box(nodes, lower, upper, wraps)
+        _boxes.refuse_mirrored(nodes)
+        _boxes.close(nodes, low, high, wraps)
         # the checks of the library: a box with an extent
-        _driftmesh.uniform((nodes.shape[0] - 1, nodes.shape[1] - 1), low, high, wraps)
+        _driftmesh.uniform([n - 1 for n in first.shape], low, high, wraps)
         self._set(nodes, low, high, wraps)
 
     def _set(
         self,
         nodes: Floats,
-        lower: tuple[float, float],
-        upper: tuple[float, float],
-        periodic: tuple[bool, bool],
+        lower: tuple[float, ...],
+        upper: tuple[float, ...],
+        periodic: tuple[bool, ...],
     ) -> None:
         nodes.flags.writeable = False
         self._nodes, self._lower, self._upper, self._periodic = nodes, lower, upper, periodic
@@ -123,15 +97,15 @@ class Mesh:
     @classmethod
     def uniform(
         cls,
-        cells: Sequence[int] | NDArray[np.integer[Any]],
-        lower: Sequence[float] = (0.0, 0.0),
-        upper: Sequence[float] = (1.0, 1.0),
-        periodic: Sequence[bool] = (False, False),
+        cells: int | Sequence[int] | NDArray[np.integer[Any]],
+        lower: float | Sequence[float] = 0.0,
+        upper: float | Sequence[float] = 1.0,
+        periodic: bool | Sequence[bool] = False,
     ) -> Mesh:
         """The mesh of equal cells.
 
         Args:
-            cells: (nx, ny), cells along ξ and η, at least 2 each.
+            cells: (nx, ny), cells along ξ and η, or one number for a line; at least 2 along bounded axes.
             lower: Lower corner of the box, in the unit of length.
             upper: Upper corner.
             periodic: Which axes wrap around.
@@ -142,55 +116,69 @@ class Mesh:
         >>> from driftmesh import Mesh
         >>> Mesh.uniform(cells=(40, 20)).x.shape
         (41, 21)
+        >>> Mesh.uniform(cells=80, upper=2.0).x[:3]
+        array([0.   , 0.025, 0.05 ])
         """
-        nx, ny = (count("cells", n) for n in pair("cells", cells))
-        low, high, wraps = _corner("lower", lower), _corner("upper", upper), _flags(periodic)
+        dimensions = 1 if np.size(cells) == 1 else 2
+        numbers = [count("cells", n) for n in _boxes.each_axis("cells", cells, dimensions)]
+        low, high = _boxes.corner("lower", lower, dimensions), _boxes.corner("upper", upper, dimensions)
+        wraps = _boxes.flags(periodic, dimensions)
         mesh = cls.__new__(cls)
-        mesh._set(_driftmesh.uniform((nx, ny), low, high, wraps), low, high, wraps)
+        mesh._set(_driftmesh.uniform(numbers, low, high, wraps), low, high, wraps)
         return mesh
 
     @property
     def x(self) -> Floats:
-        """x of the nodes, shape (nx + 1, ny + 1): a view that cannot be written."""
+        """x of the nodes, shape (nx + 1, ny + 1), of a line (nx + 1,): a view that cannot be written."""
         view: Floats = self._nodes[..., 0]
         return view
 
     @property
     def y(self) -> Floats:
-        """y of the nodes, shape (nx + 1, ny + 1): a view that cannot be written."""
+        """y of the nodes, shape (nx + 1, ny + 1): a view that cannot be written.
+
+        Raises:
+            AttributeError: The mesh is a line, which has x alone.
+        """
+        if self.dimensions == 1:
+            raise AttributeError("`y` is no attribute of a mesh of a line, whose nodes have x alone")
         view: Floats = self._nodes[..., 1]
         return view
 
     @property
-    def shape(self) -> tuple[int, int]:
-        """(nx + 1, ny + 1): the shape of every array over the mesh."""
-        n, m, _ = self._nodes.shape
-        return n, m
+    def dimensions(self) -> int:
+        """1 for a line, 2 in the plane."""
+        return len(self._periodic)
 
     @property
-    def cells(self) -> tuple[int, int]:
-        """(nx, ny)."""
-        n, m = self.shape
-        return n - 1, m - 1
+    def shape(self) -> tuple[int, ...]:
+        """(nx + 1, ny + 1), of a line (nx + 1,): the shape of every array over the mesh."""
+        return self._nodes.shape[:-1]
 
     @property
-    def lower(self) -> tuple[float, float]:
-        """Lower corner of the box."""
+    def cells(self) -> tuple[int, ...]:
+        """(nx, ny), of a line (nx,)."""
+        return tuple(n - 1 for n in self.shape)
+
+    @property
+    def lower(self) -> tuple[float, ...]:
+        """Lower corner of the box, one entry an axis."""
         return self._lower
 
     @property
-    def upper(self) -> tuple[float, float]:
-        """Upper corner of the box."""
+    def upper(self) -> tuple[float, ...]:
+        """Upper corner of the box, one entry an axis."""
         return self._upper
 
     @property
-    def periodic(self) -> tuple[bool, bool]:
+    def periodic(self) -> tuple[bool, ...]:
         """Which axes wrap around."""
         return self._periodic
 
     @property
     def areas(self) -> Floats:
-        """Area of the dual cell of each node, in the square of the unit of length, shape (nx + 1, ny + 1).
+        """Area of the dual cell of each node, in the square of the unit of length, shape (nx + 1, ny + 1); on a line
+        its length, shape (nx + 1,).
 
         ``(u * mesh.areas).sum()`` is the integral of u that a conservative :func:`transfer` keeps. The last nodes of a
         periodic axis are its first ones: their area is 0.
@@ -201,12 +189,107 @@ class Mesh:
         """
         return _driftmesh.areas(self._given())
 
-    def moved(self, x: ArrayLike, y: ArrayLike) -> Mesh:
+    @property
+    def jacobian(self) -> Floats:
+        """J = x_ξ y_η − x_η y_ξ at the nodes, ξ and η in the unit square, shape (nx + 1, ny + 1); x_ξ on a line.
+
+        By the differences of :func:`gradient`, of second order, in the square of the unit of length: large where cells
+        are wide, and on a uniform mesh the area of the box.
+
+        >>> from driftmesh import Mesh
+        >>> float(Mesh.uniform(cells=(8, 8), upper=(2, 3)).jacobian[4, 4])
+        6.0
+        """
+        from .differences import tangents
+
+        determinants: Floats = np.linalg.det(tangents(self))
+        return determinants
+
+    def velocity(self, old: Mesh, dt: float) -> Floats:
+        """(x_t, y_t): how fast each node moved from an earlier mesh to this one, shape (2, nx + 1, ny + 1).
+
+        ::
+
+            x_t = (x − x_old)/dt
+
+        On a line the shape is (1, nx + 1). Along a periodic axis a node goes the shorter way around, so that nodes
+        which left the box at one end and were put back at the other have not jumped.
+
+        Args:
+            old: The mesh before, over the same lattice and box.
+            dt: The time between both, above 0.
+
+        Raises:
+            ValueError: Another lattice or box, or ``dt`` not above 0.
+
+        >>> from driftmesh import Mesh
+        >>> old = Mesh.uniform(cells=(4, 4))
+        >>> x_t, y_t = old.moved(old.x**2, old.y).velocity(old, dt=0.5)
+        >>> float(x_t[2, 0])  # from 0.5 to 0.25
+        -0.5
+        """
+        return _points.velocity(self, old, dt)
+
+    def interpolate(self, u: ArrayLike, x: ArrayLike, y: ArrayLike | None = None, *, order: int = 1) -> Floats:
+        """Values of nodal fields at any points.
+
+        ::
+
+            u(x) = Σ_k N_k(ξ) u_k  where  x = Σ_k N_k(ξ) x_k
+
+        with the products N_k of Lagrange's polynomials along ξ and η. Functions that are linear in x and y are exact on
+        any mesh.
+
+        Args:
+            u: One field of shape (nx + 1, ny + 1), on a line (nx + 1,), or several with further axes before these.
+            x: Where values are wanted, of any shape. Along a periodic axis any image of a point will do.
+            y: The same, of a shape that can be broadcast with that of ``x``; left out on a line.
+            order: 1 takes N_k to be linear along each axis of a cell: of second order, and within the range of the
+                values at the corners. 3 takes cubics through four nodes: of fourth order where the mesh is smooth, and
+                it may leave the range of the values.
+
+        Returns:
+            The values, with the further axes of ``u`` before those of the points.
+
+        Raises:
+            ValueError: Shapes that do not fit, values that are not finite, or a point outside of the mesh, of which the
+                first one is named.
+            driftmesh.errors.MeshFolded: A cell is folded.
+
+        >>> from driftmesh import Mesh
+        >>> mesh = Mesh.uniform(cells=(4, 4))
+        >>> mesh.interpolate(mesh.x * mesh.y, [0.3, 1.0], 0.5)
+        array([0.15, 0.5 ])
+        """
+        return _points.interpolate(self, u, self._coordinates(x, y), order)
+
+    def sample(self, u: ArrayLike, shape: int | Sequence[int], *, order: int = 1) -> Floats:
+        """Values of nodal fields on the regular grid of a number of points along each axis of the box.
+
+        Args:
+            u: As of :meth:`interpolate`.
+            shape: Numbers of points along x and y, 2 or more; one number for both. They are those of
+                ``np.linspace(lower, upper, n)``. The mesh must fill its box.
+            order: As of :meth:`interpolate`.
+
+        Returns:
+            The values, with the axes of the grid last, first index along x; raises as :meth:`interpolate` does.
+
+        >>> from driftmesh import Mesh
+        >>> mesh = Mesh.uniform(cells=(4, 4))
+        >>> mesh.moved(mesh.x**2, mesh.y).sample(mesh.x**2, (3, 2))
+        array([[0. , 0. ],
+               [0.5, 0.5],
+               [1. , 1. ]])
+        """
+        return _points.sample(self, u, shape, order)
+
+    def moved(self, x: ArrayLike, y: ArrayLike | None = None) -> Mesh:
         """The same lattice and box with other positions.
 
         Args:
-            x: Positions of the nodes, shape (nx + 1, ny + 1).
-            y: The same.
+            x: Positions of the nodes, shape (nx + 1, ny + 1), of a line (nx + 1,).
+            y: The same; left out for a line.
 
         Raises:
             ValueError: Another shape, values that are not finite, or last nodes of a periodic axis that are not its
@@ -217,15 +300,16 @@ class Mesh:
         >>> mesh.moved(mesh.x**2, mesh.y).x[2, 0]
         np.float64(0.25)
         """
-        nodes = np.stack([finite("x", x, self.shape), finite("y", y, self.shape)], axis=-1)
-        _close(nodes, self._lower, self._upper, self._periodic)
+        given = zip("xy", self._coordinates(x, y))
+        nodes = np.stack([finite(name, values, self.shape) for name, values in given], axis=-1)
+        _boxes.close(nodes, self._lower, self._upper, self._periodic)
         return self._of(nodes, self)
 
     def quality(self, density: ArrayLike | None = None) -> Quality:
         """How good the mesh is.
 
         Args:
-            density: ρ at the nodes, shape (nx + 1, ny + 1), for ``equidistribution``; by default ρ = 1.
+            density: ρ at the nodes, of the shape of the mesh, for ``equidistribution``; by default ρ = 1.
 
         Raises:
             ValueError: Another shape, or a density that is not positive everywhere.
@@ -241,7 +325,8 @@ class Mesh:
         return Quality(*_driftmesh.quality(self._given(), rho))
 
     def to_meshio(self, **fields: ArrayLike) -> Any:
-        """The mesh as a ``meshio.Mesh`` of quadrilaterals, with nodal fields by name, each of shape (nx + 1, ny + 1).
+        """The mesh as a ``meshio.Mesh`` of quadrilaterals or lines, with nodal fields by name, each of the shape of the
+        mesh.
 
         Raises:
             ImportError: meshio is not there.
@@ -251,12 +336,10 @@ class Mesh:
         >>> mesh.to_meshio(u=mesh.x).cells_dict["quad"].shape
         (16, 4)
         """
-        meshio = _extra("meshio")
-        data = {name: finite(name, values, self.shape).ravel() for name, values in fields.items()}
-        return meshio.Mesh(self._points(), [("quad", self._quads())], point_data=data)
+        return _exchange.to_meshio(self, fields)
 
     def to_pyvista(self, **fields: ArrayLike) -> Any:
-        """The mesh as a ``pyvista.StructuredGrid``, with nodal fields by name, each of shape (nx + 1, ny + 1).
+        """The mesh as a ``pyvista.StructuredGrid``, with nodal fields by name, each of the shape of the mesh.
 
         Raises:
             ImportError: pyvista is not there.
@@ -266,15 +349,11 @@ class Mesh:
         >>> mesh.to_pyvista(u=mesh.x).n_cells
         16
         """
-        pyvista = _extra("pyvista")
-        grid = pyvista.StructuredGrid(self.x[..., None], self.y[..., None], np.zeros((*self.shape, 1)))
-        for name, values in fields.items():
-            # its points go along the first axis first
-            grid.point_data[name] = finite(name, values, self.shape).ravel(order="F")
-        return grid
+        return _exchange.to_pyvista(self, fields)
 
     def plot(self, u: ArrayLike | None = None, ax: Axes | None = None) -> Axes:
-        """Draws the mesh, over colours for u of shape (nx + 1, ny + 1) if it is given. Needs matplotlib.
+        """Draws the mesh over colours for u of its shape, if that is given; a line as u over its nodes. Needs
+        matplotlib.
 
         Raises:
             ImportError: matplotlib is not there.
@@ -288,31 +367,15 @@ class Mesh:
 
         return plot.mesh(self, None if u is None else finite("u", u, self.shape), ax)
 
-    def _given(self) -> tuple[Floats, tuple[float, float], tuple[float, float], tuple[bool, bool]]:
+    def _coordinates(self, x: ArrayLike, y: ArrayLike | None) -> list[ArrayLike]:
+        """As many as there are dimensions."""
+        if (y is None) != (self.dimensions == 1):
+            rule = "is missing: this mesh lies in the plane" if y is None else "is given, but this mesh is a line"
+            raise ValueError(f"`y` {rule}")
+        return [x] if y is None else [x, y]
+
+    def _given(self) -> tuple[Floats, tuple[float, ...], tuple[float, ...], tuple[bool, ...]]:
         return self._nodes, self._lower, self._upper, self._periodic
-
-    def _points(self) -> Floats:
-        points = np.zeros((self._nodes.shape[0] * self._nodes.shape[1], 3))
-        points[:, :2] = self._nodes.reshape(-1, 2)
-        return points
-
-    def _quads(self) -> Any:
-        k = np.arange(self.shape[0] * self.shape[1]).reshape(self.shape)
-        return np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], axis=-1).reshape(-1, 4)
-
-    def _check_box(self) -> None:
-        """Refuses a mesh whose bounded sides do not lie on its box: a generator moves nodes along straight sides."""
-        for axis, name in enumerate("xy"):
-            slack = ROUNDING * (self._upper[axis] - self._lower[axis])
-            for end, wall in ((0, self._lower[axis]), (-1, self._upper[axis])):
-                side = np.take(self._nodes, end, axis)[:, axis]
-                off = np.abs(side - wall)
-                if not self._periodic[axis] and off.max() > slack:
-                    k = int(off.argmax())
-                    raise ValueError(
-                        f"the mesh does not fill its box: a node of the side {name} = {wall} is at {name} = {side[k]}; "
-                        "generators move meshes of rectangles"
-                    )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Mesh):
@@ -324,7 +387,8 @@ class Mesh:
 
     def __repr__(self) -> str:
         wraps = f", periodic={self._periodic}" if any(self._periodic) else ""
-        return f"<Mesh of {self.cells[0]} × {self.cells[1]} cells, lower={self._lower}, upper={self._upper}{wraps}>"
+        cells = " × ".join(str(n) for n in self.cells)
+        return f"<Mesh of {cells} cells, lower={self._lower}, upper={self._upper}{wraps}>"
 
     def __getstate__(self) -> tuple[Any, ...]:
         return self._given()
@@ -332,55 +396,3 @@ class Mesh:
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         self._set(*state)
 
-
-def _close(nodes: Floats, lower: tuple[float, ...], upper: tuple[float, ...], periodic: tuple[bool, ...]) -> None:
-    """Checks the closing nodes of periodic axes, and puts them a box further than the first ones to the last bit."""
-    for axis in range(2):
-        if periodic[axis]:
-            size = upper[axis] - lower[axis]
-            image = np.take(nodes, 0, axis)
-            image[:, axis] += size
-            last: tuple[Any, ...] = (-1,) if axis == 0 else (slice(None), -1)
-            off = np.abs(nodes[last] - image).max()
-            if off > ROUNDING * size:
-                raise ValueError(
-                    f"axis {axis} is periodic, but its last nodes are not the first ones a box of {size} further"
-                )
-            nodes[last] = image
-
-
-def _refuse_mirrored(nodes: Floats) -> None:
-    """Refuses a mesh all of whose cells are clockwise: its indices are the wrong way round."""
-    along, across = nodes[1:, 1:] - nodes[:-1, :-1], nodes[:-1, 1:] - nodes[1:, :-1]
-    if (along[..., 0] * across[..., 1] < along[..., 1] * across[..., 0]).all():
-        raise ValueError(
-            "the mesh is mirrored: its first index must go along x, its second one along y, shape (nx + 1, ny + 1), "
-            'as of np.meshgrid(x, y, indexing="ij")'
-        )
-
-
-def _with(corner: tuple[Any, ...], axis: int, value: float) -> tuple[Any, ...]:
-    return (value, corner[1]) if axis == 0 else (corner[0], value)
-
-
-def _corner(name: str, values: Sequence[float]) -> tuple[float, float]:
-    first, second = pair(name, values)
-    return scalar(name, first), scalar(name, second)
-
-
-def _flags(values: Sequence[bool]) -> tuple[bool, bool]:
-    first, second = pair("periodic", values)
-    for value in (first, second):
-        if isinstance(value, str) or value not in (False, True):
-            raise ValueError(f"`periodic` is {values!r}, but must be two truth values, one an axis")
-    return bool(first), bool(second)
-
-
-def _extra(name: str) -> Any:
-    """An optional package."""
-    import importlib
-
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise ImportError(f"this needs {name}: pip install 'driftmesh[{name}]'") from error

@@ -27,7 +27,12 @@ if TYPE_CHECKING:
 
 
 def mesh(of: Mesh, u: Floats | None, ax: Axes | None) -> Axes:
-    """The lines of a mesh, over colours."""
+    """The lines of a mesh, over colours; of a line its nodes, below u."""
+    if of.dimensions == 1:
+        ax = _axes(ax)
+        ax.plot(of.x, np.zeros(of.shape) if u is None else u, marker="|")
+        ax.set_xlabel("x")
+        return ax
     return _state(of.x, of.y, u, _axes(ax))
 
 

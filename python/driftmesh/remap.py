@@ -9,7 +9,9 @@ from numpy.typing import ArrayLike
 
 from . import _driftmesh
 from ._arrays import Floats, finite
-from .mesh import ROUNDING, Mesh
+from ._arrays import threads as _threads
+from ._boxes import ROUNDING, periodic_values
+from .mesh import Mesh
 
 
 def transfer(
@@ -17,19 +19,23 @@ def transfer(
     old: Mesh,
     new: Mesh,
     method: Literal["conservative", "interpolate"] = "conservative",
+    *,
+    threads: int | None = None,
 ) -> Floats:
     """Carries nodal values from one mesh to another over the same lattice and box.
 
     Args:
-        u: Shape (nx + 1, ny + 1), or (nx + 1, ny + 1, k) for k unknowns.
+        u: Shape (nx + 1, ny + 1), or (nx + 1, ny + 1, k) for k unknowns; on a line (nx + 1,), or (nx + 1, k).
         old: The mesh that u is on.
         new: The mesh that it is wanted on.
         method: ``"conservative"`` advects u through the moving faces of the dual cells. It keeps
             ``(u * mesh.areas).sum()`` to round-off and every value within the range of its neighbours. Where u is
             smooth it is of second order in the mean, and of first order at sides and extrema, hence in the maximum
             norm; it is not exact for linear u. Its cost grows with the distance between the meshes, which it covers in
-            steps of at most half a cell. ``"interpolate"`` takes u to be linear on two triangles for each cell: of
-            second order everywhere, exact for linear u, and fast over any distance, but it conserves nothing.
+            steps of at most half a cell. ``"interpolate"`` takes u to be linear on two triangles for each cell, on the
+            cells of a line: of second order everywhere, exact for linear u, and fast over any distance, but it
+            conserves nothing.
+        threads: Number of threads; all cores where nothing is said. The values have the same bits for any number.
 
     Returns:
         The values on the new mesh, shape as u.
@@ -48,12 +54,13 @@ def transfer(
     """
     _check(old, new, method)
     values = finite("u", u)
-    if values.shape[:2] != old.shape or values.ndim not in (2, 3):
+    number = _threads(threads)
+    if values.shape[: old.dimensions] != old.shape or values.ndim > old.dimensions + 1:
         raise ValueError(f"`u` has shape {values.shape}, but the mesh has shape {old.shape}")
     out = np.empty_like(values)
-    for c in np.ndindex(values.shape[2:]):
-        unknown = periodic_values("u", np.ascontiguousarray(values[(..., *c)]), old)
-        out[(..., *c)] = _driftmesh.transfer(unknown, old._given(), new._given(), method == "conservative")
+    for c in np.ndindex(values.shape[old.dimensions :]):
+        unknown = periodic_values("u", np.ascontiguousarray(values[(..., *c)]), old.periodic)
+        out[(..., *c)] = _driftmesh.transfer(unknown, old._given(), new._given(), method == "conservative", number)
     return out
 
 
@@ -72,32 +79,23 @@ def _check(old: Mesh, new: Mesh, method: str) -> None:
         _refuse_moved_sides(old, new)
 
 
-def periodic_values(name: str, values: Floats, mesh: Mesh) -> Floats:
-    """Refuses values whose closing nodes on periodic axes are not those of the first."""
-    for axis in range(2):
-        if mesh.periodic[axis]:
-            start, end = np.take(values, 0, axis), np.take(values, -1, axis)
-            off = np.abs(end - start)
-            if off.max() > 1e-6 * np.abs(values).max():
-                k = int(off.argmax())
-                raise ValueError(
-                    f"axis {axis} is periodic, but `{name}` is {start[k]} at its first node and {end[k]} at its last, "
-                    f"which is the same one (index {k} along the other axis)"
-                )
-    return values
-
-
 def _refuse_moved_sides(old: Mesh, new: Mesh) -> None:
     """Refuses meshes whose sides enclose something else: there is no value for what a side sweeps."""
-    size = (old.upper[0] - old.lower[0]) * (old.upper[1] - old.lower[1])
-    for axis in range(2):
+    size = np.prod(np.subtract(old.upper, old.lower))
+    for axis in np.flatnonzero(np.logical_not(old.periodic)):
         for end in (0, -1):
             before, after = np.take(old._nodes, end, axis), np.take(new._nodes, end, axis)
-            # of the quadrilateral between a segment before and after, twice the area by its diagonals
-            one, other = after[1:] - before[:-1], after[:-1] - before[1:]
-            swept = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
-            if not old.periodic[axis] and swept.max() > ROUNDING * size:
+            if _swept(before, after) > ROUNDING * size:
                 raise ValueError(
                     f"the {'last' if end else 'first'} side of axis {axis} differs between `old` and `new`, "
                     'so that no integral can be kept; use method="interpolate"'
                 )
+
+
+def _swept(before: Floats, after: Floats) -> float:
+    """The largest area, in one dimension the length, that a segment of a side sweeps."""
+    if before.ndim == 1:
+        return float(np.abs(after - before).max())
+    # of the quadrilateral between a segment before and after, twice the area by its diagonals
+    one, other = after[1:] - before[:-1], after[:-1] - before[1:]
+    return float(np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]).max())

@@ -23,6 +23,7 @@ else:
 
 from . import _driftmesh, _toml
 from ._arrays import Floats
+from ._arrays import threads as _threads
 from .errors import MeshError, RunWarning
 from .frames import Frame, frames_of
 from .mesh import Mesh
@@ -80,8 +81,8 @@ class Run:
 
     @property
     def mesh(self) -> Mesh:
-        """The last mesh, of kinds in two dimensions."""
-        return Mesh(self.final["x"], self.final["y"], **self._domain)
+        """The last mesh, in the plane or of a line."""
+        return Mesh(self.final["x"], self.final.get("y"), **self._domain)
 
     def __repr__(self) -> str:
         steps = self.summary.get("work", {}).get("steps")
@@ -144,6 +145,7 @@ def run(
     set: Mapping[str, Any] | None = None,
     progress: bool = False,
     resume: bool = False,
+    threads: int | None = None,
 ) -> Run:
     """Runs a study.
 
@@ -156,6 +158,7 @@ def run(
         resume: Goes on from the newest checkpoint in the directory; the results have the same bits as those of a run
             without interruption. Without a checkpoint the run begins at its start. A complete one is opened, or goes on
             to a later end where ``time.end`` is later now.
+        threads: Number of threads; all cores where nothing is said. The results have the same bits for any number.
 
     Raises:
         driftmesh.StudyError: A mistake in the study. The message shows its line with a caret and, for a key that does
@@ -184,7 +187,7 @@ def run(
     >>> result.summary["work"]["steps"], result.history["t"].shape
     (10, (11,))
     """
-    given, assignments = _text_of(study), _assignments(set)
+    given, assignments, number = _text_of(study), _assignments(set), _threads(threads)
     name = _driftmesh.check(*given, assignments)
     directory = Path("out") / name if out is None else Path(out)
     if not resume:
@@ -192,7 +195,7 @@ def run(
     # an exception leaves the bar where it is
     with _bar(name, progress) as told:
         try:
-            error, ended = _driftmesh.run(*given, assignments, directory, resume, told)
+            error, ended = _driftmesh.run(*given, assignments, directory, resume, number, told)
         except MeshError as failure:
             error, ended = failure, True
         _raise(error, ended, directory)

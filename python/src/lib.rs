@@ -5,7 +5,9 @@
 mod errors;
 mod generator;
 mod line;
+mod memory;
 mod mesh;
+mod mover;
 mod stencils;
 mod study;
 mod threads;
@@ -19,7 +21,7 @@ mod _driftmesh {
     #[pymodule_export]
     use super::line::{equidistribute, schwarz};
     #[pymodule_export]
-    use super::mesh::{areas, quality, transfer, uniform};
+    use super::mesh::{areas, interpolate, quality, transfer, uniform};
     #[pymodule_export]
     use super::stencils::stencils;
     #[pymodule_export]

@@ -50,7 +50,7 @@ fn compute<T: Send + 'static>(
     calls: (Caller, Calls),
     f: impl FnOnce() -> driftmesh::Result<T> + Send + 'static,
 ) -> PyResult<T> {
-    match interruptible(py, calls, f, || BRIEFLY, |_| Ok(()))? {
+    match interruptible(py, None, calls, f, || BRIEFLY, |_| Ok(()))? {
         Ended::Itself(result) => result.map_err(|error| plain(py, error)),
         Ended::Stopped(error, _) => Err(error),
     }

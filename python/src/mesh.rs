@@ -1,55 +1,80 @@
-//! Meshes as arrays of shape (nx + 1, ny + 1, 2), the closing nodes of periodic axes included.
+//! Meshes as arrays of shape (nx + 1, ny + 1, 2), of a line (nx + 1, 1), the closing nodes of periodic axes included.
 
 use crate::errors::plain;
-use crate::threads::compute;
+use crate::threads::{Threads, compute};
 use driftmesh::Failure;
-use driftmesh::geometry::{self, DualCells, Lattice, Mesh};
+use driftmesh::geometry::{self, Cells, Degree, DualCells, Interpolator, Lattice, Mesh};
 use driftmesh::study::check_memory;
-use numpy::ndarray::{Array2, Array3};
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::ndarray::{ArrayD, IxDyn};
+use numpy::{IntoPyArray, PyArrayDyn, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Memory for each node while a mesh is moved, about.
 const BYTES_PER_NODE: u128 = 1000;
 
+/// An array of a shape that depends on the number of dimensions.
+pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+
 /// A mesh as the package hands it over: contiguous nodes and the box.
 #[derive(FromPyObject)]
-pub struct Given<'py>(PyReadonlyArray3<'py, f64>, [f64; 2], [f64; 2], [bool; 2]);
+pub struct Given<'py>(PyReadonlyArrayDyn<'py, f64>, Vec<f64>, Vec<f64>, Vec<bool>);
+
+/// Calls a function for the dimension of a mesh: 1 for a line, 2 in the plane.
+macro_rules! in_dimensions {
+    ($given:expr, $call:ident($($argument:expr),*)) => {
+        match $given.dimensions() {
+            1 => $call::<1>($($argument),*),
+            _ => $call::<2>($($argument),*),
+        }
+    };
+}
+pub(crate) use in_dimensions;
 
 impl Given<'_> {
-    pub fn mesh(&self, py: Python<'_>) -> PyResult<Mesh<2>> {
+    pub fn dimensions(&self) -> usize {
+        self.3.len()
+    }
+
+    pub fn mesh<const D: usize>(&self, py: Python<'_>) -> PyResult<Mesh<D>> {
         let Self(nodes, lower, upper, periodic) = self;
-        let [n, m, _] = *nodes.shape() else { unreachable!("an array of three axes") };
-        let lattice = Lattice::new([n - 1, m - 1], *periodic).map_err(|error| plain(py, error))?;
-        let mesh = Mesh::uniform(lattice, *lower, *upper).map_err(|error| plain(py, error))?;
-        let closed = nodes.as_slice()?.as_chunks::<2>().0;
+        let cells: Vec<usize> = nodes.shape().iter().take(D).map(|n| n - 1).collect();
+        let lattice = Lattice::new(fixed(&cells), fixed(periodic)).map_err(|error| plain(py, error))?;
+        let mesh = Mesh::uniform(lattice, fixed(lower), fixed(upper)).map_err(|error| plain(py, error))?;
+        let closed = nodes.as_slice()?.as_chunks::<D>().0;
         mesh.moved(opened(&lattice, closed)).map_err(|error| plain(py, error))
     }
 }
 
+fn fixed<T: Copy, const D: usize>(values: &[T]) -> [T; D] {
+    std::array::from_fn(|d| values[d])
+}
+
 /// Values without the closing nodes of periodic axes.
-fn opened<T: Copy>(lattice: &Lattice<2>, closed: &[T]) -> Vec<T> {
-    let ([n, m], row) = (lattice.nodes(), lattice.cells()[1] + 1);
-    closed.chunks_exact(row).take(n).flat_map(|row| &row[..m]).copied().collect()
+fn opened<T: Copy, const D: usize>(lattice: &Lattice<D>, closed: &[T]) -> Vec<T> {
+    let size = lattice.cells().map(|n| n + 1);
+    let place = |node: [usize; D]| (0..D).fold(0, |place, d| place * size[d] + node[d]);
+    (0..lattice.len()).map(|k| closed[place(lattice.node(k))]).collect()
 }
 
 /// Nodal values of a mesh from an array of the same shape.
-pub fn nodal(mesh: &Mesh<2>, values: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<f64>> {
-    Ok(opened(mesh.lattice(), values.as_slice()?))
+pub fn nodal<const D: usize>(lattice: &Lattice<D>, values: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<f64>> {
+    Ok(opened(lattice, values.as_slice()?))
 }
 
 /// An array of shape cells + 1 from nodal values.
-pub fn array<'py>(py: Python<'py>, mesh: &Mesh<2>, values: &[f64]) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let [n, m] = mesh.lattice().cells().map(|n| n + 1);
-    let array = Array2::from_shape_vec((n, m), mesh.lattice().closed(values).into_owned());
-    Ok(array.map_err(|error| PyValueError::new_err(error.to_string()))?.into_pyarray(py))
+pub fn array<'py, const D: usize>(py: Python<'py>, lattice: &Lattice<D>, values: &[f64]) -> PyResult<Array<'py>> {
+    shaped(py, &lattice.cells().map(|n| n + 1), lattice.closed(values).into_owned())
 }
 
 /// The nodes of a mesh.
-pub fn nodes<'py>(py: Python<'py>, mesh: &Mesh<2>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let [n, m] = mesh.lattice().cells().map(|n| n + 1);
-    let array = Array3::from_shape_vec((n, m, 2), mesh.closed().into_owned().into_flattened());
+pub fn nodes<'py, const D: usize>(py: Python<'py>, mesh: &Mesh<D>) -> PyResult<Array<'py>> {
+    let shape: Vec<usize> = mesh.lattice().cells().into_iter().map(|n| n + 1).chain([D]).collect();
+    shaped(py, &shape, mesh.closed().into_owned().into_flattened())
+}
+
+fn shaped<'py>(py: Python<'py>, shape: &[usize], values: Vec<f64>) -> PyResult<Array<'py>> {
+    let array = ArrayD::from_shape_vec(IxDyn(shape), values);
     Ok(array.map_err(|error| PyValueError::new_err(error.to_string()))?.into_pyarray(py))
 }
 
@@ -57,60 +82,134 @@ pub fn nodes<'py>(py: Python<'py>, mesh: &Mesh<2>) -> PyResult<Bound<'py, PyArra
 #[pyfunction]
 pub fn uniform<'py>(
     py: Python<'py>,
-    cells: [usize; 2],
-    lower: [f64; 2],
-    upper: [f64; 2],
-    periodic: [bool; 2],
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let mesh = Lattice::new(cells, periodic).and_then(|lattice| {
-        check_memory(lattice.len() as u128, BYTES_PER_NODE, &cells)?;
-        Mesh::uniform(lattice, lower, upper)
-    });
-    nodes(py, &mesh.map_err(|error| plain(py, error))?)
+    cells: Vec<usize>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    periodic: Vec<bool>,
+) -> PyResult<Array<'py>> {
+    fn equal<'py, const D: usize>(
+        py: Python<'py>,
+        cells: &[usize],
+        [lower, upper]: [&[f64]; 2],
+        periodic: &[bool],
+    ) -> PyResult<Array<'py>> {
+        let mesh = Lattice::new(fixed(cells), fixed(periodic)).and_then(|lattice: Lattice<D>| {
+            check_memory(lattice.len() as u128, BYTES_PER_NODE, cells)?;
+            Mesh::uniform(lattice, fixed(lower), fixed(upper))
+        });
+        nodes(py, &mesh.map_err(|error| plain(py, error))?)
+    }
+    match cells.len() {
+        1 => equal::<1>(py, &cells, [&lower, &upper], &periodic),
+        _ => equal::<2>(py, &cells, [&lower, &upper], &periodic),
+    }
 }
 
 /// `q_max`, `q_mean`, `min_scaled_jacobian` and `equidistribution` of a mesh under a density.
 #[pyfunction]
-pub fn quality(py: Python<'_>, mesh: Given<'_>, density: PyReadonlyArray2<'_, f64>) -> PyResult<[f64; 4]> {
-    let mesh = mesh.mesh(py)?;
-    let rho = nodal(&mesh, &density)?;
-    let q = compute(py, move || geometry::quality(&mesh, &rho))?.map_err(|failure| plain(py, failure))?;
-    Ok([q.q_max, q.q_mean, q.min_scaled_jacobian, q.equidistribution])
+pub fn quality(py: Python<'_>, mesh: Given<'_>, density: PyReadonlyArrayDyn<'_, f64>) -> PyResult<[f64; 4]> {
+    fn of<const D: usize>(py: Python<'_>, mesh: &Given<'_>, density: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<[f64; 4]>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let mesh = mesh.mesh::<D>(py)?;
+        let rho = nodal(mesh.lattice(), density)?;
+        let q = compute(py, None, move || geometry::quality(&mesh, &rho))?.map_err(|failure| plain(py, failure))?;
+        Ok([q.q_max, q.q_mean, q.min_scaled_jacobian, q.equidistribution])
+    }
+    in_dimensions!(mesh, of(py, &mesh, &density))
 }
 
 /// Areas of the dual cells; closing nodes of periodic axes, which are counted at the other end, have none.
 #[pyfunction]
-pub fn areas<'py>(py: Python<'py>, mesh: Given<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let mesh = mesh.mesh(py)?;
-    let [n, m] = mesh.lattice().nodes();
-    let open = Array2::from_shape_vec((n, m), DualCells::new(&mesh).areas().to_vec());
-    let open = open.map_err(|error| PyValueError::new_err(error.to_string()))?;
-    let [rows, columns] = mesh.lattice().cells().map(|n| n + 1);
-    let closed = Array2::from_shape_fn((rows, columns), |place| open.get(place).copied().unwrap_or(0.0));
-    Ok(closed.into_pyarray(py))
+pub fn areas<'py>(py: Python<'py>, mesh: Given<'py>) -> PyResult<Array<'py>> {
+    fn of<'py, const D: usize>(py: Python<'py>, mesh: &Given<'py>) -> PyResult<Array<'py>>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let mesh = mesh.mesh::<D>(py)?;
+        let (nodes, size) = (mesh.lattice().nodes(), mesh.lattice().cells().map(|n| n + 1));
+        let open = ArrayD::from_shape_vec(IxDyn(&nodes), DualCells::new(&mesh).areas().to_vec());
+        let open = open.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let closed = ArrayD::from_shape_fn(IxDyn(&size), |place| open.get(place).copied().unwrap_or(0.0));
+        Ok(closed.into_pyarray(py))
+    }
+    in_dimensions!(mesh, of(py, &mesh))
 }
 
 /// A nodal field on another mesh.
 #[pyfunction]
+#[pyo3(signature = (values, old, new, conservative, threads))]
 pub fn transfer<'py>(
     py: Python<'py>,
-    values: PyReadonlyArray2<'py, f64>,
+    values: PyReadonlyArrayDyn<'py, f64>,
     old: Given<'py>,
     new: Given<'py>,
     conservative: bool,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (old, new) = (old.mesh(py)?, new.mesh(py)?);
-    let values = nodal(&old, &values)?;
-    let carried = compute(py, move || {
-        let carried = if conservative {
-            geometry::remap(&old, &values, &new)?
-        } else {
+    threads: Threads,
+) -> PyResult<Array<'py>> {
+    fn carried<'py, const D: usize>(
+        py: Python<'py>,
+        values: &PyReadonlyArrayDyn<'py, f64>,
+        [old, new]: [&Given<'py>; 2],
+        conservative: bool,
+        threads: Threads,
+    ) -> PyResult<Array<'py>>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let (old, new) = (old.mesh::<D>(py)?, new.mesh::<D>(py)?);
+        let lattice = *old.lattice();
+        let values = nodal(&lattice, values)?;
+        let carried = compute(py, threads, move || {
+            if conservative {
+                return geometry::remap(&old, &values, &new);
+            }
             geometry::check_unfolded(&old)?;
             geometry::check_unfolded(&new)?;
-            geometry::interpolate(&old, &values, &new)
-        };
-        Ok::<_, Failure>((new, carried))
-    })?;
-    let (new, carried) = carried.map_err(|failure| plain(py, failure))?;
-    array(py, &new, &carried)
+            Ok::<_, Failure>(geometry::interpolate(&old, &values, &new))
+        })?;
+        array(py, &lattice, &carried.map_err(|failure| plain(py, failure))?)
+    }
+    in_dimensions!(old, carried(py, &values, [&old, &new], conservative, threads))
+}
+
+/// Nodal fields, one a row, at points, one a row; nothing but its index where a point lies outside.
+#[pyfunction]
+pub fn interpolate<'py>(
+    py: Python<'py>,
+    mesh: Given<'py>,
+    fields: PyReadonlyArray2<'py, f64>,
+    points: PyReadonlyArray2<'py, f64>,
+    cubic: bool,
+) -> PyResult<(Option<Array<'py>>, usize)> {
+    fn at<'py, const D: usize>(
+        py: Python<'py>,
+        mesh: &Given<'py>,
+        fields: &PyReadonlyArray2<'py, f64>,
+        points: &PyReadonlyArray2<'py, f64>,
+        degree: Degree,
+    ) -> PyResult<(Option<Array<'py>>, usize)>
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let mesh = mesh.mesh::<D>(py)?;
+        let ([count, size], points) = ([fields.shape()[0], fields.shape()[1]], points.as_slice()?.as_chunks::<D>().0);
+        let fields: Vec<Vec<f64>> =
+            fields.as_slice()?.chunks_exact(size).map(|field| opened(mesh.lattice(), field)).collect();
+        let (points, number) = (points.to_vec(), points.len());
+        let found = compute(py, None, move || {
+            geometry::check_unfolded(&mesh)?;
+            Ok::<_, Failure>(
+                Interpolator::new(&mesh, &points, degree)
+                    .map(|at| fields.iter().flat_map(|field| at.values(field)).collect::<Vec<f64>>()),
+            )
+        })?;
+        match found.map_err(|failure| plain(py, failure))? {
+            Ok(values) => Ok((Some(shaped(py, &[count, number], values)?), 0)),
+            Err(outside) => Ok((None, outside)),
+        }
+    }
+    let degree = if cubic { Degree::Cubic } else { Degree::Linear };
+    in_dimensions!(mesh, at(py, &mesh, &fields, &points, degree))
 }

@@ -38,8 +38,8 @@ pub fn stencils<'py>(
         _ => Err(PyValueError::new_err(format!("`scaling` is \"{name}\", but must be none, global or local"))),
     });
     let laplacian = Laplacian::named(kind, polynomials.transpose()?, scaling.transpose()?).map_err(raise)?;
-    let mesh = mesh.mesh(py)?;
-    let entries = compute(py, move || {
+    let mesh = mesh.mesh::<2>(py)?;
+    let entries = compute(py, None, move || {
         let stencils = laplacian::stencils(&mesh, laplacian)?;
         let (mut rows, mut columns, mut a, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for k in 0..stencils.patch().len() {

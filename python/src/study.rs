@@ -1,5 +1,5 @@
 use crate::errors::raised;
-use crate::threads::{BRIEFLY, Ended, PATIENCE, calls, interruptible};
+use crate::threads::{BRIEFLY, Ended, PATIENCE, Threads, calls, interruptible};
 use driftmesh::output::{RunDirectory, Standing};
 use driftmesh::simulation::{Event, Observer, Snapshot};
 use driftmesh::study::{Begin, Source, Study};
@@ -68,14 +68,14 @@ pub fn check(py: Python<'_>, path: Option<PathBuf>, origin: &str, text: &str, se
     Ok(study.name().into())
 }
 
-/// Runs a study into a directory. `told(share, t, step)` is called every now and then.
+/// Runs a study into a directory, with so many threads. `told(share, t, step)` is called every now and then.
 ///
 /// `resume` goes on from the newest checkpoint, and does nothing where the run is complete.
 ///
 /// Returns what was raised in Python or by the study, and whether the run has ended: a study that cannot be stopped
 /// half-way goes on in the background.
 #[pyfunction]
-#[pyo3(signature = (path, origin, text, set, out, resume, told))]
+#[pyo3(signature = (path, origin, text, set, out, resume, threads, told))]
 #[allow(clippy::too_many_arguments)] // four of them are one study
 pub fn run(
     py: Python<'_>,
@@ -85,6 +85,7 @@ pub fn run(
     set: Vec<String>,
     out: PathBuf,
     resume: bool,
+    threads: Threads,
     told: Option<Py<PyAny>>,
 ) -> PyResult<(Option<PyErr>, bool)> {
     let raise = |error: &Error| raised(py, error, error.help());
@@ -99,6 +100,7 @@ pub fn run(
     let computing = study.clone();
     let ended = interruptible(
         py,
+        threads,
         calls(),
         move || computing.run(&out, begin, &mut [&mut Watcher(theirs)]),
         || {

@@ -19,13 +19,18 @@ pub const PATIENCE: Duration = Duration::from_secs(3);
 /// The same for one that may not look.
 pub const BRIEFLY: Duration = Duration::from_millis(200);
 
+/// A number of threads; all cores, or what RAYON_NUM_THREADS says, where none is given.
+pub type Threads = Option<usize>;
+/// A pool, with the number of threads that it was asked for with.
+type Pool = (Threads, Arc<ThreadPool>);
+
 /// Pools at rest, kept for the next computations, and the process that they belong to: its threads are not there after
 /// a fork.
-static RESTING: Mutex<(u32, Vec<Arc<ThreadPool>>)> = Mutex::new((0, Vec::new()));
+static RESTING: Mutex<(u32, Vec<Pool>)> = Mutex::new((0, Vec::new()));
 /// Most pools at rest; what is more ends its threads.
 const KEPT: usize = 4;
 
-fn resting() -> MutexGuard<'static, (u32, Vec<Arc<ThreadPool>>)> {
+fn resting() -> MutexGuard<'static, (u32, Vec<Pool>)> {
     let mut resting = RESTING.lock().unwrap_or_else(PoisonError::into_inner);
     if resting.0 != std::process::id() {
         // the pools of the parent process are left alone: there is nobody to join
@@ -34,15 +39,16 @@ fn resting() -> MutexGuard<'static, (u32, Vec<Arc<ThreadPool>>)> {
     resting
 }
 
-fn pool() -> PyResult<Arc<ThreadPool>> {
-    if let Some(pool) = resting().1.pop() {
-        return Ok(pool);
+fn pool(threads: Threads) -> PyResult<Arc<ThreadPool>> {
+    let pools = &mut resting().1;
+    if let Some(k) = pools.iter().rposition(|pool| pool.0 == threads) {
+        return Ok(pools.swap_remove(k).1);
     }
-    let made = ThreadPoolBuilder::new().thread_name(|k| format!("driftmesh-{k}")).build();
-    made.map(Arc::new).map_err(|error| PyRuntimeError::new_err(format!("no threads can be made: {error}")))
+    let made = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).thread_name(|k| format!("driftmesh-{k}"));
+    made.build().map(Arc::new).map_err(|error| PyRuntimeError::new_err(format!("no threads can be made: {error}")))
 }
 
-fn rest(pool: Arc<ThreadPool>) {
+fn rest(pool: Pool) {
     let mut resting = resting();
     if resting.1.len() < KEPT {
         resting.1.push(pool);
@@ -89,28 +95,33 @@ impl Calls {
 }
 
 /// Computes what cannot be stopped half-way: at Ctrl-C it is left alone, and what it finds is thrown away.
-pub fn compute<T: Send + 'static>(py: Python<'_>, f: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
-    match interruptible(py, calls(), f, || BRIEFLY, |_| Ok(()))? {
+pub fn compute<T: Send + 'static>(
+    py: Python<'_>,
+    threads: Threads,
+    f: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    match interruptible(py, threads, calls(), f, || BRIEFLY, |_| Ok(()))? {
         Ended::Itself(result) => Ok(result),
         Ended::Stopped(error, _) => Err(error),
     }
 }
 
-/// Computes with all threads at hand. Ctrl-C, or an exception of a call, calls `stop`, which says how long the end may
+/// Computes with so many threads. Ctrl-C, or an exception of a call, calls `stop`, which says how long the end may
 /// take. `look` is called every now and then meanwhile.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
+    threads: Threads,
     (Caller(ended), calls): (Caller, Calls),
     f: impl FnOnce() -> T + Send + 'static,
     stop: impl Fn() -> Duration,
     mut look: impl FnMut(Python<'_>) -> PyResult<()>,
 ) -> PyResult<Ended<T>> {
     let (sender, result) = channel();
-    let pool = pool()?;
+    let pool = pool(threads)?;
     let theirs = pool.clone();
     pool.spawn(move || {
         let result = catch_unwind(AssertUnwindSafe(f));
-        rest(theirs);
+        rest((threads, theirs));
         let _ = sender.send(result);
         let _ = ended.send(Message::Ended);
     });

@@ -74,7 +74,7 @@ def test_a_folded_mesh_says_so():
         (lambda: Mesh.uniform(cells=(1, 1)), "at least 2"),
         (lambda: Mesh.uniform(cells=(2.5, 3)), "whole number"),
         (lambda: Mesh.uniform(cells=(-2, 3)), "whole number"),
-        (lambda: Mesh.uniform(cells=4), "one an axis"),
+        (lambda: Mesh.uniform(cells=(4, 4, 4)), "one an axis"),
         (lambda: Mesh.uniform(cells=(4, 4), upper=(0, 1)), "upper"),
         (lambda: Mesh.uniform(cells=(4, 4), upper=(np.nan, 1)), "upper.*finite"),
         (lambda: Mesh.uniform(cells=(10**12, 10**12)), "cannot be counted"),

@@ -18,7 +18,19 @@ from driftmesh import errors
 
 ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / "target/mypy"
-MODULES = ["errors", "generators", "laplacian", "line", "mesh", "methods", "monitors", "remap", "study"]
+MODULES = [
+    "differences",
+    "errors",
+    "generators",
+    "laplacian",
+    "line",
+    "mesh",
+    "methods",
+    "monitors",
+    "quality",
+    "remap",
+    "study",
+]
 
 
 def tool(*arguments, **settings):

@@ -1,6 +1,7 @@
 //! What is measured of the cells of a mesh.
 
 use super::nodal::check_length;
+use super::points::Place;
 use super::{DualCells, Lattice, Mesh, Quality};
 use crate::error::Failure;
 
@@ -43,6 +44,10 @@ pub trait Cells<const D: usize>: Sized {
     /// The cell, by its lowest corner, that holds each of some points. The search begins in the cell of the point
     /// before, so that neighbouring points cost a few tests each.
     fn holding(&self, points: impl Iterator<Item = [f64; D]>) -> Vec<[usize; D]>;
+
+    /// The cell of each of some points, and where in it the point lies; nothing for points outside. After a point
+    /// outside others may be left without a place, too.
+    fn places(&self, points: &[[f64; D]]) -> Vec<Option<Place<D>>>;
 }
 
 /// Areas of the cells, in lattice order; lengths in one dimension.

@@ -1,7 +1,9 @@
 //! Cells of a line.
 
 use super::field::largest;
+use super::points::{Place, lies_within};
 use super::{Cells, DualCells, Lattice, Mesh, Patch, Quality, padded};
+use crate::parallel;
 
 impl Cells<1> for Mesh<1> {
     fn dual_cells(&self) -> DualCells<1> {
@@ -82,6 +84,20 @@ impl Cells<1> for Mesh<1> {
     fn holding(&self, points: impl Iterator<Item = [f64; 1]>) -> Vec<[usize; 1]> {
         let x = self.closed();
         points.map(|[point]| [self.find(&x, point).0]).collect()
+    }
+
+    fn places(&self, points: &[[f64; 1]]) -> Vec<Option<Place<1>>> {
+        let (x, wraps) = (self.closed(), self.lattice().periodic()[0]);
+        let mut places = vec![None; points.len()];
+        parallel::for_each_piece(&mut places, |first, piece| {
+            for (place, &[point]) in piece.iter_mut().zip(&points[first..]) {
+                let (cell, share) = self.find(&x, point);
+                let found = x[cell][0] + share * (x[cell + 1][0] - x[cell][0]);
+                let inside = wraps || lies_within(self, [found], [point]);
+                *place = inside.then_some(Place { cell: [cell], share: [share] });
+            }
+        });
+        places
     }
 }
 

@@ -1,4 +1,6 @@
-use super::Mesh;
+use super::points::{Place, lies_within};
+use super::{Mesh, quality::minus};
+use crate::parallel;
 
 pub(super) fn interpolate_in_plane(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
     let cells = Search { mesh: from };
@@ -9,7 +11,8 @@ pub(super) fn interpolate_in_plane(from: &Mesh<2>, values: &[f64], to: &Mesh<2>)
         let node = lattice.node(k);
         let first_in_row = node[1] == 0;
         off = if first_in_row { off_in_row } else { off };
-        let (cell, (nodes, weights)) = cells.find(point, [0, 1].map(|d| node[d] as isize + off[d]));
+        let (cell, image) = cells.find(point, [0, 1].map(|d| node[d] as isize + off[d]));
+        let (nodes, weights) = cells.triangle(image, cell);
         off = [0, 1].map(|d| cell[d] - node[d] as isize);
         off_in_row = if first_in_row { off } else { off_in_row };
         nodes.iter().zip(weights).map(|(&n, w)| w * values[n]).sum()
@@ -23,11 +26,85 @@ pub(super) fn cells_in_plane(mesh: &Mesh<2>, points: impl Iterator<Item = [f64; 
     let cells = Search { mesh };
     let mut near = [0; 2];
     let cell = |point| {
-        let (cell, (nodes, _)) = cells.find(point, near);
-        near = cell;
-        mesh.lattice().node(nodes[0])
+        near = cells.find(point, near).0;
+        mesh.lattice().node(cells.corner(near).0)
     };
     points.map(cell).collect()
+}
+
+/// The cell of each of some points, and where in it the point lies; nothing for points outside.
+pub(super) fn places_in_plane(mesh: &Mesh<2>, points: &[[f64; 2]]) -> Vec<Option<Place<2>>> {
+    let search = Search { mesh };
+    let starts = Starts::new(&search, points.len());
+    let mut places = vec![None; points.len()];
+    parallel::for_each_piece(&mut places, |first, piece| {
+        let mut near = [0; 2];
+        for (place, &point) in piece.iter_mut().zip(&points[first..]) {
+            let away = |cell| {
+                let way = minus(mesh.image(search.corner(cell).1), mesh.image(point));
+                way[0].hypot(way[1])
+            };
+            let start = starts.beside(mesh.image(point));
+            let start = if away(near) < away(start) { near } else { start };
+            let (cell, image) = search.find(point, start);
+            near = cell;
+            *place = search.place(image, cell);
+            if place.is_none() {
+                // the walk may have ended at a side that is no wall of a box, with the point behind another one
+                let (cell, image) = search.nearest(point);
+                *place = search.place(image, cell);
+            }
+            if place.is_none() {
+                // one point outside is enough to be told of, and each costs a look at every cell
+                break;
+            }
+        }
+    });
+    places
+}
+
+/// Cells at which the search for a point may begin: one for each of the equal boxes that the box of the mesh is divided
+/// into.
+struct Starts<'a> {
+    mesh: &'a Mesh<2>,
+    boxes: [usize; 2],
+    cells: Vec<[isize; 2]>,
+}
+
+/// So many points have one starting cell, since each of these costs a search, too.
+const POINTS_A_START: f64 = 8.0;
+
+impl<'a> Starts<'a> {
+    fn new(search: &Search<'a>, points: usize) -> Self {
+        let (mesh, cells) = (search.mesh, search.mesh.lattice().cells());
+        let share = (points as f64 / POINTS_A_START / (cells[0] * cells[1]) as f64).sqrt().min(1.0);
+        let boxes = cells.map(|n| ((n as f64 * share) as usize).max(1));
+        let (lower, extent) = (mesh.lower(), mesh.extent());
+        let mut near = [0; 2];
+        let mut found = Vec::with_capacity(boxes[0] * boxes[1]);
+        for i in 0..boxes[0] {
+            let mut first_in_row = near;
+            for j in 0..boxes[1] {
+                let at = [i, j];
+                let middle = [0, 1].map(|d| lower[d] + extent[d] * (at[d] as f64 + 0.5) / boxes[d] as f64);
+                near = search.find(middle, near).0;
+                first_in_row = if j == 0 { near } else { first_in_row };
+                found.push(near);
+            }
+            near = first_in_row;
+        }
+        Self { mesh, boxes, cells: found }
+    }
+
+    /// A cell near a point of the box.
+    fn beside(&self, point: [f64; 2]) -> [isize; 2] {
+        let (lower, extent) = (self.mesh.lower(), self.mesh.extent());
+        let at = [0, 1].map(|d| {
+            let share = (point[d] - lower[d]) / extent[d] * self.boxes[d] as f64;
+            (share.max(0.0) as usize).min(self.boxes[d] - 1)
+        });
+        self.cells[at[0] * self.boxes[1] + at[1]]
+    }
 }
 
 /// The cells of a mesh by signed index, which on a periodic axis counts beyond the box.
@@ -48,9 +125,9 @@ impl Search<'_> {
         (index, std::array::from_fn(|d| x[d] + [i, j][d].div_euclid(nodes[d] as isize) as f64 * extent[d]))
     }
 
-    /// The cell that holds `point`, and nodes and barycentric weights of the triangle that does; the search begins in
-    /// cell `start`.
-    fn find(&self, point: [f64; 2], start: [isize; 2]) -> ([isize; 2], Triangle) {
+    /// The cell that holds `point`, and the image of the point in it; the search begins in cell `start`. For a point
+    /// outside it is a cell at a side.
+    fn find(&self, point: [f64; 2], start: [isize; 2]) -> ([isize; 2], [f64; 2]) {
         let cells = self.mesh.lattice().cells().map(|n| n as isize);
         let periodic = self.mesh.lattice().periodic();
         let exists = |cell: [isize; 2]| (0..2).all(|d| periodic[d] || (0..cells[d]).contains(&cell[d]));
@@ -83,14 +160,14 @@ impl Search<'_> {
                 None => break,
             }
         }
-        (cell, self.triangle(point, cell))
+        (cell, point)
     }
 
-    /// Of all triangles the one that holds a point, or is nearest to it.
-    fn nearest(&self, point: [f64; 2]) -> ([isize; 2], Triangle) {
+    /// Of all cells the one that holds a point, or is nearest to it, and the image of the point there.
+    fn nearest(&self, point: [f64; 2]) -> ([isize; 2], [f64; 2]) {
         let (cells, extent) = (self.mesh.lattice().cells().map(|n| n as isize), self.mesh.extent());
         let periodic = self.mesh.lattice().periodic();
-        let mut best = (f64::INFINITY, ([0, 0], self.triangle(point, [0, 0])));
+        let mut best = (f64::INFINITY, ([0, 0], point));
         for cell in (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| [i, j])) {
             let near = self.corner(cell).1;
             let about = |d: usize| match periodic[d] {
@@ -102,10 +179,34 @@ impl Search<'_> {
             let edges = [(a, b), (b, c), (c, d), (d, a)];
             let off = edges.into_iter().map(|(p, q)| outside(point, p, q)).fold(0.0, f64::max);
             if off < best.0 {
-                best = (off, (cell, self.triangle(point, cell)));
+                best = (off, (cell, point));
             }
         }
         best.1
+    }
+
+    /// Where a point lies in a cell; nothing where it lies outside.
+    ///
+    /// The cell is the image of the unit square by x = a + s e + t f + s t g. With q = x − a, the cross product of
+    /// q − s e = t (f + s g) with f + s g leaves (e × g) s² + (e × f − q × g) s − q × f = 0. The derivative of its left
+    /// side at s is the Jacobian there, so that the root wanted is the one where it is positive.
+    fn place(&self, point: [f64; 2], cell: [isize; 2]) -> Option<Place<2>> {
+        let corners = self.corners(cell);
+        let [a, b, c, d] = corners.map(|c| c.1);
+        let (q, e, f) = (minus(point, a), minus(b, a), minus(d, a));
+        let g = minus(minus(c, b), f);
+        let cross = |u: [f64; 2], v: [f64; 2]| u[0] * v[1] - u[1] * v[0];
+        let (square, linear, constant) = (cross(e, g), cross(e, f) - cross(q, g), cross(q, f));
+        let root = (linear * linear + 4.0 * square * constant).max(0.0).sqrt();
+        // of both ways to write the root the one in which nothing cancels
+        let s = if linear > 0.0 { 2.0 * constant / (linear + root) } else { (root - linear) / (2.0 * square) };
+        let s = s.clamp(0.0, 1.0);
+        let (along, rest) = ([0, 1].map(|d| f[d] + s * g[d]), [0, 1].map(|d| q[d] - s * e[d]));
+        let t = (along[0] * rest[0] + along[1] * rest[1]) / (along[0] * along[0] + along[1] * along[1]);
+        let t = t.clamp(0.0, 1.0);
+        let found = [0, 1].map(|d| a[d] + s * e[d] + t * along[d]);
+        let place = Place { cell: self.mesh.lattice().node(corners[0].0), share: [s, t] };
+        lies_within(self.mesh, found, point).then_some(place)
     }
 
     fn corners(&self, [i, j]: [isize; 2]) -> [(usize, [f64; 2]); 4] {

@@ -1,6 +1,7 @@
 //! Cells in the plane.
 
-use super::locate::{cells_in_plane, interpolate_in_plane};
+use super::locate::{cells_in_plane, interpolate_in_plane, places_in_plane};
+use super::points::Place;
 use super::quality::{Quality, jacobians_in_plane, minus, node_areas_in_plane, qualities_in_plane, quality_in_plane};
 use super::{Cells, DualCells, Lattice, Mesh};
 
@@ -58,6 +59,10 @@ impl Cells<2> for Mesh<2> {
 
     fn holding(&self, points: impl Iterator<Item = [f64; 2]>) -> Vec<[usize; 2]> {
         cells_in_plane(self, points)
+    }
+
+    fn places(&self, points: &[[f64; 2]]) -> Vec<Option<Place<2>>> {
+        places_in_plane(self, points)
     }
 }
 

@@ -222,7 +222,7 @@ impl<const D: usize> Gait<D> {
     ///
     /// # Errors
     /// [`Unfit::Damaged`].
-    pub(crate) fn check(&self, nodes: usize) -> Result<(), Unfit> {
+    pub fn check(&self, nodes: usize) -> Result<(), Unfit> {
         check_nodal("velocity", &self.velocity, nodes)?;
         check_nodal("correction", &self.correction, nodes)?;
         if !self.rho.is_empty() {
