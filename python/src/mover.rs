@@ -26,12 +26,14 @@ pub struct Movers {
     pub plane: Parts<2>,
 }
 
+/// Refuses settings that do not fit a lattice.
+type Check<const D: usize> = Box<dyn Fn(&Lattice<D>) -> driftmesh::Result<()> + Send>;
+
 /// A mover in D dimensions.
 pub struct Parts<const D: usize> {
     pub monitor: Box<dyn Monitor<D>>,
     pub mover: Mover<D>,
-    /// Refuses settings that do not fit a lattice.
-    pub check: Box<dyn Fn(&Lattice<D>) -> driftmesh::Result<()> + Send>,
+    pub check: Check<D>,
     /// The mesh that the last step led to, and how it was going: forgotten where the next step starts from another
     /// mesh.
     pub last: Option<(Mesh<D>, Gait<D>)>,

@@ -115,14 +115,20 @@ struct Search<'a> {
 type Triangle = ([usize; 3], [f64; 3]);
 
 impl Search<'_> {
-    fn corner(&self, [i, j]: [isize; 2]) -> (usize, [f64; 2]) {
+    fn corner(&self, node: [isize; 2]) -> (usize, [f64; 2]) {
         let lattice = self.mesh.lattice();
-        let nodes = lattice.nodes();
-        let extent = self.mesh.extent();
-        let wrapped = [0, 1].map(|d| [i, j][d].rem_euclid(nodes[d] as isize) as usize);
-        let index = lattice.index(wrapped);
+        let (nodes, extent) = (lattice.nodes(), self.mesh.extent());
+        // divisions take longer than all the rest, and most nodes need none
+        let counted = [0, 1].map(|d| match usize::try_from(node[d]) {
+            Ok(k) if k < nodes[d] => (k, 0.0),
+            _ => {
+                let n = nodes[d] as isize;
+                (node[d].rem_euclid(n) as usize, node[d].div_euclid(n) as f64)
+            }
+        });
+        let index = lattice.index(counted.map(|(k, _)| k));
         let x = self.mesh.x()[index];
-        (index, std::array::from_fn(|d| x[d] + [i, j][d].div_euclid(nodes[d] as isize) as f64 * extent[d]))
+        (index, [0, 1].map(|d| x[d] + counted[d].1 * extent[d]))
     }
 
     /// The cell that holds `point`, and the image of the point in it; the search begins in cell `start`. For a point

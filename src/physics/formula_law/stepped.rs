@@ -71,16 +71,16 @@ where
         let u = u.as_chunks::<B>().0;
         let sources = self.timed.at(t, x, |k| u[k]);
         let mut all = Vec::with_capacity(B * x.len());
-        for k in 0..x.len() {
+        for ((k, x), beyond) in x.iter().enumerate().zip(beyond) {
             for c in 0..B {
                 let mut forcing = Forcing { source: sources[k][c], ..Forcing::default() };
-                for (d, end) in timed(c).filter(|&(d, end)| beyond[k][d][end]) {
+                for (d, end) in timed(c).filter(|&(d, end)| beyond[d][end]) {
                     match &self.sides[c][d][end] {
                         Open::Value(formula) => {
-                            forcing.value = formula.eval(&x[k].into_iter().chain([t]).collect::<Vec<f64>>());
+                            forcing.value = formula.eval(&x.iter().copied().chain([t]).collect::<Vec<f64>>());
                         }
                         Open::Flux(flux) => {
-                            let place: Vec<f64> = x[k].into_iter().chain(u[k]).chain([t]).collect();
+                            let place: Vec<f64> = x.iter().copied().chain(u[k]).chain([t]).collect();
                             forcing.inflow += flux.value.eval(&place);
                         }
                         Open::Closed | Open::Outflow => {}
