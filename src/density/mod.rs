@@ -13,7 +13,7 @@ mod tables;
 
 pub use arclength::{Arclength, Strength};
 pub use given::Given;
-pub(crate) use need::need;
+pub(crate) use need::Need;
 pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
 pub(crate) use root_gradient::largest_step;

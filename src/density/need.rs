@@ -1,4 +1,4 @@
-use crate::geometry::{Mesh, Patch, diagonal, length, padded, strides};
+use crate::geometry::{Cells, Mesh, Patch, diagonal, length, padded, strides};
 use crate::numerics::difference::scaled_gradient;
 use crate::numerics::larger;
 
@@ -13,15 +13,42 @@ const BENDS: [f64; 2] = [0.06, 0.09];
 /// Number of nodes in a row over which bends are added up: those of a jump are in four of them.
 const WINDOW: usize = 4;
 
-/// The need for a density that is not even, where u changes by `share` of its range over an equal cell at most: 0 where
-/// equal cells resolve u, 1 where they do not.
-pub(crate) fn need(share: f64) -> f64 {
-    between(SLOPES, share)
+/// What a mesh that is not even keeps of these limits: it goes back to equal cells only where these resolve u this much
+/// better. On its way back a front would leave the nodes behind, which have to travel far, and pass through cells wider
+/// than equal ones; and were the limits the same, a solution near them would send the mesh to and fro.
+const KEPT: f64 = 0.3;
+/// One less the smallest cell over an equal one, from which on a mesh begins not to be even, and is not.
+const UNEVEN: [f64; 2] = [0.4, 0.7];
+
+/// The need for a density that is not even
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Need {
+    /// What is left of the limits for this mesh.
+    kept: f64,
 }
 
-/// The same need, where u bends by `share` of its range in both directions within a few nodes.
-pub(super) fn need_by_bends(share: f64) -> f64 {
-    between(BENDS, share)
+impl Need {
+    /// On a mesh.
+    pub fn on<const D: usize>(mesh: &Mesh<D>) -> Self
+    where
+        Mesh<D>: Cells<D>,
+    {
+        let cells: usize = mesh.lattice().cells().iter().product();
+        let smallest = mesh.volumes().fold(f64::INFINITY, f64::min) * cells as f64;
+        let uneven = between(UNEVEN, 1.0 - smallest / mesh.extent().iter().product::<f64>());
+        Self { kept: 1.0 - (1.0 - KEPT) * uneven }
+    }
+
+    /// Where u changes by `share` of its range over an equal cell at most: 0 where equal cells resolve u, 1 where they
+    /// do not.
+    pub fn by_slopes(self, share: f64) -> f64 {
+        between(SLOPES.map(|limit| self.kept * limit), share)
+    }
+
+    /// The same where u bends by `share` of its range in both directions within a few nodes.
+    pub fn by_bends(self, share: f64) -> f64 {
+        between(BENDS.map(|limit| self.kept * limit), share)
+    }
 }
 
 /// Rises from 0 to 1 between two values, with a slope that is 0 at both.

@@ -1,4 +1,4 @@
-use super::need::{bends, between, need as need_of, need_by_bends};
+use super::need::{Need, bends, between};
 use super::{Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
 use crate::geometry::{Cells, Field, Lattice, Mesh, check_length, strides};
@@ -21,7 +21,8 @@ use std::borrow::Cow;
 ///
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
 /// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
-/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. Where the steepest slope
+/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. On a mesh that is not even
+/// any more these limits are down to 0.3 times as large: it goes back to equal cells late. Where the steepest slope
 /// is less than twice (⟨|∇u|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could
 /// be taken, and s is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and
 /// 500 around jumps.
@@ -144,6 +145,7 @@ impl Followed {
         let ends: Vec<[f64; 2]> = ends.collect();
         let sizes = ends.iter().map(|[low, high]| high.max(-low));
         let largest = sizes.clone().fold(0.0, larger);
+        let needs = Need::on(mesh);
         let (mut slopes, mut need, mut step) = (Vec::new(), 0.0, 0.0);
         for ((u, [low, high]), size) in unknowns.iter().zip(&ends).zip(sizes) {
             let range = high - low;
@@ -158,9 +160,9 @@ impl Followed {
                 continue;
             }
             step = larger(step, largest_step(lattice, u) / range);
-            need = f64::max(need, need_of(steepest));
+            need = f64::max(need, needs.by_slopes(steepest));
             if need < 1.0 {
-                need = need.max(need_by_bends(bends(mesh, u) / range));
+                need = need.max(needs.by_bends(bends(mesh, u) / range));
             }
             match slopes.is_empty() {
                 true => slopes = own,

@@ -1,7 +1,7 @@
 //! What a mesh may do to the solution on its way.
 
 use super::State;
-use crate::density::{largest_step, need};
+use crate::density::{Need, largest_step};
 use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
@@ -42,7 +42,7 @@ const INTERPOLATION: f64 = 0.2;
 ///
 /// E₀ and E are the errors with which equal cells and this mesh interpolate the unknown, so that over a run the error
 /// stays below a quarter of the one of equal cells. U is what the solution changes by itself in a unit of time, of
-/// which a mesh that follows may add the share c, from 0.2 to 0.5; n is the [`need`], which is 0 where equal cells
+/// which a mesh that follows may add the share c, from 0.2 to 0.5; n is the [`Need`], which is 0 where equal cells
 /// resolve all unknowns. The last term is for the way back to equal cells, where these have become better than this
 /// mesh.
 pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
@@ -69,7 +69,8 @@ where
         })
         .collect();
     // one unknown that equal cells do not resolve is reason enough to hurry
-    let hurry = unknowns.iter().fold(0.0, |m, (_, _, over_cell)| larger(m, need(*over_cell)));
+    let need = Need::on(&state.mesh);
+    let hurry = unknowns.iter().fold(0.0, |m, (_, _, over_cell)| larger(m, need.by_slopes(*over_cell)));
     let mut share = 1.0_f64;
     for (values, range, over_cell) in unknowns {
         let u: Vec<f64> = padded(lattice, values.as_chunks::<1>().0, [[0.0]; D]).into_flattened();
