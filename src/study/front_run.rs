@@ -1,6 +1,6 @@
 //! Studies of kind `stefan`: how they run.
 
-use super::front_checks::Given;
+use super::front_given::Given;
 use super::front_figures::{FrontParts, FrontReport, FrontSummary, Row, Tables};
 use super::kind::{Running, SpentBy};
 use super::runner::Stage;
@@ -9,20 +9,26 @@ use crate::geometry::{Mesh, quality};
 use crate::kept::{Kept, check_nodal};
 use crate::output::{FramesAt, Picture, RunDirectory, Spent, Summary, draw_curves};
 use crate::simulation::{Event, Scene, Schedule, Snapshot, WorkTotal};
-use crate::stefan::{Energy, Front, FrontState, LOWER, Stepping, UPPER};
+use crate::stefan::{Attempt, Energy, Front, FrontState, LOWER, Stepping, UPPER};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
 /// Automatic steps of an explicit front are at most this share of the longest stable one.
 const OF_THE_LIMIT: f64 = 0.5;
-/// Automatic steps of an explicit front are at most the whole run over this number.
+/// In an automatic step an explicit front moves at most by this share of its distance from the nearer wall; in the first
+/// one of an implicit front, too.
+const OF_THE_ROOM: f64 = 0.002;
+/// Automatic steps are at most the whole run over this number, which bounds what formulas of time may hide in a step.
 const PARTS: f64 = 50.0;
-/// Automatic steps of an implicit front are the whole run over this number: accuracy alone limits them.
-const IMPLICIT_PARTS: f64 = 100.0;
-/// How often an automatic step that fails is halved before the run fails. The next step has its whole length again, so
-/// that a run that goes on from a checkpoint takes the same steps.
+/// The estimated error of an automatic step of an implicit front.
+const TOLERANCE: f64 = 1e-6;
+/// How much shorter and longer than an automatic step of an implicit front the next one may be.
+const PACE: [f64; 2] = [0.2, 2.0];
+/// How often an automatic step that fails is halved before the run fails.
 const HALVINGS: i32 = 6;
+/// How often an automatic step with too large an error is shortened before it is taken as it is.
+const REJECTIONS: usize = 12;
 /// Fronts that the picture over time shows, about.
 const CURVES: usize = 16;
 
@@ -52,6 +58,8 @@ pub struct FrontCourse {
     warnings: Vec<String>,
     /// Times and fronts, some of them.
     fronts: Vec<(f64, Vec<f64>)>,
+    /// Length of the next automatic step of an implicit front; none before the first.
+    pace: Option<f64>,
     /// In a checkpoint, what frames, tables and observers carry; empty in a run.
     kept: Kept,
 }
@@ -95,6 +103,7 @@ impl FrontRun {
             reports: Vec::new(),
             warnings: Vec::new(),
             fronts: Vec::new(),
+            pace: None,
             kept: Kept::default(),
         };
         Self { name: name.into(), front, given, schedule, at, course, tables: None }
@@ -203,13 +212,26 @@ impl FrontRun {
         if !schedule.is_automatic() {
             return schedule.step_from(state.step).map(|_| schedule.time(state.step + 1));
         }
-        let span = schedule.end() - schedule.start();
+        let slow = || OF_THE_ROOM * front.passage(&self.given, state);
         let dt = match front.stepping {
             // the schedule may lengthen a step by a third
-            Stepping::Explicit => (OF_THE_LIMIT * front.limit(state)).min(span / PARTS),
-            Stepping::Implicit => span / IMPLICIT_PARTS,
+            Stepping::Explicit => (OF_THE_LIMIT * front.limit(state)).min(slow()) * 0.5_f64.powi(halvings),
+            Stepping::Implicit => self.course.pace.unwrap_or_else(slow),
         };
-        schedule.after(state.t, dt * 0.5_f64.powi(halvings))
+        let longest = (schedule.end() - schedule.start()) / PARTS;
+        schedule.after(state.t, dt.min(longest))
+    }
+
+    /// Whether an automatic step of this length with this error will do; sets the length of the next one.
+    fn judge(&mut self, dt: f64, error: Option<f64>, rejections: usize) -> bool {
+        let Some(error) = error.filter(|_| self.schedule.is_automatic()) else { return true };
+        let [shorter, longer] = PACE;
+        let next = dt * (0.9 * (TOLERANCE / error).cbrt()).clamp(shorter, longer);
+        let good = error <= TOLERANCE || rejections == REJECTIONS;
+        // a step that ends at a report may be shorter than it could be
+        let before = self.course.pace.filter(|before| good && dt < *before).unwrap_or(0.0);
+        self.course.pace = Some(next.max(before));
+        good
     }
 }
 
@@ -223,16 +245,17 @@ impl Running for FrontRun {
             self.tables = stage.directory.map(|to| Tables::create(to.path(), x)).transpose()?;
         }
         self.tell(stage.begins, 0.0, stage)?;
-        let mut halvings = 0;
+        let (mut halvings, mut rejections) = (0, 0);
         while let Some(t) = self.next(halvings) {
             let (began, dt) = (Instant::now(), t - self.course.state.t);
-            let stepped = self.front.step(&self.given, &mut self.course.state, t);
+            let attempt = self.front.attempt(&self.given, &self.course.state, t);
             self.course.seconds.parts.pde += began.elapsed().as_secs_f64();
-            self.course.work.work += match stepped {
-                Ok(work) => work,
+            let Attempt { state, work, error } = match attempt {
+                Ok(attempt) => attempt,
                 // the state is as it was
                 Err(Error::Failed { .. }) if self.schedule.is_automatic() && halvings < HALVINGS => {
                     halvings += 1;
+                    self.course.pace = Some(0.5 * dt);
                     self.course.work.rejected_steps += 1;
                     continue;
                 }
@@ -242,7 +265,14 @@ impl Running for FrontRun {
                 }
                 Err(other) => return Err(other),
             };
-            halvings = 0;
+            self.course.work.work += work;
+            if !self.judge(dt, error, rejections) {
+                rejections += 1;
+                self.course.work.rejected_steps += 1;
+                continue;
+            }
+            (halvings, rejections) = (0, 0);
+            self.course.state = state;
             self.course.work.steps += 1;
             self.tell(Event::Stepped, dt, stage)?;
         }

@@ -3,6 +3,7 @@
 use super::LaplacianTable;
 use super::common::{Header, Output};
 use super::mapped::Ends;
+use crate::physics::Condition;
 use crate::setting::{Auto, fixed, pair};
 use crate::stefan::{Filter, Method, Stepping, Transfer};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -83,31 +84,54 @@ pub struct Phases {
 }
 
 /// `[phase.lower]` or `[phase.upper]`.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhaseTable {
-    /// D.
-    pub diffusivity: f64,
+    /// D; 1 where nothing is said. Goes with `mobility`, or `conductivity` and `capacity` stand in its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffusivity: Option<f64>,
+    /// k of D = k/C. Goes with `capacity` and `latent_heat`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conductivity: Option<f64>,
+    /// C: heat for each volume and degree.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub capacity: Option<f64>,
     /// Temperature at the start, a formula of x and y.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub initial: Option<String>,
-    /// Temperature of the wall, a formula of x, y and t.
+    /// What holds on the wall: its temperature, a formula of x, y and t; `"no-flux"`; or `{ flux = "…" }`, what flows in,
+    /// a formula of u, x, y and t.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub boundary: Option<String>,
+    #[schemars(schema_with = "wall_schema")]
+    pub boundary: Option<Condition>,
 }
 
-impl Default for PhaseTable {
-    fn default() -> Self {
-        Self { diffusivity: 1.0, initial: None, boundary: None }
-    }
+fn wall_schema(_: &mut SchemaGenerator) -> Schema {
+    let flux = json_schema!({
+        "type": "object", "properties": { "flux": { "type": ["string", "number"] } }, "required": ["flux"],
+        "additionalProperties": false, "description": "What flows in: a formula of u, x, y and t."
+    });
+    json_schema!({ "anyOf": [
+        { "const": "no-flux", "description": "Nothing flows through." },
+        { "type": ["string", "number"], "description": "The temperature: a formula of x, y and t." },
+        flux,
+    ] })
 }
 
 /// `[front]`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FrontTable {
-    /// L, the inverse of the latent heat.
-    pub mobility: f64,
+    /// L, the inverse of the latent heat; 1 where nothing is said. Goes with `diffusivity`, or `latent_heat` stands in
+    /// its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mobility: Option<f64>,
+    /// Λ: heat for each volume that melts. Goes with `conductivity` and `capacity` of both phases.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub latent_heat: Option<f64>,
+    /// T_m, the temperature of the front; 0 where nothing is said. Goes with `latent_heat`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub melting: Option<f64>,
     /// How the front is moved.
     pub method: Method,
     /// How temperatures get to the new mesh.
@@ -117,14 +141,16 @@ pub struct FrontTable {
     #[serde(serialize_with = "write_filter", deserialize_with = "read_filter")]
     #[schemars(schema_with = "filter_schema")]
     pub filter: Filter,
-    /// From which temperatures the front moves.
+    /// How a step advances front and temperatures.
     pub stepping: Stepping,
 }
 
 impl Default for FrontTable {
     fn default() -> Self {
         Self {
-            mobility: 1.0,
+            mobility: None,
+            latent_heat: None,
+            melting: None,
             method: Method::default(),
             transfer: Transfer::default(),
             filter: Filter::default(),
@@ -231,7 +257,7 @@ pub struct FrontTime {
     /// From start to end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duration: Option<f64>,
-    /// Longest step; or half of what is stable, and at most a fiftieth of the run.
+    /// Longest step; or steps that follow the estimated error, of an explicit front half of what is stable.
     #[serde(default)]
     pub step: Auto<f64>,
     /// Times at which `summary.json` reports; the end where none are given.
