@@ -1,7 +1,7 @@
 //! The balance of energy over a step.
 
 use super::columns::{LOWER, UPPER};
-use super::conduct::{Fields, velocity};
+use super::conduct::{Fields, present, velocity};
 use super::energy::{Energy, Phase, total};
 use super::solver::{Front, FrontState, Problem};
 
@@ -18,9 +18,11 @@ pub(super) struct Instant<'a> {
 
 impl Front {
     /// ∫C (u − T_m) and ∫C (u − T_m) Φ of both phases.
-    fn contents(&self, h: &[f64], u: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
-        let (y, above) = (self.heights(h), self.above_melting(u));
-        [LOWER, UPPER].map(|phase| self.phase(phase, &y, &above).content())
+    fn contents(&self, fields: &Fields) -> [[f64; 2]; 2] {
+        let (y, above) = (self.heights(&fields.h), self.above_melting(&fields.u));
+        let mut contents = [[0.0; 2]; 2];
+        present(fields.alone).for_each(|phase| contents[phase] = self.phase(phase, &y, &above).content());
+        contents
     }
 
     fn above_melting(&self, u: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
@@ -38,9 +40,9 @@ impl Front {
         }
     }
 
-    /// The balance of energy at the start.
-    pub(super) fn content(&self, h: &[f64], u: &[Vec<f64>; 2]) -> f64 {
-        total(&self.columns, h, self.contents(h, u).map(|content| content[0]), self.latent_heat())
+    /// E.
+    pub(super) fn content(&self, fields: &Fields) -> f64 {
+        total(&self.columns, &fields.h, self.contents(fields).map(|content| content[0]), self.latent_heat())
     }
 
     /// The balance of energy after a step to (h, u) with these instants.
@@ -51,13 +53,22 @@ impl Front {
         end: &Fields,
         instants: &[Instant<'_>],
     ) -> Energy {
-        let [before, after] =
-            [self.contents(&state.front, &state.u), self.contents(&end.h, &end.u)];
+        let [before, after] = [&state.fields(), end].map(|fields| self.contents(fields));
         let mut energy = state.energy;
         energy.now = total(&self.columns, &end.h, after.map(|content| content[0]), self.latent_heat());
-        for phase in [LOWER, UPPER] {
-            if !self.has_flux(problem, phase, state.t) {
-                energy.inflow += after[phase][1] - before[phase][1];
+        let flux = [LOWER, UPPER].map(|wall| self.has_flux(problem, wall, state.t));
+        match end.alone {
+            // what flows through a wall with a given temperature is what is missing
+            Some(phase) if flux != [true; 2] => {
+                let change = after[phase][0] - before[phase][0];
+                energy.inflow += change;
+                energy.inflow_by_differences += change;
+                return energy;
+            }
+            Some(_) => (),
+            None => {
+                let unseen = [LOWER, UPPER].map(|phase| after[phase][1] - before[phase][1]);
+                energy.inflow += (0..2).filter(|&phase| !flux[phase]).map(|phase| unseen[phase]).sum::<f64>();
             }
         }
         for instant in instants {
@@ -74,11 +85,15 @@ impl Front {
         let (y, above) = (self.heights(&instant.fields.h), self.above_melting(&instant.fields.u));
         let from = self.heights(instant.from);
         let mut sums = [0.0; 2];
-        for phase in [LOWER, UPPER] {
+        for phase in present(instant.fields.alone) {
             let at = self.phase(phase, &y, &above);
-            let given = self.given_flux(problem, phase, &instant.fields.u[phase], instant.t);
+            let given = self.given_flux(problem, phase, (phase, &instant.fields.u), instant.t);
             sums[0] += given.unwrap_or_else(|| at.flow(&velocity(&from[phase], &y[phase], instant.over)));
             sums[1] += given.unwrap_or_else(|| at.wall_flux());
+            if instant.fields.alone.is_some() {
+                let other = self.given_flux(problem, 1 - phase, (phase, &instant.fields.u), instant.t).unwrap_or(0.0);
+                sums = sums.map(|sum| sum + other);
+            }
             if !self.mirrored() {
                 let [all, unseen] = at.side_fluxes();
                 sums[0] += if given.is_some() { all } else { unseen };
@@ -88,13 +103,20 @@ impl Front {
         sums
     }
 
-    /// ∫q ds over the wall of a phase, where q is given.
-    fn given_flux(&self, problem: &dyn Problem, phase: usize, u: &[f64], t: f64) -> Option<f64> {
-        let (nodes, [_, wall]) = (self.columns.rows(phase) + 1, self.columns.ends(phase));
-        let (x, y, last) = (self.columns.x(), self.columns.wall(phase), self.columns.x().len() - 1);
+    /// ∫q ds over a wall that a phase reaches, where q is given.
+    fn given_flux(
+        &self,
+        problem: &dyn Problem,
+        wall: usize,
+        (phase, u): (usize, &[Vec<f64>; 2]),
+        t: f64,
+    ) -> Option<f64> {
+        let nodes = self.columns.rows(phase) + 1;
+        let at = if wall == LOWER { 0 } else { nodes - 1 };
+        let (x, y, last) = (self.columns.x(), self.columns.wall(wall), self.columns.x().len() - 1);
         let rise = super::front::tilt(&self.columns, y, self.mirrored());
         let flux = |i: usize| {
-            let [flux, _] = problem.flux(phase, [x[i], y[i]], u[i * nodes + wall], t)?;
+            let [flux, _] = problem.flux(wall, [x[i], y[i]], u[phase][i * nodes + at], t)?;
             let part = if i == 0 || i == last { 0.5 } else { 1.0 };
             Some(part * self.columns.spacing() * flux * rise[i].hypot(1.0))
         };

@@ -1,6 +1,6 @@
 //! One implicit step of the heat equation in one phase.
 
-use super::columns::{Columns, LOWER, UPPER};
+use super::columns::Columns;
 use crate::error::Result;
 use crate::geometry::{Mesh, Patch};
 use crate::laplacian::{Laplacian, unchecked};
@@ -21,8 +21,9 @@ pub(super) struct HeatStep<'a> {
     pub u: &'a [f64],
     /// At the end of the step: given values on walls, front and Dirichlet sides; a guess elsewhere.
     pub sides: &'a [f64],
-    /// Where no value is given on the wall: a and b of the slope ∂u/∂y = a + b u there, for each column.
-    pub wall: Option<&'a [[f64; 2]]>,
+    /// Where no value is given at the lowest or the highest row: a and b of the slope ∂u/∂y = a + b u there, for each
+    /// column.
+    pub ends: [Option<&'a [[f64; 2]]>; 2],
     /// Whether nothing flows through the sides; otherwise their values are given.
     pub mirrored: bool,
 }
@@ -94,9 +95,9 @@ impl HeatStep<'_> {
         self.columns.rows(self.phase) + 1
     }
 
-    /// Rows of the mesh below the lowest node: one of ghosts below a bottom without a given value.
+    /// Rows of the mesh below the lowest node: one of ghosts where no value is given there.
     fn below(&self) -> usize {
-        usize::from(self.wall.is_some() && self.phase == LOWER)
+        usize::from(self.ends[0].is_some())
     }
 
     /// The node of the k-th unknown.
@@ -118,20 +119,18 @@ impl HeatStep<'_> {
         x
     }
 
-    /// The mesh of the phase with mirrored columns beyond the sides, and with ghosts beyond a wall without a given
-    /// value: the mirror images of the nodes next to it.
+    /// The mesh of the phase with mirrored columns beyond the sides, and with ghosts beyond a row without a given value:
+    /// the mirror images of the nodes next to it.
     fn mesh(&self) -> Result<Mesh<2>> {
-        if self.wall.is_none() {
-            return self.columns.mesh(self.nodes(), self.y, self.mirrored);
-        }
-        let mut y = Vec::with_capacity(self.y.len() + self.columns.x().len());
+        let ghosts = self.ends.iter().flatten().count();
+        let mut y = Vec::with_capacity(self.y.len() + ghosts * self.columns.x().len());
         for column in self.y.chunks_exact(self.nodes()) {
             let last = column.len() - 1;
-            y.extend((self.phase == LOWER).then(|| 2.0 * column[0] - column[1]));
+            y.extend(self.ends[0].map(|_| 2.0 * column[0] - column[1]));
             y.extend_from_slice(column);
-            y.extend((self.phase == UPPER).then(|| 2.0 * column[last] - column[last - 1]));
+            y.extend(self.ends[1].map(|_| 2.0 * column[last] - column[last - 1]));
         }
-        self.columns.mesh(self.nodes() + 1, &y, self.mirrored)
+        self.columns.mesh(self.nodes() + ghosts, &y, self.mirrored)
     }
 
     fn rows(&self, laplacian: Laplacian) -> Result<Option<Rows>> {
@@ -141,13 +140,15 @@ impl HeatStep<'_> {
         let [count, inside] = patch.size;
         let mut matrix = LatticeMatrix::<2, 9>::zero(patch);
         let mut source = vec![0.0; patch.len()];
-        let [_, wall] = self.columns.ends(self.phase);
+        let last = self.nodes() - 1;
         for (k, laplacian) in nine.iter().enumerate() {
             let i = k / inside;
             let own = self.own(&patch, k);
             let mut row = self.row(own, laplacian);
-            if let Some(slopes) = self.wall.filter(|_| own % self.nodes() == wall) {
-                source[k] = -self.reflect(&mut row, own / self.nodes(), slopes);
+            for (end, at) in [0, last].into_iter().enumerate() {
+                if let Some(slopes) = self.ends[end].filter(|_| own % self.nodes() == at) {
+                    source[k] = -self.reflect(&mut row, [own / self.nodes(), end], slopes);
+                }
             }
             if self.mirrored {
                 fold(&mut row, [i == 0, i + 1 == count]);
@@ -161,9 +162,9 @@ impl HeatStep<'_> {
     fn row(&self, own: usize, laplacian: &[f64; 9]) -> [f64; 9] {
         let mut row = laplacian.map(|a| -self.dt * self.diffusivity * a);
         row[0] += 1.0;
-        // walls do not move
-        let [_, wall] = self.columns.ends(self.phase);
-        if let Some(w) = self.velocity.filter(|_| own % self.nodes() != wall) {
+        // only walls are unknown at an end, and do not move
+        let inside = !own.is_multiple_of(self.nodes()) && !(own + 1).is_multiple_of(self.nodes());
+        if let Some(w) = self.velocity.filter(|_| inside) {
             let weights = slope([self.y[own - 1], self.y[own], self.y[own + 1]]);
             // the node and its neighbours along the column
             for (place, weight) in [3, 0, 4].into_iter().zip(weights) {
@@ -173,22 +174,21 @@ impl HeatStep<'_> {
         row
     }
 
-    /// Expresses the ghosts beyond the wall by their images and by the slope at the wall, and returns the constant of
-    /// the row that this leaves.
-    fn reflect(&self, row: &mut [f64; 9], i: usize, slopes: &[[f64; 2]]) -> f64 {
+    /// Expresses the ghosts beyond an end of the i-th column by their images and by the slope at the end, and returns the
+    /// constant of the row that this leaves.
+    fn reflect(&self, row: &mut [f64; 9], [i, end]: [usize; 2], slopes: &[[f64; 2]]) -> f64 {
         let (nodes, last) = (self.nodes(), self.columns.x().len() - 1);
-        let [_, wall] = self.columns.ends(self.phase);
-        let next = if self.phase == LOWER { 1 } else { wall - 1 };
-        // the place of the node on the wall, and of its neighbours below and above
+        let [at, next] = if end == 0 { [0, 1] } else { [nodes - 1, nodes - 2] };
+        // the place of the node at the end, and of its neighbours below and above
         let columns = [(i, [0, 3, 4]), (i.checked_sub(1).unwrap_or(1), [1, 5, 6]), (i + 1, [2, 7, 8])];
         let mut constant = 0.0;
         for (column, [on_wall, low, high]) in columns {
             let column = if column > last { last - 1 } else { column };
-            let (ghost, image) = if self.phase == LOWER { (low, high) } else { (high, low) };
+            let (ghost, image) = if end == 0 { (low, high) } else { (high, low) };
             let weight = std::mem::take(&mut row[ghost]);
             let [a, b] = slopes[column];
             // u at the ghost is u at its image plus this distance times the slope
-            let distance = 2.0 * (self.y[column * nodes + wall] - self.y[column * nodes + next]);
+            let distance = 2.0 * (self.y[column * nodes + at] - self.y[column * nodes + next]);
             row[image] += weight;
             row[on_wall] += weight * distance * b;
             constant += weight * distance * a;

@@ -2,7 +2,7 @@
 
 use super::balance::Instant;
 use super::columns::{LOWER, UPPER};
-use super::conduct::{Fields, velocity};
+use super::conduct::{Fields, present, velocity};
 use super::energy::Energy;
 use super::response::Response;
 use super::solver::{Front, FrontState, Problem};
@@ -47,7 +47,7 @@ impl Front {
     ) -> Result<(Fields, Energy, Work, Option<f64>)> {
         let mut work = Work::default();
         let tau = IMPLICIT * (t - state.t);
-        let start = Fields { h: state.front.clone(), u: state.u.clone() };
+        let start = state.fields();
         let leaned = self.leaned(problem, &start, slopes, [state.t, tau])?;
         let between = state.t + 2.0 * tau;
         let middle = self.newton(problem, &leaned, &start.h, [between, tau], &mut work)?;
@@ -81,12 +81,15 @@ impl Front {
         slopes: &[Vec<f64>; 2],
         [t, dt]: [f64; 2],
     ) -> Result<Fields> {
-        let h = self.moved(problem, [&start.h; 2], slopes, [t + dt, dt])?;
+        let h = match start.alone {
+            None => self.moved(problem, [&start.h; 2], slopes, [t + dt, dt])?,
+            Some(_) => start.h.clone(),
+        };
         let (old, new) = (self.heights(&start.h), self.heights(&h));
         let motion = [LOWER, UPPER].map(|phase| velocity(&old[phase], &new[phase], dt));
         let gain = self.gain(problem, start, &motion, [t, dt])?;
         let u = [LOWER, UPPER].map(|phase| start.u[phase].iter().zip(&gain[phase]).map(|(u, gain)| u + gain).collect());
-        Ok(Fields { h, u })
+        Ok(Fields { h, u, alone: start.alone })
     }
 
     /// The size of an estimated error: of the front against its distance from the nearer wall, of the temperatures,
@@ -102,12 +105,12 @@ impl Front {
         let all = || end.u.iter().flatten().copied();
         let range = all().fold(f64::MIN, f64::max) - all().fold(f64::MAX, f64::min);
         let (old, new) = (self.heights(&base.h), self.heights(&end.h));
-        for phase in [LOWER, UPPER] {
+        for phase in present(end.alone) {
             let zero = vec![0.0; end.u[phase].len()];
             let mut solver = std::mem::take(&mut self.solvers[phase]);
             let motion = velocity(&old[phase], &new[phase], tau);
             let fields = [&new[phase][..], &miss.u[phase], &zero];
-            let damped = self.heat(phase, tau, fields, Some(&motion), None).solve(&mut solver, self.laplacian);
+            let damped = self.heat(phase, tau, fields, Some(&motion), &[None, None]).solve(&mut solver, self.laplacian);
             self.solvers[phase] = solver;
             error = larger(error, damped?.into_iter().fold(0.0, larger) / range.max(f64::MIN_POSITIVE));
         }
@@ -123,6 +126,11 @@ impl Front {
         [t, dt]: [f64; 2],
         work: &mut Work,
     ) -> Result<Fields> {
+        if from.alone.is_some() {
+            let u = self.conduct(problem, from, guess, [t, dt])?;
+            work.linear_solves += 1;
+            return Ok(Fields { h: guess.to_vec(), u, alone: from.alone });
+        }
         let response = match self.response.take() {
             Some((known, response)) if known == dt => response,
             _ => Response::new(&self.columns, &self.material, dt),
@@ -142,7 +150,7 @@ impl Front {
             miss = residual.iter().copied().fold(0.0, larger);
             if miss <= tolerance {
                 self.response = Some((dt, response));
-                return Ok(Fields { h, u });
+                return Ok(Fields { h, u, alone: from.alone });
             }
             let correction = response.correct(self, &h, &slopes, dt, &residual);
             h.iter_mut().zip(correction).for_each(|(h, c)| *h += c);

@@ -109,8 +109,16 @@ pub struct FrontState {
     pub front: Vec<f64>,
     /// Temperatures below and above it, column by column.
     pub u: [Vec<f64>; 2],
+    /// The phase that fills the box, if one does: the front then lies on the wall of the other one.
+    pub alone: Option<usize>,
     /// Balance of energy.
     pub energy: Energy,
+}
+
+impl FrontState {
+    pub(super) fn fields(&self) -> Fields {
+        Fields { h: self.front.clone(), u: self.u.clone(), alone: self.alone }
+    }
 }
 
 /// What a step comes to.
@@ -179,10 +187,10 @@ impl Front {
                 return Err(self.columns.not_finite(INITIAL[phase], u[phase][k], phase, k, y).into());
             }
         }
-        let content = self.content(&front, &u);
+        let content = self.content(&Fields { h: front.clone(), u: u.clone(), alone: None });
         let energy = Energy { start: content, now: content, ..Energy::default() };
         self.check_warm_below(&front, &self.slopes(&front, &u))?;
-        Ok(FrontState { t, step: 0, front, u, energy })
+        Ok(FrontState { t, step: 0, front, u, alone: None, energy })
     }
 
     fn check_warm_below(&self, h: &[f64], slopes: &[Vec<f64>; 2]) -> Result<(), Failure> {
@@ -238,7 +246,7 @@ impl Front {
             Stepping::Implicit => self.tr_bdf2(problem, state, &slopes, t)?,
         };
         self.check_warm_below(&end.h, &self.slopes(&end.h, &end.u))?;
-        let state = FrontState { t, step: state.step + 1, front: end.h, u: end.u, energy };
+        let state = FrontState { t, step: state.step + 1, front: end.h, u: end.u, alone: end.alone, energy };
         Ok(Attempt { state, work, error })
     }
 
@@ -256,9 +264,9 @@ impl Front {
         }
         let h = self.moved(problem, [&state.front; 2], slopes, [t, dt])?;
         self.columns.check(&h)?;
-        let from = Fields { h: state.front.clone(), u: state.u.clone() };
+        let from = state.fields();
         let u = self.conduct(problem, &from, &h, [t, dt])?;
-        let end = Fields { h, u };
+        let end = Fields { h, u, alone: state.alone };
         let instant = Instant { t, dt, fields: &end, from: &state.front, over: dt };
         let energy = self.balance(problem, state, &end, &[instant]);
         Ok((end, energy, Work { linear_solves: 2, ..Work::default() }, None))
