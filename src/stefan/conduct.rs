@@ -67,7 +67,7 @@ impl Front {
     }
 
     /// Temperatures of a phase at time `t` after a step of `dt`, from those at the start and the heights at the end.
-    fn conduct_in(
+    pub(super) fn conduct_in(
         &mut self,
         problem: &dyn Problem,
         (phase, alone): (usize, Option<usize>),

@@ -17,6 +17,7 @@ mod balance;
 mod columns;
 mod conduct;
 mod energy;
+mod events;
 mod exact;
 mod front;
 mod heat;
@@ -27,6 +28,7 @@ mod solver;
 
 pub use columns::{Columns, LOWER, UPPER};
 pub use energy::Energy;
+pub use events::{Change, PhaseEvent};
 pub use exact::Similarity;
 pub use front::{Filter, Method};
 pub use material::Material;

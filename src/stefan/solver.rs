@@ -2,10 +2,11 @@ use super::balance::Instant;
 use super::columns::{Columns, LOWER, UPPER};
 use super::conduct::Fields;
 use super::energy::Energy;
+use super::events::PhaseEvent;
 use super::front::{self, Filter, Method};
 use super::material::Material;
 use super::response::Response;
-use crate::error::{Failure, Result};
+use crate::error::{Error, Failure, Result};
 use crate::laplacian::Laplacian;
 use crate::numerics::larger;
 use crate::numerics::linear::Robust;
@@ -131,6 +132,8 @@ pub struct Attempt {
     /// Of an implicit step its estimated error: the larger one of the front's, as a share of its distance from the nearer
     /// wall, and of the temperature's, as a share of its range.
     pub error: Option<f64>,
+    /// A phase that has appeared or vanished.
+    pub event: Option<PhaseEvent>,
 }
 
 /// Names, for messages, of the initial temperatures by phase.
@@ -170,13 +173,16 @@ impl Front {
     /// As [`Columns::check`]; [`Failure::NonFinite`] where a temperature is not finite; [`Failure::WrongSide`].
     pub fn start(&self, problem: &dyn Problem, t: f64) -> Result<FrontState> {
         let front: Vec<f64> = self.columns.x().iter().map(|&x| problem.initial_front(x)).collect();
-        self.columns.check(&front)?;
+        let alone = self.fills(&front);
+        if alone.is_none() {
+            self.columns.check(&front)?;
+        }
         let u = [LOWER, UPPER].map(|phase| {
             let y = self.columns.heights(phase, &front);
             let nodes = self.columns.rows(phase) + 1;
             let [on_front, _] = self.columns.ends(phase);
             let value = |k: usize| match k % nodes {
-                j if j == on_front => self.material.melting,
+                j if j == on_front && alone.is_none() => self.material.melting,
                 _ => problem.initial(phase, [self.columns.x()[k / nodes], y[k]]),
             };
             (0..y.len()).map(value).collect::<Vec<f64>>()
@@ -187,17 +193,19 @@ impl Front {
                 return Err(self.columns.not_finite(INITIAL[phase], u[phase][k], phase, k, y).into());
             }
         }
-        let content = self.content(&Fields { h: front.clone(), u: u.clone(), alone: None });
+        let content = self.content(&Fields { h: front.clone(), u: u.clone(), alone });
         let energy = Energy { start: content, now: content, ..Energy::default() };
-        self.check_warm_below(&front, &self.slopes(&front, &u))?;
-        Ok(FrontState { t, step: 0, front, u, alone: None, energy })
+        let state = FrontState { t, step: 0, front, u, alone, energy };
+        self.check_warm_below(&state)?;
+        Ok(state)
     }
 
-    fn check_warm_below(&self, h: &[f64], slopes: &[Vec<f64>; 2]) -> Result<(), Failure> {
-        match self.undercooled {
-            Some(_) => Ok(()),
-            None => front::check_warm_below(&self.columns, h, slopes, self.material.conductivity),
+    fn check_warm_below(&self, state: &FrontState) -> Result<(), Failure> {
+        if self.undercooled.is_some() || state.alone.is_some() {
+            return Ok(());
         }
+        let slopes = self.slopes(&state.front, &state.u);
+        front::check_warm_below(&self.columns, &state.front, &slopes, self.material.conductivity)
     }
 
     pub(super) fn heights(&self, h: &[f64]) -> [Vec<f64>; 2] {
@@ -211,16 +219,17 @@ impl Front {
 
     /// The longest step for which the explicit front is stable, as estimated from the temperatures at the front.
     pub fn limit(&self, state: &FrontState) -> f64 {
-        front::limit(&self.columns, &self.slopes(&state.front, &state.u), &self.material, self.filter)
+        match state.alone {
+            Some(_) => f64::INFINITY,
+            None => front::limit(&self.columns, &self.slopes(&state.front, &state.u), &self.material, self.filter),
+        }
     }
 
     /// The time in which the front, at its speed now, would move as far as it is from the nearer wall.
     pub fn passage(&self, problem: &dyn Problem, state: &FrontState) -> f64 {
-        let slopes = self.slopes(&state.front, &state.u);
-        let dt = 1e-3 * self.limit(state).min(1.0);
-        let Ok(moved) = self.moved(problem, [&state.front; 2], &slopes, [state.t, dt]) else { return f64::INFINITY };
-        let room = |(i, (a, b)): (usize, (&f64, &f64))| self.columns.room(i, *a) * dt / (b - a).abs();
-        state.front.iter().zip(&moved).enumerate().map(room).fold(f64::INFINITY, f64::min)
+        let speed = if state.alone.is_none() { self.speed(problem, state) } else { None };
+        let time = |(i, speed): (usize, &f64)| self.columns.room(i, state.front[i]) / speed.abs();
+        speed.unwrap_or_default().iter().enumerate().map(time).fold(f64::INFINITY, f64::min)
     }
 
     /// A step to time `t`; the state changes only if it succeeds.
@@ -234,20 +243,41 @@ impl Front {
         Ok(attempt.work)
     }
 
-    /// What a step to time `t` would come to.
+    /// What a step to time `t` would come to. A phase may vanish in it, and one may appear.
     ///
     /// # Errors
     /// As [`step`](Self::step).
     pub fn attempt(&mut self, problem: &dyn Problem, state: &FrontState, t: f64) -> Result<Attempt> {
-        let slopes = self.slopes(&state.front, &state.u);
-        self.check_warm_below(&state.front, &slopes)?;
-        let (end, energy, work, error) = match self.stepping {
-            Stepping::Explicit => self.explicit(problem, state, &slopes, t)?,
-            Stepping::Implicit => self.tr_bdf2(problem, state, &slopes, t)?,
+        if let Some((mut from, event)) = self.appear(problem, state, t)? {
+            from.step = state.step;
+            if from.t >= t {
+                from.step += 1;
+                return Ok(Attempt { state: from, work: Work::default(), error: None, event: Some(event) });
+            }
+            return Ok(Attempt { event: Some(event), ..self.plain(problem, &from, t)? });
+        }
+        match self.plain(problem, state, t) {
+            Err(Error::Failed {
+                failure: failure @ (Failure::FrontOutside { .. } | Failure::VanishingPhase { .. }), ..
+            }) => self.cross(problem, state, t, failure),
+            other => other,
+        }
+    }
+
+    /// A step in which no phase vanishes or appears.
+    pub(super) fn plain(&mut self, problem: &dyn Problem, state: &FrontState, t: f64) -> Result<Attempt> {
+        self.check_warm_below(state)?;
+        let slopes = match state.alone {
+            Some(_) => Default::default(),
+            None => self.slopes(&state.front, &state.u),
         };
-        self.check_warm_below(&end.h, &self.slopes(&end.h, &end.u))?;
+        let (end, energy, work, error) = match self.stepping {
+            Stepping::Explicit if state.alone.is_none() => self.explicit(problem, state, &slopes, t)?,
+            _ => self.tr_bdf2(problem, state, &slopes, t)?,
+        };
         let state = FrontState { t, step: state.step + 1, front: end.h, u: end.u, alone: end.alone, energy };
-        Ok(Attempt { state, work, error })
+        self.check_warm_below(&state)?;
+        Ok(Attempt { state, work, error, event: None })
     }
 
     fn explicit(
@@ -305,6 +335,9 @@ impl Front {
 
     /// Largest errors of the front and of the temperature, where the problem knows the exact solution.
     pub fn errors(&self, problem: &dyn Problem, state: &FrontState) -> Option<[f64; 2]> {
+        if state.alone.is_some() {
+            return None;
+        }
         let x = self.columns.x();
         let mut worst = [0.0, 0.0];
         for (&x, &h) in x.iter().zip(&state.front) {

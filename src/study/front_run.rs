@@ -9,7 +9,7 @@ use crate::geometry::{Mesh, quality};
 use crate::kept::{Kept, check_nodal};
 use crate::output::{FramesAt, Picture, RunDirectory, Spent, Summary, draw_curves};
 use crate::simulation::{Event, Scene, Schedule, Snapshot, WorkTotal};
-use crate::stefan::{Attempt, Energy, Front, FrontState, LOWER, Stepping, UPPER};
+use crate::stefan::{Attempt, Energy, Front, FrontState, LOWER, PhaseEvent, Stepping, UPPER};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -27,6 +27,8 @@ const TOLERANCE: f64 = 1e-6;
 const PACE: [f64; 2] = [0.2, 2.0];
 /// How often an automatic step that fails is halved before the run fails.
 const HALVINGS: i32 = 6;
+/// Automatic steps that are shorter than this share of the run are not halved again.
+const SHORTEST: f64 = 1e-7;
 /// How often an automatic step with too large an error is shortened before it is taken as it is.
 const REJECTIONS: usize = 12;
 /// Fronts that the picture over time shows, about.
@@ -58,6 +60,8 @@ pub struct FrontCourse {
     warnings: Vec<String>,
     /// Times and fronts, some of them.
     fronts: Vec<(f64, Vec<f64>)>,
+    /// Phases that have appeared or vanished.
+    pub phases: Vec<PhaseEvent>,
     /// Length of the next automatic step of an implicit front; none before the first.
     pace: Option<f64>,
     /// In a checkpoint, what frames, tables and observers carry; empty in a run.
@@ -71,7 +75,9 @@ impl FrontCourse {
         let heights = |front: &[f64]| check_nodal("front", front.as_chunks::<1>().0, columns.x().len());
         heights(&state.front)?;
         self.fronts.iter().try_for_each(|(_, front)| heights(front))?;
-        columns.check(&state.front).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+        if state.alone.is_none() {
+            columns.check(&state.front).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+        }
         for phase in [LOWER, UPPER] {
             let nodes = columns.x().len() * (columns.rows(phase) + 1);
             check_nodal("temperature", state.u[phase].as_chunks::<1>().0, nodes)?;
@@ -103,6 +109,7 @@ impl FrontRun {
             reports: Vec::new(),
             warnings: Vec::new(),
             fronts: Vec::new(),
+            phases: Vec::new(),
             pace: None,
             kept: Kept::default(),
         };
@@ -118,13 +125,14 @@ impl FrontRun {
     }
 
     fn mesh(&self) -> Result<Mesh<2>> {
-        self.front.columns.whole(&self.course.state.front)
+        self.front.columns.whole(&self.front.shown(&self.course.state).0)
     }
 
     fn scene_on(&self, mesh: &Mesh<2>) -> Scene {
-        let (columns, FrontState { t, step, front, u, .. }) = (&self.front.columns, &self.course.state);
+        let (columns, FrontState { t, step, front, .. }) = (&self.front.columns, &self.course.state);
         let curve = columns.x().iter().zip(front).map(|(x, y)| [*x, *y]).collect();
-        Scene { curve, ..Scene::of_mesh(*t, *step, mesh, vec![("u".into(), columns.joined(u))]) }
+        let (_, u) = self.front.shown(&self.course.state);
+        Scene { curve, ..Scene::of_mesh(*t, *step, mesh, vec![("u".into(), columns.joined(&u))]) }
     }
 
     /// Fronts over time, the last good one among them.
@@ -218,8 +226,12 @@ impl FrontRun {
             Stepping::Explicit => (OF_THE_LIMIT * front.limit(state)).min(slow()) * 0.5_f64.powi(halvings),
             Stepping::Implicit => self.course.pace.unwrap_or_else(slow),
         };
-        let longest = (schedule.end() - schedule.start()) / PARTS;
+        let longest = self.span() / PARTS;
         schedule.after(state.t, dt.min(longest))
+    }
+
+    fn span(&self) -> f64 {
+        self.schedule.end() - self.schedule.start()
     }
 
     /// Whether an automatic step of this length with this error will do; sets the length of the next one.
@@ -250,10 +262,12 @@ impl Running for FrontRun {
             let (began, dt) = (Instant::now(), t - self.course.state.t);
             let attempt = self.front.attempt(&self.given, &self.course.state, t);
             self.course.seconds.parts.pde += began.elapsed().as_secs_f64();
-            let Attempt { state, work, error } = match attempt {
+            let Attempt { state, work, error, event } = match attempt {
                 Ok(attempt) => attempt,
                 // the state is as it was
-                Err(Error::Failed { .. }) if self.schedule.is_automatic() && halvings < HALVINGS => {
+                Err(Error::Failed { .. })
+                    if self.schedule.is_automatic() && halvings < HALVINGS && dt > SHORTEST * self.span() =>
+                {
                     halvings += 1;
                     self.course.pace = Some(0.5 * dt);
                     self.course.work.rejected_steps += 1;
@@ -273,6 +287,7 @@ impl Running for FrontRun {
             }
             (halvings, rejections) = (0, 0);
             self.course.state = state;
+            self.course.phases.extend(event);
             self.course.work.steps += 1;
             self.tell(Event::Stepped, dt, stage)?;
         }
@@ -314,8 +329,8 @@ impl Running for FrontRun {
     }
 
     fn tell(&self, summary: &mut Summary<FrontSummary>) {
-        let FrontCourse { seconds, work, reports, warnings, .. } = self.course.clone();
-        summary.figures = FrontSummary { work, reports };
+        let FrontCourse { seconds, work, reports, warnings, phases, .. } = self.course.clone();
+        summary.figures = FrontSummary { work, reports, phases };
         (summary.seconds, summary.warnings) = (seconds, warnings);
     }
 
