@@ -142,11 +142,9 @@ duration = 36000.0
 /// Ten hours, for two latent heats, with temperatures above melting and above absolute zero.
 #[test]
 fn ice_melts_in_the_units_of_a_data_sheet() {
-    for set in [
-        &[][..],
-        &["front.latent_heat=3.34e8"],
-        &["front.melting=273.15", "exact.wall=293.15", "exact.far=268.15"],
-    ] {
+    for set in
+        [&[][..], &["front.latent_heat=3.34e8"], &["front.melting=273.15", "exact.wall=293.15", "exact.far=268.15"]]
+    {
         let report = course(ICE, &set.iter().map(|s| s.to_string()).collect::<Vec<_>>()).reports[0];
         let [error, energy] = [report.front.error_linf.unwrap(), report.energy_imbalance.unwrap()];
         println!("{set:?}: {} {:e} {energy:e}", report.front.mean, error / report.front.mean);
@@ -158,7 +156,10 @@ fn ice_melts_in_the_units_of_a_data_sheet() {
 #[test]
 fn material_is_given_in_one_way() {
     for (set, words) in [
-        (&["phase.lower.diffusivity=1.0"][..], &["phase.lower.diffusivity", "phase.lower.conductivity", "mobility"][..]),
+        (
+            &["phase.lower.diffusivity=1.0"][..],
+            &["phase.lower.diffusivity", "phase.lower.conductivity", "mobility"][..],
+        ),
         (&["front.mobility=1.0"], &["front.mobility", "front.latent_heat"]),
         (&["front.latent_heat=0.0"], &["front.latent_heat", "above 0"]),
         (&["phase.upper.capacity=-1.0"], &["phase.upper.capacity", "above 0"]),

@@ -86,7 +86,8 @@ impl Columns {
         &self.walls[phase]
     }
 
-    /// Distance of a front at height y from the nearer wall at a column, a hundredth of that between the walls at least.
+    /// Distance of a front at height y from the nearer wall at a column, a hundredth of that between the walls at
+    /// least.
     pub(super) fn room(&self, i: usize, y: f64) -> f64 {
         let [bottom, top] = self.walls.each_ref().map(|wall| wall[i]);
         (y - bottom).min(top - y).max(0.01 * (top - bottom))

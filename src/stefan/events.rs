@@ -112,8 +112,8 @@ impl Front {
         Err(failure.into())
     }
 
-    /// The state at a time `t`, without a phase that is gone at the time `gone`. What its last per cent took is not part
-    /// of the balance of energy.
+    /// The state at a time `t`, without a phase that is gone at the time `gone`. What its last per cent took is not
+    /// part of the balance of energy.
     fn vanish(
         &mut self,
         problem: &dyn Problem,
@@ -142,8 +142,8 @@ impl Front {
         FrontState { t, step: state.step + 1, front: end.h, u: end.u, alone: end.alone, energy }
     }
 
-    /// The state soon after the other phase has appeared at its wall, whose temperature is beyond melting; none where it
-    /// is not. The new phase and what it does to the other one are Neumann's solution.
+    /// The state soon after the other phase has appeared at its wall, whose temperature is beyond melting; none where
+    /// it is not. The new phase and what it does to the other one are Neumann's solution.
     pub(super) fn appear(
         &self,
         problem: &dyn Problem,
@@ -188,6 +188,18 @@ impl Front {
         }
         let event = PhaseEvent::new(state.t, Change::Appeared, phase);
         Ok(Some((self.rebalanced(state, Fields { h, u, alone: None }, state.t + grown), event)))
+    }
+
+    /// The phase that would appear at a wall with a given flux, where its temperature is beyond melting.
+    pub fn overdue(&self, problem: &dyn Problem, state: &FrontState) -> Option<&'static str> {
+        const BEYOND: f64 = 1e-6;
+        let alone = state.alone?;
+        let (phase, nodes) = (1 - alone, self.columns.rows(alone) + 1);
+        let at = if phase == LOWER { 0 } else { nodes - 1 };
+        let beyond = |u: &f64| (u - self.material.melting) * if phase == LOWER { 1.0 } else { -1.0 };
+        let farthest = state.u[alone].iter().skip(at).step_by(nodes).map(beyond).fold(f64::MIN, f64::max);
+        let size = state.u[alone].iter().map(|u| beyond(u).abs()).fold(0.0, f64::max);
+        (self.has_flux(problem, phase, state.t) && farthest > BEYOND * size).then_some(["lower", "upper"][phase])
     }
 
     /// Front and temperatures on a mesh that can be drawn: where a phase fills the box, its rows and those of the other

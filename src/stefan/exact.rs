@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 /// line source:  u₁ = Q/(4πk₁) (E₁(r²/4D₁t) − E₁(λ²/D₁))                u₀ = T₀ (1 − E₁(r²/4D₀t) / E₁(λ²/D₀))
 /// ```
 ///
-/// with temperatures above that of melting, and the front at s = 2λ√t or r = 2λ√t. s is the distance from a wall that rises to the right by an angle, r the
-/// distance from the source; λ follows from the condition on the front.
+/// with temperatures above that of melting, and the front at s = 2λ√t or r = 2λ√t. s is the distance from a wall that
+/// rises to the right by an angle, r the distance from the source; λ follows from the condition on the front.
 ///
 /// # Example
 /// ```

@@ -28,7 +28,8 @@ pub(super) struct HeatStep<'a> {
     pub mirrored: bool,
 }
 
-/// The rows of 1 − Δt (D Δ + w ∂/∂y) for the unknowns of a phase, and what the slope at the wall adds to the right side.
+/// The rows of 1 − Δt (D Δ + w ∂/∂y) for the unknowns of a phase, and what the slope at the wall adds to the right
+/// side.
 struct Rows {
     matrix: LatticeMatrix<2, 9>,
     source: Vec<f64>,
@@ -119,8 +120,8 @@ impl HeatStep<'_> {
         x
     }
 
-    /// The mesh of the phase with mirrored columns beyond the sides, and with ghosts beyond a row without a given value:
-    /// the mirror images of the nodes next to it.
+    /// The mesh of the phase with mirrored columns beyond the sides, and with ghosts beyond a row without a given
+    /// value: the mirror images of the nodes next to it.
     fn mesh(&self) -> Result<Mesh<2>> {
         let ghosts = self.ends.iter().flatten().count();
         let mut y = Vec::with_capacity(self.y.len() + ghosts * self.columns.x().len());
@@ -174,8 +175,8 @@ impl HeatStep<'_> {
         row
     }
 
-    /// Expresses the ghosts beyond an end of the i-th column by their images and by the slope at the end, and returns the
-    /// constant of the row that this leaves.
+    /// Expresses the ghosts beyond an end of the i-th column by their images and by the slope at the end, and returns
+    /// the constant of the row that this leaves.
     fn reflect(&self, row: &mut [f64; 9], [i, end]: [usize; 2], slopes: &[[f64; 2]]) -> f64 {
         let (nodes, last) = (self.nodes(), self.columns.x().len() - 1);
         let [at, next] = if end == 0 { [0, 1] } else { [nodes - 1, nodes - 2] };

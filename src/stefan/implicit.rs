@@ -36,8 +36,8 @@ impl Front {
     /// u' is the rate at a node that moves with the front. `slopes` are ∂u/∂y at the start.
     ///
     /// # Source
-    /// Bank and others, *Transient simulation of silicon devices and circuits* (1985); Hosea and Shampine, *Analysis and
-    /// implementation of TR-BDF2* (1996), for the estimate of the error.
+    /// Bank and others, *Transient simulation of silicon devices and circuits* (1985); Hosea and Shampine, *Analysis
+    /// and implementation of TR-BDF2* (1996), for the estimate of the error.
     pub(super) fn tr_bdf2(
         &mut self,
         problem: &dyn Problem,
@@ -54,7 +54,8 @@ impl Front {
         let root = std::f64::consts::SQRT_2;
         let base = Fields::sum([(0.5 * (root + 1.0), &middle), (0.5 * (1.0 - root), &start)]);
         let end = self.newton(problem, &base, &middle.h, [t, tau], &mut work)?;
-        let instant = |t, weight: f64, fields, from| Instant { t, dt: weight * tau / IMPLICIT, fields, from, over: tau };
+        let instant =
+            |t, weight: f64, fields, from| Instant { t, dt: weight * tau / IMPLICIT, fields, from, over: tau };
         // at the start the front has moved on by `tau` to where `leaned` is
         let behind = Fields::sum([(2.0, &start), (-1.0, &leaned)]);
         let instants = [

@@ -29,10 +29,11 @@ pub enum Transfer {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Stepping {
-    /// The front moves by the heat flux at the start of the step, then temperatures take a step of implicit Euler. First
-    /// order in time; stability limits the step.
+    /// The front moves by the heat flux at the start of the step, then temperatures take a step of implicit Euler.
+    /// First order in time; stability limits the step.
     Explicit,
-    /// Front and temperatures together by TR-BDF2, each stage by Newton's method. Second order in time, without a limit.
+    /// Front and temperatures together by TR-BDF2, each stage by Newton's method. Second order in time, without a
+    /// limit.
     #[default]
     Implicit,
 }
@@ -129,8 +130,8 @@ pub struct Attempt {
     pub state: FrontState,
     /// Its cost.
     pub work: Work,
-    /// Of an implicit step its estimated error: the larger one of the front's, as a share of its distance from the nearer
-    /// wall, and of the temperature's, as a share of its range.
+    /// Of an implicit step its estimated error: the larger one of the front's, as a share of its distance from the
+    /// nearer wall, and of the temperature's, as a share of its range.
     pub error: Option<f64>,
     /// A phase that has appeared or vanished.
     pub event: Option<PhaseEvent>,
@@ -258,7 +259,8 @@ impl Front {
         }
         match self.plain(problem, state, t) {
             Err(Error::Failed {
-                failure: failure @ (Failure::FrontOutside { .. } | Failure::VanishingPhase { .. }), ..
+                failure: failure @ (Failure::FrontOutside { .. } | Failure::VanishingPhase { .. }),
+                ..
             }) => self.cross(problem, state, t, failure),
             other => other,
         }

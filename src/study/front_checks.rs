@@ -1,9 +1,9 @@
 //! Studies of kind `stefan`: what is refused, what is doubtful, and what runs.
 
 use super::common::{Header, Output, StudyKind};
+use super::front_given::Given;
 use super::front_run::{FrontCourse, FrontRun};
 use super::kind::Kind;
-use super::front_given::Given;
 use super::mapped::{Ends, check_between, parse};
 use super::stefan::{ExactKind, FrontTime, StefanStudy};
 use crate::error::{Error, Failure, Result};
@@ -108,6 +108,7 @@ impl Kind for StefanStudy {
             let rule = "the temperature is infinite there, inside the box; move it below bottom or beyond the sides";
             return Err(Error::invalid("exact.centre", format!("[{cx}, {cy}]"), rule));
         }
+        front.undercooled = self.undercooled(&front, &given)?;
         let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
         let frames = self.output.frames_of(&schedule)?;
         self.output.check()?;
@@ -116,6 +117,27 @@ impl Kind for StefanStudy {
 }
 
 impl StefanStudy {
+    /// The phase that is an undercooled melt, where `front.undercooled` says that there is one.
+    fn undercooled(&self, front: &Front, given: &Given) -> Result<Option<usize>> {
+        if !self.front.undercooled {
+            return Ok(None);
+        }
+        let cold = |phase: usize| {
+            let places = front.columns.x().iter().zip(front.columns.wall(phase)).flat_map(|(&x, &wall)| {
+                let h = given.initial_front(x);
+                (1..=8).map(move |k| [x, h + (wall - h) * f64::from(k) / 8.0])
+            });
+            places.into_iter().any(|place| given.initial(phase, place) < front.material.melting)
+        };
+        match [UPPER, LOWER].into_iter().find(|&phase| cold(phase)) {
+            Some(phase) => Ok(Some(phase)),
+            None => {
+                let rule = "no phase is below the melting temperature at the start; leave it out";
+                Err(Error::invalid("front.undercooled", true, rule))
+            }
+        }
+    }
+
     fn schedule(&self, given: &Given) -> Result<Schedule> {
         let FrontTime { start, end, duration, step, report } = &self.time;
         let from = match (given, start) {

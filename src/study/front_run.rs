@@ -1,7 +1,7 @@
 //! Studies of kind `stefan`: how they run.
 
-use super::front_given::Given;
 use super::front_figures::{FrontParts, FrontReport, FrontSummary, Row, Tables};
+use super::front_given::Given;
 use super::kind::{Running, SpentBy};
 use super::runner::Stage;
 use crate::error::{Error, Moment, Result, Unfit};
@@ -16,8 +16,8 @@ use std::time::Instant;
 
 /// Automatic steps of an explicit front are at most this share of the longest stable one.
 const OF_THE_LIMIT: f64 = 0.5;
-/// In an automatic step an explicit front moves at most by this share of its distance from the nearer wall; in the first
-/// one of an implicit front, too.
+/// In an automatic step an explicit front moves at most by this share of its distance from the nearer wall; in the
+/// first one of an implicit front, too.
 const OF_THE_ROOM: f64 = 0.002;
 /// Automatic steps are at most the whole run over this number, which bounds what formulas of time may hide in a step.
 const PARTS: f64 = 50.0;
@@ -230,6 +230,18 @@ impl FrontRun {
         schedule.after(state.t, dt.min(longest))
     }
 
+    /// Warns once where a phase would appear that cannot.
+    fn warn_of_overdue(&mut self) {
+        const NO_SEED: &str = "would appear at its wall, where a flux is given";
+        let Some(phase) = self.front.overdue(&self.given, &self.course.state) else { return };
+        if !self.course.warnings.iter().any(|warning| warning.contains(NO_SEED)) {
+            let t = self.course.state.t;
+            let what =
+                format!("at t = {t:.6} the {phase} phase {NO_SEED}, and is left out; give its temperature there");
+            self.course.warnings.push(what);
+        }
+    }
+
     fn span(&self) -> f64 {
         self.schedule.end() - self.schedule.start()
     }
@@ -288,6 +300,7 @@ impl Running for FrontRun {
             (halvings, rejections) = (0, 0);
             self.course.state = state;
             self.course.phases.extend(event);
+            self.warn_of_overdue();
             self.course.work.steps += 1;
             self.tell(Event::Stepped, dt, stage)?;
         }

@@ -99,8 +99,8 @@ pub struct PhaseTable {
     /// Temperature at the start, a formula of x and y.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub initial: Option<String>,
-    /// What holds on the wall: its temperature, a formula of x, y and t; `"no-flux"`; or `{ flux = "…" }`, what flows in,
-    /// a formula of u, x, y and t.
+    /// What holds on the wall: its temperature, a formula of x, y and t; `"no-flux"`; or `{ flux = "…" }`, what flows
+    /// in, a formula of u, x, y and t.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "wall_schema")]
     pub boundary: Option<Condition>,
@@ -132,6 +132,9 @@ pub struct FrontTable {
     /// T_m, the temperature of the front; 0 where nothing is said. Goes with `latent_heat`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub melting: Option<f64>,
+    /// Whether a phase is a melt below its melting temperature, which freezes into it: the upper one if its initial
+    /// temperature is below melting anywhere, else the lower one.
+    pub undercooled: bool,
     /// How the front is moved.
     pub method: Method,
     /// How temperatures get to the new mesh.
@@ -151,6 +154,7 @@ impl Default for FrontTable {
             mobility: None,
             latent_heat: None,
             melting: None,
+            undercooled: false,
             method: Method::default(),
             transfer: Transfer::default(),
             filter: Filter::default(),
