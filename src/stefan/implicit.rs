@@ -165,7 +165,7 @@ impl Front {
         let [bottom, top] = [LOWER, UPPER].map(|phase| self.columns.wall(phase));
         let height = top.iter().zip(bottom).fold(0.0_f64, |m, (top, bottom)| m.max(top - bottom));
         // the jump has the round-off of the temperatures
-        let size = from.u.iter().flatten().copied().fold(1.0, larger);
+        let size = from.u.iter().flatten().map(|u| u - self.material.melting).fold(1.0, larger);
         // and heights have that of their distance from the origin
         let farthest = bottom.iter().chain(top).copied().fold(0.0, larger);
         [CONVERGED * height * size, ROUNDING * farthest]

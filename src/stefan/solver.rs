@@ -44,6 +44,7 @@ pub enum Stepping {
 pub enum Sides {
     /// No flux: mesh and temperatures are mirrored.
     #[default]
+    #[serde(alias = "no-flux")]
     Neumann,
     /// Temperatures and the height of the front are given by the exact solution.
     Exact,
