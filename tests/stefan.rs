@@ -124,7 +124,7 @@ fn automatic_steps_that_fail_are_halved() {
         let set: Vec<String> = heated.iter().map(|s| s.to_string()).chain([format!("time.step={step}")]).collect();
         compute("stefan-slides", &set)
     };
-    let [given, automatic] = ["0.04", "\"auto\""].map(ends);
+    let [given, automatic] = ["0.13", "\"auto\""].map(ends);
     assert!(says(given.failure.as_ref().unwrap(), &["stalled", "lower the time step"]), "{:?}", given.failure);
     assert!(given.course.state.t < 1.6 && given.course.work.rejected_steps == 0);
     assert!(automatic.failure.is_none(), "{:?}", automatic.failure);

@@ -232,7 +232,8 @@ impl Failure {
                 Set(Setting::Stepping, &["\"implicit\""]),
             ])],
             Self::WrongSide { .. } => {
-                vec![Remedy::any([Say("let the lower phase be the warm one: mend the initial and boundary formulas")])]
+                let warm = Say("let the lower phase be the warm one: mend the initial and boundary formulas");
+                vec![Remedy::any([warm, Set(Setting::Undercooled, &["true"])])]
             }
             _ => Vec::new(),
         }

@@ -104,6 +104,9 @@ pub enum Setting {
     /// Stepping of a front.
     #[strum(serialize = "the stepping of the front")]
     Stepping,
+    /// Whether a phase is an undercooled melt.
+    #[strum(serialize = "that the melt is undercooled")]
+    Undercooled,
 }
 
 impl Setting {

@@ -86,6 +86,13 @@ impl Columns {
         &self.walls[phase]
     }
 
+    /// Distance of a front at height y from the nearer wall at a column, a hundredth of that between the walls at
+    /// least.
+    pub(super) fn room(&self, i: usize, y: f64) -> f64 {
+        let [bottom, top] = self.walls.each_ref().map(|wall| wall[i]);
+        (y - bottom).min(top - y).max(0.01 * (top - bottom))
+    }
+
     /// Row of the front and of the wall in a phase.
     pub fn ends(&self, phase: usize) -> [usize; 2] {
         if phase == LOWER { [self.rows[LOWER], 0] } else { [0, self.rows[UPPER]] }
@@ -105,9 +112,9 @@ impl Columns {
         y
     }
 
-    /// The mesh of a phase; with `mirrored`, one more column beyond each side.
-    pub(super) fn mesh(&self, phase: usize, y: &[f64], mirrored: bool) -> Result<Mesh<2>> {
-        let (n, m) = (self.x.len(), self.rows[phase] + 1);
+    /// The mesh of m nodes a column at heights y; with `mirrored`, one more column beyond each side.
+    pub(super) fn mesh(&self, m: usize, y: &[f64], mirrored: bool) -> Result<Mesh<2>> {
+        let n = self.x.len();
         let h = self.spacing();
         let mut nodes = Vec::with_capacity((n + 2) * m);
         let mut column = |x: f64, i: usize| nodes.extend(y[i * m..(i + 1) * m].iter().map(|&y| [x, y]));

@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 /// The balance of energy since the start
 ///
 /// ```text
-/// E = ∫u dA + (area below the front)/L,      imbalance = |ΔE − ∫F dt| / |ΔE|
+/// E = ∫C (u − T_m) dA + Λ (area below the front),      imbalance = |ΔE − ∫F dt| / |ΔE|
 /// ```
 ///
 /// F is the flux through walls and sides: by the weighted residual
 ///
 /// ```text
-/// F = d/dt ∫uΦ + D ∫∇u·∇Φ + ∫w u ∂Φ/∂y,   Φ linear in the row from 1 on the wall to 0 on the front
+/// F = d/dt ∫C u Φ + k ∫∇u·∇Φ + ∫C w u ∂Φ/∂y,   Φ linear in the row from 1 on the wall to 0 on the front
 /// ```
 ///
 /// and for comparison by one-sided differences over three rows.
@@ -52,7 +52,10 @@ pub(super) struct Phase<'a> {
     pub columns: &'a Columns,
     pub phase: usize,
     pub y: &'a [f64],
+    /// Temperatures above that of melting.
     pub u: &'a [f64],
+    pub conductivity: f64,
+    pub capacity: f64,
 }
 
 /// A point of two-point Gauss quadrature in a cell: its share of the area, and values and gradients there of the
@@ -99,20 +102,20 @@ impl Phase<'_> {
         if self.phase == LOWER { 1.0 - up } else { up }
     }
 
-    /// ∫u and ∫uΦ.
+    /// ∫C u and ∫C u Φ.
     pub fn content(&self) -> [f64; 2] {
         let mut sums = [0.0; 2];
         self.integrate(|corners, point| {
             let at = |f: &dyn Fn(usize) -> f64| (0..4).map(|c| point.value[c] * f(corners[c])).sum::<f64>();
             let (u, phi) = (at(&|k| self.u[k]), at(&|k| self.test(k)));
-            sums[0] += point.area * u;
-            sums[1] += point.area * u * phi;
+            sums[0] += point.area * self.capacity * u;
+            sums[1] += point.area * self.capacity * u * phi;
         });
         sums
     }
 
-    /// D ∫∇u·∇Φ + ∫w u ∂Φ/∂y.
-    pub fn flow(&self, diffusivity: f64, velocity: &[f64]) -> f64 {
+    /// k ∫∇u·∇Φ + ∫C w u ∂Φ/∂y.
+    pub fn flow(&self, velocity: &[f64]) -> f64 {
         let mut sum = 0.0;
         self.integrate(|corners, point| {
             let (mut du, mut dphi, mut u, mut w) = ([0.0; 2], [0.0; 2], 0.0, 0.0);
@@ -124,13 +127,14 @@ impl Phase<'_> {
                 u += point.value[c] * self.u[k];
                 w += point.value[c] * velocity[k];
             }
-            sum += point.area * (diffusivity * (du[0] * dphi[0] + du[1] * dphi[1]) + w * u * dphi[1]);
+            let conducted = self.conductivity * (du[0] * dphi[0] + du[1] * dphi[1]);
+            sum += point.area * (conducted + self.capacity * w * u * dphi[1]);
         });
         sum
     }
 
     /// Flux in through the wall, by one-sided differences.
-    pub fn wall_flux(&self, diffusivity: f64) -> f64 {
+    pub fn wall_flux(&self) -> f64 {
         let (m, dx, n) = (self.nodes(), self.columns.spacing(), self.columns.x().len());
         let [_, wall] = self.columns.ends(self.phase);
         let on_wall: Vec<f64> = (0..n).map(|i| self.u[i * m + wall]).collect();
@@ -141,13 +145,13 @@ impl Phase<'_> {
             let at = |f: &[f64]| [f[row(0)], f[row(1)], f[row(2)]];
             let u_y = end_slope(at(self.y), at(self.u));
             let outward = if self.phase == LOWER { -1.0 } else { 1.0 };
-            outward * diffusivity * (u_y * (1.0 + slope_x[i] * slope_x[i]) - slope_x[i] * u_x[i])
+            outward * self.conductivity * (u_y * (1.0 + slope_x[i] * slope_x[i]) - slope_x[i] * u_x[i])
         };
         (0..n).map(|i| flux(i) * if i == 0 || i + 1 == n { 0.5 * dx } else { dx }).sum()
     }
 
-    /// Fluxes in through both sides by one-sided differences: the whole flux, and ∫D ∂_n u (1 − Φ).
-    pub fn side_fluxes(&self, diffusivity: f64) -> [f64; 2] {
+    /// Fluxes in through both sides by one-sided differences: the whole flux, and ∫k ∂_n u (1 − Φ).
+    pub fn side_fluxes(&self) -> [f64; 2] {
         let (m, dx, n) = (self.nodes(), self.columns.spacing(), self.columns.x().len());
         let mut sums = [0.0; 2];
         for (side, inner, outer) in [(0, 1, 2), (n - 1, n - 2, n - 3)] {
@@ -168,7 +172,7 @@ impl Phase<'_> {
                     }
                 };
                 // the derivative along the row, corrected by ∂u/∂y for the slope of the row
-                -diffusivity * (along(self.u) - u_y * along(self.y))
+                -self.conductivity * (along(self.u) - u_y * along(self.y))
             };
             for j in 0..m - 1 {
                 let k = side * m + j;
@@ -182,10 +186,10 @@ impl Phase<'_> {
     }
 }
 
-/// E from ∫u of both phases and the front.
-pub(super) fn total(columns: &Columns, h: &[f64], contents: [f64; 2], mobility: f64) -> f64 {
+/// E from ∫C (u − T_m) of both phases and the front.
+pub(super) fn total(columns: &Columns, h: &[f64], contents: [f64; 2], latent_heat: f64) -> f64 {
     let dx = columns.spacing();
     let last = h.len() - 1;
     let below = |i: usize| (h[i] - columns.wall(LOWER)[i]) * if i == 0 || i == last { 0.5 * dx } else { dx };
-    contents[LOWER] + contents[UPPER] + (0..=last).map(below).sum::<f64>() / mobility
+    contents[LOWER] + contents[UPPER] + (0..=last).map(below).sum::<f64>() * latent_heat
 }

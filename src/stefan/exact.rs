@@ -1,3 +1,5 @@
+use super::columns::{LOWER, UPPER};
+use super::material::Material;
 use crate::error::{Error, Result};
 use libm::{erf, erfc};
 use std::f64::consts::PI;
@@ -6,16 +8,17 @@ use std::f64::consts::PI;
 ///
 /// ```text
 /// planar:       u₁ = T₁ (1 − erf(s/2√(D₁t)) / erf(λ/√D₁))              u₀ = T₀ (1 − erfc(s/2√(D₀t)) / erfc(λ/√D₀))
-/// line source:  u₁ = Q/(4πD₁) (E₁(r²/4D₁t) − E₁(λ²/D₁))                u₀ = T₀ (1 − E₁(r²/4D₀t) / E₁(λ²/D₀))
+/// line source:  u₁ = Q/(4πk₁) (E₁(r²/4D₁t) − E₁(λ²/D₁))                u₀ = T₀ (1 − E₁(r²/4D₀t) / E₁(λ²/D₀))
 /// ```
 ///
-/// with the front at s = 2λ√t or r = 2λ√t. s is the distance from a wall that rises to the right by an angle, r the
-/// distance from the source; λ follows from the condition on the front.
+/// with temperatures above that of melting, and the front at s = 2λ√t or r = 2λ√t. s is the distance from a wall that
+/// rises to the right by an angle, r the distance from the source; λ follows from the condition on the front.
 ///
 /// # Example
 /// ```
-/// use driftmesh::stefan::Similarity;
-/// let exact = Similarity::planar([1.0, -0.5], [1.0, 1.0], 1.0, 0.0, 0.0)?;
+/// use driftmesh::stefan::{Material, Similarity};
+/// let material = Material::diffusing([1.0, 1.0], 1.0)?;
+/// let exact = Similarity::planar([1.0, -0.5], material, 0.0, 0.0)?;
 /// assert!((exact.lambda() - 0.469851).abs() < 1e-6);
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
@@ -25,16 +28,15 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {
     shape: Shape,
-    /// Temperature of the cold phase, far away.
+    /// Temperature of the cold phase, far away, above that of melting.
     far: f64,
-    /// Diffusivities of the warm and of the cold phase.
-    diffusivity: [f64; 2],
+    material: Material,
     lambda: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shape {
-    /// Temperature of the wall; sine and cosine of its angle; its distance from the origin.
+    /// Temperature of the wall above that of melting; sine and cosine of its angle; its distance from the origin.
     Planar {
         wall: f64,
         tilt: [f64; 2],
@@ -47,58 +49,55 @@ enum Shape {
 }
 
 impl Similarity {
-    /// Neumann's solution: temperatures at the wall and far away, diffusivities below and above the front, mobility,
-    /// tilt in degrees, offset of the wall.
+    /// Neumann's solution: temperatures at the wall and far away, tilt in degrees, offset of the wall.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless the wall is warm, the other end not, and the tilt below 60 degrees.
-    pub fn planar([wall, far]: [f64; 2], diffusivity: [f64; 2], mobility: f64, tilt: f64, offset: f64) -> Result<Self> {
-        positive("wall", wall)?;
-        cold(far)?;
+    pub fn planar([wall, far]: [f64; 2], material: Material, tilt: f64, offset: f64) -> Result<Self> {
+        let given = [wall, far];
+        warm("wall", wall, material.melting)?;
+        cold(far, material.melting)?;
+        let [wall, far] = given.map(|u| u - material.melting);
         if tilt.is_nan() || tilt.abs() > 60.0 {
             return Err(Error::invalid("tilt", tilt, "must be between -60 and 60 degrees"));
         }
         if !offset.is_finite() {
             return Err(Error::invalid("offset", offset, "must be a finite number"));
         }
-        let [warm, ice] = diffusivity.map(f64::sqrt);
+        let [warm, ice] = [LOWER, UPPER].map(|phase| material.diffusivity(phase).sqrt());
+        let [warm_k, ice_k] = material.conductivity;
         let lambda = root(|l| {
             let (w, i) = (l / warm, l / ice);
-            let melting = wall * warm * (-w * w).exp() / erf(w);
-            let freezing = far * ice / scaled_erfc(i);
-            l - mobility / PI.sqrt() * (melting + freezing)
+            let melting = wall * warm_k / warm * (-w * w).exp() / erf(w);
+            let freezing = far * ice_k / ice / scaled_erfc(i);
+            l - (melting + freezing) / (material.latent_heat * PI.sqrt())
         });
-        let lambda = within_reach(lambda, ["wall", "far"], [wall, far])?;
+        let lambda = within_reach(lambda, ["wall", "far"], given)?;
         let (sin, cos) = tilt.to_radians().sin_cos();
-        Ok(Self { shape: Shape::Planar { wall, tilt: [sin, cos], offset }, far, diffusivity, lambda })
+        Ok(Self { shape: Shape::Planar { wall, tilt: [sin, cos], offset }, far, material, lambda })
     }
 
-    /// Melting around a line: heat given off per length and time, temperature far away, diffusivities below and above
-    /// the front, mobility, place of the line.
+    /// Melting around a line: heat given off per length and time, temperature far away, place of the line.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless the strength is positive and the temperature far away not.
-    pub fn line_source(
-        strength: f64,
-        far: f64,
-        diffusivity: [f64; 2],
-        mobility: f64,
-        centre: [f64; 2],
-    ) -> Result<Self> {
-        positive("strength", strength)?;
-        cold(far)?;
+    pub fn line_source(strength: f64, far: f64, material: Material, centre: [f64; 2]) -> Result<Self> {
+        warm("strength", strength, 0.0)?;
+        cold(far, material.melting)?;
+        let given = far;
+        let far = far - material.melting;
         if !centre.iter().all(|c| c.is_finite()) {
             return Err(Error::invalid("centre", format!("{centre:?}"), "must be two finite numbers"));
         }
-        let [warm, ice] = diffusivity;
+        let [warm, ice] = [LOWER, UPPER].map(|phase| material.diffusivity(phase));
         let lambda = root(|l| {
             let z = l * l;
             let melting = strength / (4.0 * PI) * (-z / warm).exp();
-            let freezing = far * ice / scaled_e1(z / ice);
-            z - mobility * (melting + freezing)
+            let freezing = far * material.conductivity[UPPER] / scaled_e1(z / ice);
+            z - (melting + freezing) / material.latent_heat
         });
-        let lambda = within_reach(lambda, ["strength", "far"], [strength, far])?;
-        Ok(Self { shape: Shape::LineSource { strength, centre }, far, diffusivity, lambda })
+        let lambda = within_reach(lambda, ["strength", "far"], [strength, given])?;
+        Ok(Self { shape: Shape::LineSource { strength, centre }, far, material, lambda })
     }
 
     /// The point where the solution is singular, if there is one: a line source.
@@ -131,8 +130,8 @@ impl Similarity {
     /// Temperature.
     pub fn temperature(&self, [x, y]: [f64; 2], t: f64) -> f64 {
         let front = 2.0 * self.lambda * t.sqrt();
-        let [warm, ice] = self.diffusivity;
-        match self.shape {
+        let [warm, ice] = [LOWER, UPPER].map(|phase| self.material.diffusivity(phase));
+        let above = match self.shape {
             Shape::Planar { wall, tilt: [sin, cos], offset } => {
                 let s = y * cos - x * sin - offset;
                 let over = |d: f64| s / (2.0 * (d * t).sqrt());
@@ -149,28 +148,32 @@ impl Similarity {
                 let r2 = (x - centre[0]).powi(2) + (y - centre[1]).powi(2);
                 let (over, z) = (|d: f64| r2 / (4.0 * d * t), self.lambda * self.lambda);
                 match r2 <= front * front {
-                    true => strength / (4.0 * PI * warm) * (e1(over(warm)) - e1(z / warm)),
+                    true => strength / (4.0 * PI * self.material.conductivity[LOWER]) * (e1(over(warm)) - e1(z / warm)),
                     false => {
                         let [a, b] = [over(ice), z / ice];
                         self.far * (1.0 - (b - a).exp() * scaled_e1(a) / scaled_e1(b))
                     }
                 }
             }
+        };
+        self.material.melting + above
+    }
+}
+
+fn warm(key: &str, value: f64, melting: f64) -> Result<()> {
+    match value > melting && value.is_finite() {
+        true => Ok(()),
+        false => Err(Error::invalid(key, value, format!("must be above {melting}: the lower phase is the warm one"))),
+    }
+}
+
+fn cold(far: f64, melting: f64) -> Result<()> {
+    match far <= melting && far.is_finite() {
+        true => Ok(()),
+        false => {
+            let rule = format!("must be {melting} or below: the upper phase is the cold one");
+            Err(Error::invalid("far", far, rule))
         }
-    }
-}
-
-fn positive(key: &str, value: f64) -> Result<()> {
-    match value > 0.0 && value.is_finite() {
-        true => Ok(()),
-        false => Err(Error::invalid(key, value, "must be above 0: the lower phase is the warm one")),
-    }
-}
-
-fn cold(far: f64) -> Result<()> {
-    match far <= 0.0 && far.is_finite() {
-        true => Ok(()),
-        false => Err(Error::invalid("far", far, "must be 0 or below: the upper phase is the cold one")),
     }
 }
 
@@ -239,6 +242,10 @@ fn scaled_e1(z: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn of(diffusivity: [f64; 2]) -> Material {
+        Material::diffusing(diffusivity, 1.0).unwrap()
+    }
+
     /// Values of Abramowitz and Stegun, table 5.1, and the meeting of both branches.
     #[test]
     fn exponential_integral() {
@@ -252,9 +259,9 @@ mod tests {
 
     #[test]
     fn fronts_move_at_the_published_rates() {
-        let planar = Similarity::planar([1.0, -0.5], [1.0; 2], 1.0, 0.0, 0.0).unwrap();
+        let planar = Similarity::planar([1.0, -0.5], of([1.0; 2]), 0.0, 0.0).unwrap();
         assert!((planar.lambda() - 0.469851).abs() < 5e-7);
-        let source = Similarity::line_source(8.0, -0.3, [1.0; 2], 1.0, [0.0, -0.5]).unwrap();
+        let source = Similarity::line_source(8.0, -0.3, of([1.0; 2]), [0.0, -0.5]).unwrap();
         assert!((source.lambda() - 0.511282).abs() < 5e-7);
     }
 
@@ -262,11 +269,11 @@ mod tests {
     #[test]
     fn diffusivities_may_differ_by_orders_of_magnitude() {
         // cold that spreads fast stops the melting around a line unless there is little of it
-        assert!(Similarity::line_source(8.0, -0.3, [1.0, 3000.0], 1.0, [0.0, -0.5]).is_err());
+        assert!(Similarity::line_source(8.0, -0.3, of([1.0, 3000.0]), [0.0, -0.5]).is_err());
         for (d, far) in [([1.0, 1e-4], -0.3), ([3000.0, 1.0], -0.3), ([1.0, 3000.0], -3e-3), ([1e-6, 1.0], -0.3)] {
             for exact in [
-                Similarity::planar([1.0, -0.5], d, 1.0, 0.0, 0.0).unwrap(),
-                Similarity::line_source(8.0, far, d, 1.0, [0.0, -0.5]).unwrap(),
+                Similarity::planar([1.0, -0.5], of(d), 0.0, 0.0).unwrap(),
+                Similarity::line_source(8.0, far, of(d), [0.0, -0.5]).unwrap(),
             ] {
                 let t = exact.time(1.0);
                 let h = exact.height(0.0, t);
@@ -278,21 +285,22 @@ mod tests {
         }
     }
 
-    /// h_t = L (D₀ u₀_ν − D₁ u₁_ν) by differences, with all parameters different from one.
+    /// Λ h_t = k₀ u₀_ν − k₁ u₁_ν by differences, with all parameters different from one.
     #[test]
     fn the_front_condition_holds() {
-        let (d, mobility) = ([2.0, 0.7], 0.4);
+        let material = Material::new([2.0, 0.7], [1.5, 0.8], 2.5, 0.3).unwrap();
         for exact in [
-            Similarity::planar([1.3, -0.4], d, mobility, 0.0, 0.1).unwrap(),
-            Similarity::line_source(5.0, -0.2, d, mobility, [0.0, -0.5]).unwrap(),
+            Similarity::planar([1.6, -0.1], material, 0.0, 0.1).unwrap(),
+            Similarity::line_source(5.0, 0.1, material, [0.0, -0.5]).unwrap(),
         ] {
             let (t, e) = (0.3, 1e-4);
             let h = exact.height(0.0, t);
             let speed = (exact.height(0.0, t + e) - exact.height(0.0, t - e)) / (2.0 * e);
-            let u = |y: f64| exact.temperature([0.0, y], t);
+            let u = |y: f64| exact.temperature([0.0, y], t) - material.melting;
             assert!(u(h).abs() < 1e-12);
             let one_sided = |e: f64| (4.0 * u(h + e) - u(h + 2.0 * e)) / (2.0 * e);
-            let jump = mobility * (d[1] * one_sided(e) - d[0] * one_sided(-e));
+            let [below, above] = material.conductivity;
+            let jump = (above * one_sided(e) - below * one_sided(-e)) / material.latent_heat;
             assert!((speed / jump - 1.0).abs() < 1e-5, "{speed} {jump}");
         }
     }

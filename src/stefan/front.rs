@@ -2,6 +2,7 @@
 
 use super::columns::{Columns, LOWER, UPPER};
 use super::heat::end_slope;
+use super::material::Material;
 use crate::error::{Error, Failure, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -110,10 +111,10 @@ pub(super) fn tilt(columns: &Columns, h: &[f64], mirrored: bool) -> Vec<f64> {
     (0..=last).map(at).collect()
 }
 
-/// J = D₀ ∂u₀/∂y − D₁ ∂u₁/∂y.
-pub(super) fn jump(slopes: &[Vec<f64>; 2], diffusivity: [f64; 2]) -> Vec<f64> {
+/// J = k₀ ∂u₀/∂y − k₁ ∂u₁/∂y.
+pub(super) fn jump(slopes: &[Vec<f64>; 2], conductivity: [f64; 2]) -> Vec<f64> {
     let pairs = slopes[UPPER].iter().zip(&slopes[LOWER]);
-    pairs.map(|(above, below)| diffusivity[UPPER] * above - diffusivity[LOWER] * below).collect()
+    pairs.map(|(above, below)| conductivity[UPPER] * above - conductivity[LOWER] * below).collect()
 }
 
 /// Refuses a front with the warm phase above it.
@@ -121,10 +122,10 @@ pub(super) fn check_warm_below(
     columns: &Columns,
     h: &[f64],
     slopes: &[Vec<f64>; 2],
-    diffusivity: [f64; 2],
+    conductivity: [f64; 2],
 ) -> Result<(), Failure> {
     for (i, (above, below)) in slopes[UPPER].iter().zip(&slopes[LOWER]).enumerate() {
-        let (above, below) = (diffusivity[UPPER] * above, diffusivity[LOWER] * below);
+        let (above, below) = (conductivity[UPPER] * above, conductivity[LOWER] * below);
         if above + below > 1e-12 * (above.abs() + below.abs()) {
             return Err(Failure::WrongSide { x: [columns.x()[i], h[i]], slope: above + below });
         }
@@ -135,20 +136,13 @@ pub(super) fn check_warm_below(
 /// The longest step for which a sawtooth of the explicit front does not grow
 ///
 /// ```text
-/// Δt ≤ 2 hx / (π L max(|D₀ ∂u₀/∂y| + |D₁ ∂u₁/∂y|)) × relief of the filter
+/// Δt ≤ 2 hx Λ / (π max(|k₀ ∂u₀/∂y| + |k₁ ∂u₁/∂y|)) × relief of the filter
 /// ```
-pub(super) fn limit(
-    columns: &Columns,
-    slopes: &[Vec<f64>; 2],
-    diffusivity: [f64; 2],
-    mobility: f64,
-    filter: Filter,
-) -> f64 {
+pub(super) fn limit(columns: &Columns, slopes: &[Vec<f64>; 2], material: &Material, filter: Filter) -> f64 {
+    let [below, above] = material.conductivity;
     let pairs = slopes[UPPER].iter().zip(&slopes[LOWER]);
-    let steepest = pairs
-        .map(|(above, below)| (diffusivity[UPPER] * above).abs() + (diffusivity[LOWER] * below).abs())
-        .fold(0.0_f64, f64::max);
-    2.0 * columns.spacing() / (PI * mobility * steepest) * filter.relief()
+    let steepest = pairs.map(|(u, l)| (above * u).abs() + (below * l).abs()).fold(0.0_f64, f64::max);
+    2.0 * columns.spacing() * material.latent_heat / (PI * steepest) * filter.relief()
 }
 
 /// The front after a step, from the filtered jump J: column by column.
@@ -159,7 +153,7 @@ pub(super) fn graph(h: &[f64], tilt: &[f64], jump: &[f64], factor: f64) -> Vec<f
 /// The front after a step by segments that shift along their normals
 ///
 /// ```text
-/// d_i = Δt L ⟦D ∂_ν u⟧ ν_i,   vertices shift by the mean of their two segments
+/// d_i = Δt ⟦k ∂_ν u⟧/Λ ν_i,   vertices shift by the mean of their two segments
 /// ```
 pub(super) fn segments(
     columns: &Columns,

@@ -2,7 +2,7 @@
 
 use super::columns::Columns;
 use crate::error::Result;
-use crate::geometry::Patch;
+use crate::geometry::{Mesh, Patch};
 use crate::laplacian::{Laplacian, unchecked};
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
@@ -21,8 +21,18 @@ pub(super) struct HeatStep<'a> {
     pub u: &'a [f64],
     /// At the end of the step: given values on walls, front and Dirichlet sides; a guess elsewhere.
     pub sides: &'a [f64],
+    /// Where no value is given at the lowest or the highest row: a and b of the slope ∂u/∂y = a + b u there, for each
+    /// column.
+    pub ends: [Option<&'a [[f64; 2]]>; 2],
     /// Whether nothing flows through the sides; otherwise their values are given.
     pub mirrored: bool,
+}
+
+/// The rows of 1 − Δt (D Δ + w ∂/∂y) for the unknowns of a phase, and what the slope at the wall adds to the right
+/// side.
+struct Rows {
+    matrix: LatticeMatrix<2, 9>,
+    source: Vec<f64>,
 }
 
 /// Weights of ∂/∂y at the middle of three heights, exact for quadratics.
@@ -44,24 +54,23 @@ const ROUNDING: f64 = 2e-14;
 impl HeatStep<'_> {
     /// (u − uⁿ)/Δt − w ∂u/∂y = D Δu for u on the new mesh.
     pub fn solve(&self, solver: &mut Robust<1>, laplacian: Laplacian) -> Result<Vec<f64>> {
-        let mesh = self.columns.mesh(self.phase, self.y, self.mirrored)?;
-        let stencils = unchecked(&mesh, laplacian)?;
-        let Some(nine) = stencils.nine_points() else { return Ok(self.sides.to_vec()) };
-        let patch = Patch { wraps: [false; 2], ..*stencils.patch() };
-        let (matrix, b) = self.system(patch, nine);
-        let mut x = vec![[0.0]; patch.padded_len()];
-        let (nodes, width) = (self.nodes(), patch.size[1] + 2);
-        for (p, x) in x.chunks_exact_mut(width).enumerate() {
-            let Some(i) = self.column(p) else { continue };
-            x.iter_mut().zip(&self.sides[i * nodes..]).for_each(|(x, side)| x[0] = *side);
+        let Some(Rows { mut matrix, source }) = self.rows(laplacian)? else { return Ok(self.sides.to_vec()) };
+        let value = |(k, source): (usize, &f64)| [self.u[self.own(&matrix.patch, k)] + source];
+        let mut b: Vec<[f64; 1]> = source.iter().enumerate().map(value).collect();
+        // rows near a finely graded front are larger by orders of magnitude than the others, and a common tolerance
+        // would be set by their rounding
+        for (row, b) in matrix.rows.iter_mut().zip(&mut b) {
+            let size = row[0].abs().max(1.0);
+            *row = row.map(|a| a / size);
+            b[0] /= size;
         }
+        let mut x = self.padded(&matrix.patch, self.sides);
         let largest = matrix.rows.as_flattened().iter().fold(1.0_f64, |m, a| m.max(a.abs()));
-        let size = self.sides.iter().chain(self.u).copied().fold(0.0, larger);
+        let size = self.sides.iter().chain(self.u).chain(&source).copied().fold(0.0, larger);
         solver.solve(&matrix, &b, &mut x, [ROUNDING * largest * size.max(f64::MIN_POSITIVE)])?;
         let mut u = self.sides.to_vec();
-        for (p, x) in x.chunks_exact(width).enumerate().skip(1).take(patch.size[0]) {
-            let Some(i) = self.column(p) else { continue };
-            u[i * nodes..][1..width - 1].iter_mut().zip(&x[1..]).for_each(|(u, x)| *u = x[0]);
+        for k in 0..matrix.patch.len() {
+            u[self.own(&matrix.patch, k)] = x[place(&matrix.patch, k)][0];
         }
         match u.iter().position(|u| !u.is_finite()) {
             None => Ok(u),
@@ -69,43 +78,94 @@ impl HeatStep<'_> {
         }
     }
 
+    /// What the nodes that are unknown gain in a time Δt at the rate D Δu + w ∂u/∂y of the values u; 0 at the others.
+    pub fn gain(&self, laplacian: Laplacian) -> Result<Vec<f64>> {
+        let mut gain = vec![0.0; self.u.len()];
+        let Some(Rows { matrix, source }) = self.rows(laplacian)? else { return Ok(gain) };
+        let mut product = vec![[0.0]; matrix.patch.padded_len()];
+        matrix.multiply(&self.padded(&matrix.patch, self.u), &mut product);
+        for (k, source) in source.into_iter().enumerate() {
+            let own = self.own(&matrix.patch, k);
+            gain[own] = self.u[own] + source - product[place(&matrix.patch, k)][0];
+        }
+        Ok(gain)
+    }
+
     /// Number of nodes in a column of the phase.
     fn nodes(&self) -> usize {
         self.columns.rows(self.phase) + 1
     }
 
-    /// The column that is the p-th of a padded vector, whose ring lies on sides with given values and beyond mirrored
-    /// ones.
-    fn column(&self, p: usize) -> Option<usize> {
-        (p + usize::from(!self.mirrored)).checked_sub(1).filter(|&i| i < self.columns.x().len())
+    /// Rows of the mesh below the lowest node: one of ghosts where no value is given there.
+    fn below(&self) -> usize {
+        usize::from(self.ends[0].is_some())
     }
 
-    /// The linear system for the nodes of a patch, of which `nine` holds the weights of the Laplacian. Each row is
-    /// divided by its own entry if that is above 1: rows near a finely graded front are larger by orders of magnitude,
-    /// and a common tolerance would be set by the rounding of these.
-    fn system(&self, patch: Patch<2>, nine: &[[f64; 9]]) -> (LatticeMatrix<2, 9>, Vec<[f64; 1]>) {
+    /// The node of the k-th unknown.
+    fn own(&self, patch: &Patch<2>, k: usize) -> usize {
+        let [i, j] = [k / patch.size[1], k % patch.size[1]];
+        (i + usize::from(!self.mirrored)) * self.nodes() + j + 1 - self.below()
+    }
+
+    /// Values of the nodes as a padded vector, whose ring lies on sides with given values and beyond others, where it
+    /// is 0.
+    fn padded(&self, patch: &Patch<2>, values: &[f64]) -> Vec<[f64; 1]> {
+        let (width, nodes) = (patch.size[1] + 2, self.nodes());
+        let mut x = vec![[0.0]; patch.padded_len()];
+        for (p, x) in x.chunks_exact_mut(width).enumerate() {
+            let column = (p + usize::from(!self.mirrored)).checked_sub(1).filter(|&i| i < self.columns.x().len());
+            let Some(i) = column else { continue };
+            x[self.below()..].iter_mut().zip(&values[i * nodes..(i + 1) * nodes]).for_each(|(x, value)| x[0] = *value);
+        }
+        x
+    }
+
+    /// The mesh of the phase with mirrored columns beyond the sides, and with ghosts beyond a row without a given
+    /// value: the mirror images of the nodes next to it.
+    fn mesh(&self) -> Result<Mesh<2>> {
+        let ghosts = self.ends.iter().flatten().count();
+        let mut y = Vec::with_capacity(self.y.len() + ghosts * self.columns.x().len());
+        for column in self.y.chunks_exact(self.nodes()) {
+            let last = column.len() - 1;
+            y.extend(self.ends[0].map(|_| 2.0 * column[0] - column[1]));
+            y.extend_from_slice(column);
+            y.extend(self.ends[1].map(|_| 2.0 * column[last] - column[last - 1]));
+        }
+        self.columns.mesh(self.nodes() + ghosts, &y, self.mirrored)
+    }
+
+    fn rows(&self, laplacian: Laplacian) -> Result<Option<Rows>> {
+        let stencils = unchecked(&self.mesh()?, laplacian)?;
+        let Some(nine) = stencils.nine_points() else { return Ok(None) };
+        let patch = Patch { wraps: [false; 2], ..*stencils.patch() };
         let [count, inside] = patch.size;
         let mut matrix = LatticeMatrix::<2, 9>::zero(patch);
-        let mut b = vec![[0.0]; patch.len()];
+        let mut source = vec![0.0; patch.len()];
+        let last = self.nodes() - 1;
         for (k, laplacian) in nine.iter().enumerate() {
-            let (i, j) = (k / inside, k % inside);
-            let own = (i + usize::from(!self.mirrored)) * self.nodes() + j + 1;
+            let i = k / inside;
+            let own = self.own(&patch, k);
             let mut row = self.row(own, laplacian);
+            for (end, at) in [0, last].into_iter().enumerate() {
+                if let Some(slopes) = self.ends[end].filter(|_| own % self.nodes() == at) {
+                    source[k] = -self.reflect(&mut row, [own / self.nodes(), end], slopes);
+                }
+            }
             if self.mirrored {
                 fold(&mut row, [i == 0, i + 1 == count]);
             }
-            let size = row[0].abs().max(1.0);
-            matrix.rows[k] = row.map(|a| a / size);
-            b[k] = [self.u[own] / size];
+            matrix.rows[k] = row;
         }
-        (matrix, b)
+        Ok(Some(Rows { matrix, source }))
     }
 
     /// The coefficients of 1 − Δt (D Δ + w ∂/∂y) at node `own`.
     fn row(&self, own: usize, laplacian: &[f64; 9]) -> [f64; 9] {
         let mut row = laplacian.map(|a| -self.dt * self.diffusivity * a);
         row[0] += 1.0;
-        if let Some(w) = self.velocity {
+        // only walls are unknown at an end, and do not move
+        let inside = !own.is_multiple_of(self.nodes()) && !(own + 1).is_multiple_of(self.nodes());
+        if let Some(w) = self.velocity.filter(|_| inside) {
             let weights = slope([self.y[own - 1], self.y[own], self.y[own + 1]]);
             // the node and its neighbours along the column
             for (place, weight) in [3, 0, 4].into_iter().zip(weights) {
@@ -114,6 +174,33 @@ impl HeatStep<'_> {
         }
         row
     }
+
+    /// Expresses the ghosts beyond an end of the i-th column by their images and by the slope at the end, and returns
+    /// the constant of the row that this leaves.
+    fn reflect(&self, row: &mut [f64; 9], [i, end]: [usize; 2], slopes: &[[f64; 2]]) -> f64 {
+        let (nodes, last) = (self.nodes(), self.columns.x().len() - 1);
+        let [at, next] = if end == 0 { [0, 1] } else { [nodes - 1, nodes - 2] };
+        // the place of the node at the end, and of its neighbours below and above
+        let columns = [(i, [0, 3, 4]), (i.checked_sub(1).unwrap_or(1), [1, 5, 6]), (i + 1, [2, 7, 8])];
+        let mut constant = 0.0;
+        for (column, [on_wall, low, high]) in columns {
+            let column = if column > last { last - 1 } else { column };
+            let (ghost, image) = if end == 0 { (low, high) } else { (high, low) };
+            let weight = std::mem::take(&mut row[ghost]);
+            let [a, b] = slopes[column];
+            // u at the ghost is u at its image plus this distance times the slope
+            let distance = 2.0 * (self.y[column * nodes + at] - self.y[column * nodes + next]);
+            row[image] += weight;
+            row[on_wall] += weight * distance * b;
+            constant += weight * distance * a;
+        }
+        constant
+    }
+}
+
+/// The place of the k-th unknown in a padded vector.
+fn place(patch: &Patch<2>, k: usize) -> usize {
+    (k / patch.size[1] + 1) * (patch.size[1] + 2) + k % patch.size[1] + 1
 }
 
 /// Adds the coefficients of the points beyond a mirrored left or right side to those of their images.
@@ -139,7 +226,7 @@ pub(super) fn carry(y: &[f64], u: &[f64], front: usize, new: &[f64], to: &mut [f
     let h = new[front];
     let mut known: Vec<(f64, f64)> =
         (0..last).map(toward).map(|j| (y[j], u[j])).filter(|(y, _)| up * (h - y) > 0.0).collect();
-    known.push((h, 0.0));
+    known.push((h, u[front]));
     let mut k = 0;
     for j in (0..=last).map(toward) {
         while k + 2 < known.len() && up * (new[j] - known[k + 1].0) > 0.0 {

@@ -1,8 +1,11 @@
+use super::balance::Instant;
 use super::columns::{Columns, LOWER, UPPER};
-use super::energy::{Energy, Phase, total};
+use super::conduct::Fields;
+use super::energy::Energy;
+use super::events::PhaseEvent;
 use super::front::{self, Filter, Method};
-use super::heat::{HeatStep, carry};
-use super::implicit::Response;
+use super::material::Material;
+use super::response::Response;
 use crate::error::{Error, Failure, Result};
 use crate::laplacian::Laplacian;
 use crate::numerics::larger;
@@ -22,14 +25,16 @@ pub enum Transfer {
     Interpolate,
 }
 
-/// The temperatures whose flux moves the front.
+/// How a step advances front and temperatures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Stepping {
-    /// Those at the start of the step, whose length is then limited by stability.
-    #[default]
+    /// The front moves by the heat flux at the start of the step, then temperatures take a step of implicit Euler.
+    /// First order in time; stability limits the step.
     Explicit,
-    /// Those at the end of the step, found by Newton's method, without a limit.
+    /// Front and temperatures together by TR-BDF2, each stage by Newton's method. Second order in time, without a
+    /// limit.
+    #[default]
     Implicit,
 }
 
@@ -39,6 +44,7 @@ pub enum Stepping {
 pub enum Sides {
     /// No flux: mesh and temperatures are mirrored.
     #[default]
+    #[serde(alias = "no-flux")]
     Neumann,
     /// Temperatures and the height of the front are given by the exact solution.
     Exact,
@@ -60,6 +66,12 @@ pub trait Problem: Sync {
 
     /// The exact temperature where it is known.
     fn exact(&self, x: [f64; 2], t: f64) -> Option<f64>;
+
+    /// Flux of heat k ∂u/∂n into the phase through its wall, and its derivative by the temperature u of the wall; none
+    /// where [`boundary`](Self::boundary) gives the temperature. A wall has one of both everywhere and always.
+    fn flux(&self, _phase: usize, _x: [f64; 2], _u: f64, _t: f64) -> Option<[f64; 2]> {
+        None
+    }
 }
 
 /// A front between two phases, with the scheme that advances it.
@@ -67,24 +79,24 @@ pub trait Problem: Sync {
 pub struct Front {
     /// Columns and walls.
     pub columns: Columns,
-    /// Diffusivities D of the lower and the upper phase.
-    pub diffusivity: [f64; 2],
-    /// L, the inverse of the latent heat.
-    pub mobility: f64,
+    /// What conducts, stores and melts.
+    pub material: Material,
+    /// The phase, if there is one, that is a melt below its melting temperature and freezes into itself.
+    pub undercooled: Option<usize>,
     /// How the front is moved.
     pub method: Method,
     /// How temperatures are transferred to the new mesh.
     pub transfer: Transfer,
     /// Smoothing of the front's velocity over three neighbouring columns.
     pub filter: Filter,
-    /// The temperatures whose flux moves the front.
+    /// How a step advances front and temperatures.
     pub stepping: Stepping,
     /// Conditions on the left and the right side.
     pub sides: Sides,
     /// The discrete Laplacian, of nine points.
     pub laplacian: Laplacian,
     /// Linear solvers of both phases.
-    solvers: [Robust<1>; 2],
+    pub(super) solvers: [Robust<1>; 2],
     /// Time step and response of the last step.
     pub(super) response: Option<(f64, Response)>,
 }
@@ -100,8 +112,30 @@ pub struct FrontState {
     pub front: Vec<f64>,
     /// Temperatures below and above it, column by column.
     pub u: [Vec<f64>; 2],
+    /// The phase that fills the box, if one does: the front then lies on the wall of the other one.
+    pub alone: Option<usize>,
     /// Balance of energy.
     pub energy: Energy,
+}
+
+impl FrontState {
+    pub(super) fn fields(&self) -> Fields {
+        Fields { h: self.front.clone(), u: self.u.clone(), alone: self.alone }
+    }
+}
+
+/// What a step comes to.
+#[derive(Debug, Clone)]
+pub struct Attempt {
+    /// The state after it.
+    pub state: FrontState,
+    /// Its cost.
+    pub work: Work,
+    /// Of an implicit step its estimated error: the larger one of the front's, as a share of its distance from the
+    /// nearer wall, and of the temperature's, as a share of its range.
+    pub error: Option<f64>,
+    /// A phase that has appeared or vanished.
+    pub event: Option<PhaseEvent>,
 }
 
 /// Names, for messages, of the initial temperatures by phase.
@@ -109,24 +143,12 @@ pub(crate) const INITIAL: [&str; 2] =
     ["the initial temperature of the lower phase", "the initial temperature of the upper phase"];
 
 impl Front {
-    /// A front with the default method: graph, ALE, filter (1, 6, 1), explicit, no flux through the sides.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] unless diffusivities and mobility are positive.
-    pub fn new(columns: Columns, diffusivity: [f64; 2], mobility: f64) -> Result<Self> {
-        for (key, value, rule) in [
-            ("phase.lower.diffusivity", diffusivity[LOWER], "must be above 0"),
-            ("phase.upper.diffusivity", diffusivity[UPPER], "must be above 0"),
-            ("front.mobility", mobility, "must be above 0: it is the inverse of the latent heat"),
-        ] {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::invalid(key, value, rule));
-            }
-        }
-        Ok(Self {
+    /// A front with the default method: graph, ALE, filter (1, 6, 1), implicit, no flux through the sides.
+    pub fn new(columns: Columns, material: Material) -> Self {
+        Self {
             columns,
-            diffusivity,
-            mobility,
+            material,
+            undercooled: None,
             method: Method::default(),
             transfer: Transfer::default(),
             filter: Filter::default(),
@@ -135,7 +157,12 @@ impl Front {
             laplacian: Laplacian::default(),
             solvers: Default::default(),
             response: None,
-        })
+        }
+    }
+
+    /// Λ of Λ V = k₀ ∂u₀/∂n − k₁ ∂u₁/∂n: negative where the upper phase is the melt.
+    pub(super) fn latent_heat(&self) -> f64 {
+        if self.undercooled == Some(UPPER) { -self.material.latent_heat } else { self.material.latent_heat }
     }
 
     pub(super) fn mirrored(&self) -> bool {
@@ -148,13 +175,16 @@ impl Front {
     /// As [`Columns::check`]; [`Failure::NonFinite`] where a temperature is not finite; [`Failure::WrongSide`].
     pub fn start(&self, problem: &dyn Problem, t: f64) -> Result<FrontState> {
         let front: Vec<f64> = self.columns.x().iter().map(|&x| problem.initial_front(x)).collect();
-        self.columns.check(&front)?;
+        let alone = self.fills(&front);
+        if alone.is_none() {
+            self.columns.check(&front)?;
+        }
         let u = [LOWER, UPPER].map(|phase| {
             let y = self.columns.heights(phase, &front);
             let nodes = self.columns.rows(phase) + 1;
             let [on_front, _] = self.columns.ends(phase);
             let value = |k: usize| match k % nodes {
-                j if j == on_front => 0.0,
+                j if j == on_front && alone.is_none() => self.material.melting,
                 _ => problem.initial(phase, [self.columns.x()[k / nodes], y[k]]),
             };
             (0..y.len()).map(value).collect::<Vec<f64>>()
@@ -165,13 +195,19 @@ impl Front {
                 return Err(self.columns.not_finite(INITIAL[phase], u[phase][k], phase, k, y).into());
             }
         }
-        let mut state = FrontState { t, step: 0, front, u, energy: Energy::default() };
-        let slopes = self.slopes(&state.front, &state.u);
-        front::check_warm_below(&self.columns, &state.front, &slopes, self.diffusivity)?;
-        let content = self.contents(&state.front, &state.u).map(|content| content[0]);
-        let energy = total(&self.columns, &state.front, content, self.mobility);
-        state.energy = Energy { start: energy, now: energy, ..Energy::default() };
+        let content = self.content(&Fields { h: front.clone(), u: u.clone(), alone });
+        let energy = Energy { start: content, now: content, ..Energy::default() };
+        let state = FrontState { t, step: 0, front, u, alone, energy };
+        self.check_warm_below(&state)?;
         Ok(state)
+    }
+
+    fn check_warm_below(&self, state: &FrontState) -> Result<(), Failure> {
+        if self.undercooled.is_some() || state.alone.is_some() {
+            return Ok(());
+        }
+        let slopes = self.slopes(&state.front, &state.u);
+        front::check_warm_below(&self.columns, &state.front, &slopes, self.material.conductivity)
     }
 
     pub(super) fn heights(&self, h: &[f64]) -> [Vec<f64>; 2] {
@@ -183,14 +219,19 @@ impl Front {
         front::slopes(&self.columns, &self.heights(h), u)
     }
 
-    fn contents(&self, h: &[f64], u: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
-        let y = self.heights(h);
-        [LOWER, UPPER].map(|phase| Phase { columns: &self.columns, phase, y: &y[phase], u: &u[phase] }.content())
-    }
-
     /// The longest step for which the explicit front is stable, as estimated from the temperatures at the front.
     pub fn limit(&self, state: &FrontState) -> f64 {
-        front::limit(&self.columns, &self.slopes(&state.front, &state.u), self.diffusivity, self.mobility, self.filter)
+        match state.alone {
+            Some(_) => f64::INFINITY,
+            None => front::limit(&self.columns, &self.slopes(&state.front, &state.u), &self.material, self.filter),
+        }
+    }
+
+    /// The time in which the front, at its speed now, would move as far as it is from the nearer wall.
+    pub fn passage(&self, problem: &dyn Problem, state: &FrontState) -> f64 {
+        let speed = if state.alone.is_none() { self.speed(problem, state) } else { None };
+        let time = |(i, speed): (usize, &f64)| self.columns.room(i, state.front[i]) / speed.abs();
+        speed.unwrap_or_default().iter().enumerate().map(time).fold(f64::INFINITY, f64::min)
     }
 
     /// A step to time `t`; the state changes only if it succeeds.
@@ -199,46 +240,84 @@ impl Front {
     /// [`Failure::FrontUnstable`] where an explicit step is too long; those of [`Columns::check`] for the new front;
     /// [`Failure::WrongSide`]; [`Failure::NonFinite`]; [`Failure::NewtonStalled`]; [`Failure::LinearStalled`].
     pub fn step(&mut self, problem: &dyn Problem, state: &mut FrontState, t: f64) -> Result<Work> {
-        let dt = t - state.t;
-        let slopes = self.slopes(&state.front, &state.u);
-        front::check_warm_below(&self.columns, &state.front, &slopes, self.diffusivity)?;
-        let mut work = Work::default();
-        let (h, u) = match self.stepping {
-            Stepping::Explicit => {
-                let limit = front::limit(&self.columns, &slopes, self.diffusivity, self.mobility, self.filter);
-                if dt > limit {
-                    return Err(Failure::FrontUnstable { dt, limit }.into());
-                }
-                let h = self.moved(problem, &state.front, &state.front, &slopes, t, dt)?;
-                self.columns.check(&h)?;
-                let u = self.conduct(problem, state, &h, t)?;
-                work.linear_solves += 2;
-                (h, u)
-            }
-            Stepping::Implicit => self.newton(problem, state, &slopes, t, &mut work)?,
-        };
-        let slopes = self.slopes(&h, &u);
-        front::check_warm_below(&self.columns, &h, &slopes, self.diffusivity)?;
-        state.energy = self.balance(state, &h, &u, dt);
-        (state.front, state.u, state.t) = (h, u, t);
-        state.step += 1;
-        Ok(work)
+        let attempt = self.attempt(problem, state, t)?;
+        *state = attempt.state;
+        Ok(attempt.work)
     }
 
-    /// The front after a step from `from`, moved by the jump of the heat flux that belongs to the front `at`.
+    /// What a step to time `t` would come to. A phase may vanish in it, and one may appear.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn attempt(&mut self, problem: &dyn Problem, state: &FrontState, t: f64) -> Result<Attempt> {
+        if let Some((mut from, event)) = self.appear(problem, state, t)? {
+            from.step = state.step;
+            if from.t >= t {
+                from.step += 1;
+                return Ok(Attempt { state: from, work: Work::default(), error: None, event: Some(event) });
+            }
+            return Ok(Attempt { event: Some(event), ..self.plain(problem, &from, t)? });
+        }
+        match self.plain(problem, state, t) {
+            Err(Error::Failed {
+                failure: failure @ (Failure::FrontOutside { .. } | Failure::VanishingPhase { .. }),
+                ..
+            }) => self.cross(problem, state, t, failure),
+            other => other,
+        }
+    }
+
+    /// A step in which no phase vanishes or appears.
+    pub(super) fn plain(&mut self, problem: &dyn Problem, state: &FrontState, t: f64) -> Result<Attempt> {
+        self.check_warm_below(state)?;
+        let slopes = match state.alone {
+            Some(_) => Default::default(),
+            None => self.slopes(&state.front, &state.u),
+        };
+        let (end, energy, work, error) = match self.stepping {
+            Stepping::Explicit if state.alone.is_none() => self.explicit(problem, state, &slopes, t)?,
+            _ => self.tr_bdf2(problem, state, &slopes, t)?,
+        };
+        let state = FrontState { t, step: state.step + 1, front: end.h, u: end.u, alone: end.alone, energy };
+        self.check_warm_below(&state)?;
+        Ok(Attempt { state, work, error, event: None })
+    }
+
+    fn explicit(
+        &mut self,
+        problem: &dyn Problem,
+        state: &FrontState,
+        slopes: &[Vec<f64>; 2],
+        t: f64,
+    ) -> Result<(Fields, Energy, Work, Option<f64>)> {
+        let dt = t - state.t;
+        let limit = front::limit(&self.columns, slopes, &self.material, self.filter);
+        if dt > limit {
+            return Err(Failure::FrontUnstable { dt, limit }.into());
+        }
+        let h = self.moved(problem, [&state.front; 2], slopes, [t, dt])?;
+        self.columns.check(&h)?;
+        let from = state.fields();
+        let u = self.conduct(problem, &from, &h, [t, dt])?;
+        let end = Fields { h, u, alone: state.alone };
+        let instant = Instant { t, dt, fields: &end, from: &state.front, over: dt };
+        let energy = self.balance(problem, state, &end, &[instant]);
+        Ok((end, energy, Work { linear_solves: 2, ..Work::default() }, None))
+    }
+
+    /// The front after a step of `dt` to `t` from the first of two fronts, moved by the jump of the heat flux that
+    /// belongs to the second.
     pub(super) fn moved(
         &self,
         problem: &dyn Problem,
-        from: &[f64],
-        at: &[f64],
+        [from, at]: [&[f64]; 2],
         slopes: &[Vec<f64>; 2],
-        t: f64,
-        dt: f64,
+        [t, dt]: [f64; 2],
     ) -> Result<Vec<f64>> {
         let mirrored = self.mirrored();
-        let jump = self.filter.apply(&front::jump(slopes, self.diffusivity), mirrored);
+        let jump = self.filter.apply(&front::jump(slopes, self.material.conductivity), mirrored);
         let tilt = front::tilt(&self.columns, at, mirrored);
-        let factor = dt * self.mobility;
+        let factor = dt / self.latent_heat();
         let mut h = match self.method {
             Method::Graph => front::graph(from, &tilt, &jump, factor),
             Method::Segments => front::segments(&self.columns, from, &tilt, &jump, factor, mirrored)?,
@@ -257,84 +336,11 @@ impl Front {
         }
     }
 
-    /// Temperatures at time `t`, when the front is at `h`.
-    pub(super) fn conduct(
-        &mut self,
-        problem: &dyn Problem,
-        state: &FrontState,
-        h: &[f64],
-        t: f64,
-    ) -> Result<[Vec<f64>; 2]> {
-        let dt = t - state.t;
-        let (old, new) = (self.heights(&state.front), self.heights(h));
-        let mut out = [Vec::new(), Vec::new()];
-        for phase in [LOWER, UPPER] {
-            let nodes = self.columns.rows(phase) + 1;
-            let [front, wall] = self.columns.ends(phase);
-            let last = self.columns.x().len() - 1;
-            let mut u = state.u[phase].clone();
-            let velocity = velocity(&old[phase], &new[phase], dt);
-            if self.transfer == Transfer::Interpolate {
-                for i in 0..=last {
-                    let part = i * nodes..(i + 1) * nodes;
-                    let [y, new] = [&old, &new].map(|y| &y[phase][part.clone()]);
-                    carry(y, &state.u[phase][part.clone()], front, new, &mut u[part]);
-                }
-            }
-            let mut sides = u.clone();
-            for k in 0..sides.len() {
-                let (i, j) = (k / nodes, k % nodes);
-                let given = j == wall || !self.mirrored() && (i == 0 || i == last);
-                if j == front {
-                    sides[k] = 0.0;
-                } else if given {
-                    let y = new[phase][k];
-                    sides[k] = problem.boundary(phase, [self.columns.x()[i], y], t);
-                    if !sides[k].is_finite() {
-                        let what = "the boundary temperature";
-                        return Err(self.columns.not_finite(what, sides[k], phase, k, y).into());
-                    }
-                }
-            }
-            let step = HeatStep {
-                columns: &self.columns,
-                phase,
-                diffusivity: self.diffusivity[phase],
-                dt,
-                y: &new[phase],
-                velocity: (self.transfer == Transfer::Ale).then_some(&velocity),
-                u: &u,
-                sides: &sides,
-                mirrored: self.mirrored(),
-            };
-            out[phase] = step.solve(&mut self.solvers[phase], self.laplacian)?;
-        }
-        Ok(out)
-    }
-
-    /// The balance of energy after a step to (h, u).
-    fn balance(&self, state: &FrontState, h: &[f64], u: &[Vec<f64>; 2], dt: f64) -> Energy {
-        let (old, new) = (self.heights(&state.front), self.heights(h));
-        let [before, after] = [self.contents(&state.front, &state.u), self.contents(h, u)];
-        let mut energy = state.energy;
-        energy.now = total(&self.columns, h, after.map(|content| content[0]), self.mobility);
-        for phase in [LOWER, UPPER] {
-            let d = self.diffusivity[phase];
-            let at = Phase { columns: &self.columns, phase, y: &new[phase], u: &u[phase] };
-            let velocity = velocity(&old[phase], &new[phase], dt);
-            energy.inflow += after[phase][1] - before[phase][1] + dt * at.flow(d, &velocity);
-            energy.inflow_by_differences += dt * at.wall_flux(d);
-            if !self.mirrored() {
-                let [all, unseen] = at.side_fluxes(d);
-                energy.inflow += dt * unseen;
-                energy.inflow_by_differences += dt * all;
-            }
-        }
-        energy
-    }
-
     /// Largest errors of the front and of the temperature, where the problem knows the exact solution.
     pub fn errors(&self, problem: &dyn Problem, state: &FrontState) -> Option<[f64; 2]> {
+        if state.alone.is_some() {
+            return None;
+        }
         let x = self.columns.x();
         let mut worst = [0.0, 0.0];
         for (&x, &h) in x.iter().zip(&state.front) {
@@ -348,9 +354,4 @@ impl Front {
         }
         Some(worst)
     }
-}
-
-/// Velocities of nodes that have moved from `old` to `new` heights.
-fn velocity(old: &[f64], new: &[f64], dt: f64) -> Vec<f64> {
-    old.iter().zip(new).map(|(a, b)| (b - a) / dt).collect()
 }

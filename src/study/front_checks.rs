@@ -1,16 +1,16 @@
 //! Studies of kind `stefan`: what is refused, what is doubtful, and what runs.
 
 use super::common::{Header, Output, StudyKind};
+use super::front_given::Given;
 use super::front_run::{FrontCourse, FrontRun};
 use super::kind::Kind;
 use super::mapped::{Ends, check_between, parse};
-use super::stefan::{Centre, ExactFront, ExactKind, FrontTime, PhaseTable, StefanStudy};
+use super::stefan::{ExactKind, FrontTime, StefanStudy};
 use crate::error::{Error, Failure, Result};
-use crate::formula::Formula;
 use crate::laplacian::Laplacian;
 use crate::setting::Auto;
 use crate::simulation::Schedule;
-use crate::stefan::{Columns, Front, FrontState, INITIAL, LOWER, Problem, Sides, Similarity, UPPER};
+use crate::stefan::{Columns, Front, FrontState, INITIAL, LOWER, Problem, Sides, UPPER};
 
 /// Bytes of memory that a run needs for each node: nodal arrays, the sparse matrix and its factors.
 const BYTES_PER_NODE: u128 = 6000;
@@ -28,7 +28,9 @@ impl Kind for StefanStudy {
 
     /// Refuses a start that no run can begin with, too.
     fn resolve(&mut self) -> Result<()> {
-        self.begin().map(|_| ())
+        self.begin()?;
+        self.complete();
+        Ok(())
     }
 
     fn memory(&self) -> u128 {
@@ -46,15 +48,20 @@ impl Kind for StefanStudy {
             let columns = front.columns.x().iter().zip(&state.front).zip(front.columns.wall(phase));
             let (mut on_front, mut on_wall) = ((0.0_f64, 0.0), (0.0_f64, 0.0));
             for ((&x, &h), &wall) in columns {
-                let off = given.initial(phase, [x, h]).abs();
-                let gap = (given.initial(phase, [x, wall]) - given.boundary(phase, [x, wall], state.t)).abs();
+                let off = (given.initial(phase, [x, h]) - front.material.melting).abs();
+                let gap = match given.flux(phase, [x, wall], 0.0, state.t) {
+                    Some(_) => 0.0,
+                    None => (given.initial(phase, [x, wall]) - given.boundary(phase, [x, wall], state.t)).abs(),
+                };
                 on_front = if off > on_front.0 { (off, x) } else { on_front };
                 on_wall = if gap > on_wall.0 { (gap, x) } else { on_wall };
             }
             let size = state.u[phase].iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-            if on_front.0 > NOT_ROUNDING * size {
+            if on_front.0 > NOT_ROUNDING * size && state.alone.is_none() {
                 let (off, x) = on_front;
-                warnings.push(format!("`phase.{name}.initial` is not 0 on the front: off by {off:.1e} at x = {x}"));
+                let melting = front.material.melting;
+                let said = format!("`phase.{name}.initial` is not {melting} on the front: off by {off:.1e} at x = {x}");
+                warnings.push(said);
             }
             if on_wall.0 > NOT_ROUNDING * size {
                 let (gap, x) = on_wall;
@@ -79,8 +86,7 @@ impl Kind for StefanStudy {
         let columns =
             Columns::new(x, [&|x| bottom.eval(&[x]), &|x| top.eval(&[x])], self.grid.cells, self.grid.grading)
                 .map_err(|error| error.within("grid"))?;
-        let diffusivity = [self.phase.lower.diffusivity, self.phase.upper.diffusivity];
-        let mut front = Front::new(columns, diffusivity, self.front.mobility)?;
+        let mut front = Front::new(columns, self.material()?);
         self.front.filter.check().map_err(|error| error.within("front"))?;
         front.method = self.front.method;
         front.transfer = self.front.transfer;
@@ -92,7 +98,7 @@ impl Kind for StefanStudy {
             let rule = "its 25 points reach across the front; take another kind";
             return Err(Error::invalid("laplacian.kind", "\"compact25\"", rule));
         }
-        let given = self.given()?;
+        let given = self.given(front.material)?;
         let schedule = self.schedule(&given).map_err(|error| error.within("time"))?;
         if let Given::Exact(solution, _) = &given
             && let Some([cx, cy]) = solution.source()
@@ -102,6 +108,7 @@ impl Kind for StefanStudy {
             let rule = "the temperature is infinite there, inside the box; move it below bottom or beyond the sides";
             return Err(Error::invalid("exact.centre", format!("[{cx}, {cy}]"), rule));
         }
+        front.undercooled = self.undercooled(&front, &given)?;
         let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
         let frames = self.output.frames_of(&schedule)?;
         self.output.check()?;
@@ -110,42 +117,25 @@ impl Kind for StefanStudy {
 }
 
 impl StefanStudy {
-    fn given(&self) -> Result<Given> {
-        let phases = [("lower", &self.phase.lower), ("upper", &self.phase.upper)];
-        if let Some(exact) = &self.exact {
-            let formulas = phases.iter().flat_map(|(name, phase)| {
-                [("initial", &phase.initial), ("boundary", &phase.boundary)]
-                    .map(|(key, text)| (format!("phase.{name}.{key}"), text))
+    /// The phase that is an undercooled melt, where `front.undercooled` says that there is one.
+    fn undercooled(&self, front: &Front, given: &Given) -> Result<Option<usize>> {
+        if !self.front.undercooled {
+            return Ok(None);
+        }
+        let cold = |phase: usize| {
+            let places = front.columns.x().iter().zip(front.columns.wall(phase)).flat_map(|(&x, &wall)| {
+                let h = given.initial_front(x);
+                (1..=8).map(move |k| [x, h + (wall - h) * f64::from(k) / 8.0])
             });
-            let all = formulas.chain([("domain.front".to_string(), &self.domain.front)]);
-            if let Some((key, Some(text))) = all.into_iter().find(|(_, text)| text.is_some()) {
-                let rule = "the exact solution of [exact] gives it; leave one of them out";
-                return Err(Error::invalid(key, format!("{text:?}"), rule));
-            }
-            let diffusivity = phases.map(|(_, phase)| phase.diffusivity);
-            let (solution, start) =
-                exact.solution(diffusivity, self.front.mobility).map_err(|error| error.within("exact"))?;
-            return Ok(Given::Exact(solution, start));
-        }
-        if self.walls.sides == crate::stefan::Sides::Exact {
-            let rule = "needs an exact solution; add [exact], or set it to \"neumann\"";
-            return Err(Error::invalid("walls.sides", "\"exact\"", rule));
-        }
-        let read = |key: String, text: &Option<String>, variables: &[&str]| match text {
-            Some(text) => parse(&key, text, variables),
-            None => Err(Error::invalid(key, "not given", "add it, or an exact solution: [exact]")),
+            places.into_iter().any(|place| given.initial(phase, place) < front.material.melting)
         };
-        let both =
-            |key: &str, take: &dyn Fn(&PhaseTable) -> Option<String>, variables: &[&str]| -> Result<[Formula; 2]> {
-                let [lower, upper] =
-                    phases.map(|(name, phase)| read(format!("phase.{name}.{key}"), &take(phase), variables));
-                Ok([lower?, upper?])
-            };
-        Ok(Given::Formulas {
-            front: read("domain.front".into(), &self.domain.front, &["x"])?,
-            initial: both("initial", &|phase| phase.initial.clone(), &["x", "y"])?,
-            boundary: both("boundary", &|phase| phase.boundary.clone(), &["x", "y", "t"])?,
-        })
+        match [UPPER, LOWER].into_iter().find(|&phase| cold(phase)) {
+            Some(phase) => Ok(Some(phase)),
+            None => {
+                let rule = "no phase is below the melting temperature at the start; leave it out";
+                Err(Error::invalid("front.undercooled", true, rule))
+            }
+        }
     }
 
     fn schedule(&self, given: &Given) -> Result<Schedule> {
@@ -219,91 +209,5 @@ impl StefanStudy {
                  there, and errors are against another problem; set walls.sides to \"exact\""
             )
         })
-    }
-}
-
-/// What a study makes of its formulas or of its exact solution.
-#[derive(Debug, Clone)]
-#[allow(clippy::large_enum_variant)] // one value a run
-pub(super) enum Given {
-    Formulas { front: Formula, initial: [Formula; 2], boundary: [Formula; 2] },
-    Exact(Similarity, f64),
-}
-
-impl Problem for Given {
-    fn boundary(&self, phase: usize, [x, y]: [f64; 2], t: f64) -> f64 {
-        match self {
-            Self::Formulas { boundary, .. } => boundary[phase].eval(&[x, y, t]),
-            Self::Exact(solution, _) => solution.temperature([x, y], t),
-        }
-    }
-
-    fn initial(&self, phase: usize, x: [f64; 2]) -> f64 {
-        match self {
-            Self::Formulas { initial, .. } => initial[phase].eval(&x),
-            Self::Exact(solution, start) => solution.temperature(x, *start),
-        }
-    }
-
-    fn initial_front(&self, x: f64) -> f64 {
-        match self {
-            Self::Formulas { front, .. } => front.eval(&[x]),
-            Self::Exact(solution, start) => solution.height(x, *start),
-        }
-    }
-
-    fn exact_front(&self, x: f64, t: f64) -> Option<f64> {
-        match self {
-            Self::Formulas { .. } => None,
-            Self::Exact(solution, _) => Some(solution.height(x, t)),
-        }
-    }
-
-    fn exact(&self, x: [f64; 2], t: f64) -> Option<f64> {
-        match self {
-            Self::Formulas { .. } => None,
-            Self::Exact(solution, _) => Some(solution.temperature(x, t)),
-        }
-    }
-}
-
-impl ExactFront {
-    /// The solution and the time at which it starts.
-    fn solution(&self, diffusivity: [f64; 2], mobility: f64) -> Result<(Similarity, f64)> {
-        let planar = self.kind == ExactKind::Planar;
-        let given = [
-            ("wall", self.wall.is_some(), true),
-            ("start_front", self.start_front.is_some(), true),
-            ("tilt", self.tilt.is_some(), true),
-            ("offset", self.offset.is_some(), true),
-            ("strength", self.strength.is_some(), false),
-            ("start_radius", self.start_radius.is_some(), false),
-            ("centre", self.centre.is_some(), false),
-        ];
-        if let Some((key, ..)) = given.into_iter().find(|&(_, given, of_planar)| given && of_planar != planar) {
-            let kind = if planar { "planar" } else { "line-source" };
-            return Err(Error::invalid(key, "given", format!("kind = \"{kind}\" does not have it; leave it out")));
-        }
-        let need = |key, value: Option<f64>| value.ok_or_else(|| Error::invalid(key, "not given", "add it"));
-        let (key, distance, solution) = match self.kind {
-            ExactKind::Planar => {
-                let (wall, start) = (need("wall", self.wall)?, need("start_front", self.start_front)?);
-                let (tilt, offset) = (self.tilt.unwrap_or(0.0), self.offset.unwrap_or(0.0));
-                ("start_front", start, Similarity::planar([wall, self.far], diffusivity, mobility, tilt, offset)?)
-            }
-            ExactKind::LineSource => {
-                let (strength, start) = (need("strength", self.strength)?, need("start_radius", self.start_radius)?);
-                let Centre(centre) = self.centre.ok_or_else(|| Error::invalid("centre", "not given", "add it"))?;
-                ("start_radius", start, Similarity::line_source(strength, self.far, diffusivity, mobility, centre)?)
-            }
-        };
-        if !(distance > 0.0 && distance.is_finite()) {
-            return Err(Error::invalid(key, distance, "must be above 0"));
-        }
-        let start = solution.time(distance);
-        if !start.is_normal() {
-            return Err(Error::invalid(key, distance, format!("is where the front is at t = {start:e}, out of range")));
-        }
-        Ok((solution, start))
     }
 }

@@ -5,7 +5,7 @@ use crate::geometry::Quality;
 use crate::kept::Kept;
 use crate::output::{Figures, Rows};
 use crate::simulation::WorkTotal;
-use crate::stefan::{Front, FrontState, Problem};
+use crate::stefan::{Front, FrontState, PhaseEvent, Problem};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -16,6 +16,9 @@ pub struct FrontSummary {
     pub work: WorkTotal,
     /// One entry for each time of `time.report` that was reached.
     pub reports: Vec<FrontReport>,
+    /// Phases that have appeared or vanished.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub phases: Vec<PhaseEvent>,
 }
 
 /// Seconds of a front, by part.

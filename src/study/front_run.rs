@@ -1,7 +1,7 @@
 //! Studies of kind `stefan`: how they run.
 
-use super::front_checks::Given;
 use super::front_figures::{FrontParts, FrontReport, FrontSummary, Row, Tables};
+use super::front_given::Given;
 use super::kind::{Running, SpentBy};
 use super::runner::Stage;
 use crate::error::{Error, Moment, Result, Unfit};
@@ -9,20 +9,28 @@ use crate::geometry::{Mesh, quality};
 use crate::kept::{Kept, check_nodal};
 use crate::output::{FramesAt, Picture, RunDirectory, Spent, Summary, draw_curves};
 use crate::simulation::{Event, Scene, Schedule, Snapshot, WorkTotal};
-use crate::stefan::{Energy, Front, FrontState, LOWER, Stepping, UPPER};
+use crate::stefan::{Attempt, Energy, Front, FrontState, LOWER, PhaseEvent, Stepping, UPPER};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
 /// Automatic steps of an explicit front are at most this share of the longest stable one.
 const OF_THE_LIMIT: f64 = 0.5;
-/// Automatic steps of an explicit front are at most the whole run over this number.
+/// In an automatic step an explicit front moves at most by this share of its distance from the nearer wall; in the
+/// first one of an implicit front, too.
+const OF_THE_ROOM: f64 = 0.002;
+/// Automatic steps are at most the whole run over this number, which bounds what formulas of time may hide in a step.
 const PARTS: f64 = 50.0;
-/// Automatic steps of an implicit front are the whole run over this number: accuracy alone limits them.
-const IMPLICIT_PARTS: f64 = 100.0;
-/// How often an automatic step that fails is halved before the run fails. The next step has its whole length again, so
-/// that a run that goes on from a checkpoint takes the same steps.
+/// The estimated error of an automatic step of an implicit front.
+const TOLERANCE: f64 = 1e-6;
+/// How much shorter and longer than an automatic step of an implicit front the next one may be.
+const PACE: [f64; 2] = [0.2, 2.0];
+/// How often an automatic step that fails is halved before the run fails.
 const HALVINGS: i32 = 6;
+/// Automatic steps that are shorter than this share of the run are not halved again.
+const SHORTEST: f64 = 1e-7;
+/// How often an automatic step with too large an error is shortened before it is taken as it is.
+const REJECTIONS: usize = 12;
 /// Fronts that the picture over time shows, about.
 const CURVES: usize = 16;
 
@@ -52,6 +60,10 @@ pub struct FrontCourse {
     warnings: Vec<String>,
     /// Times and fronts, some of them.
     fronts: Vec<(f64, Vec<f64>)>,
+    /// Phases that have appeared or vanished.
+    pub phases: Vec<PhaseEvent>,
+    /// Length of the next automatic step of an implicit front; none before the first.
+    pace: Option<f64>,
     /// In a checkpoint, what frames, tables and observers carry; empty in a run.
     kept: Kept,
 }
@@ -63,7 +75,9 @@ impl FrontCourse {
         let heights = |front: &[f64]| check_nodal("front", front.as_chunks::<1>().0, columns.x().len());
         heights(&state.front)?;
         self.fronts.iter().try_for_each(|(_, front)| heights(front))?;
-        columns.check(&state.front).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+        if state.alone.is_none() {
+            columns.check(&state.front).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+        }
         for phase in [LOWER, UPPER] {
             let nodes = columns.x().len() * (columns.rows(phase) + 1);
             check_nodal("temperature", state.u[phase].as_chunks::<1>().0, nodes)?;
@@ -95,6 +109,8 @@ impl FrontRun {
             reports: Vec::new(),
             warnings: Vec::new(),
             fronts: Vec::new(),
+            phases: Vec::new(),
+            pace: None,
             kept: Kept::default(),
         };
         Self { name: name.into(), front, given, schedule, at, course, tables: None }
@@ -109,13 +125,14 @@ impl FrontRun {
     }
 
     fn mesh(&self) -> Result<Mesh<2>> {
-        self.front.columns.whole(&self.course.state.front)
+        self.front.columns.whole(&self.front.shown(&self.course.state).0)
     }
 
     fn scene_on(&self, mesh: &Mesh<2>) -> Scene {
-        let (columns, FrontState { t, step, front, u, .. }) = (&self.front.columns, &self.course.state);
+        let (columns, FrontState { t, step, front, .. }) = (&self.front.columns, &self.course.state);
         let curve = columns.x().iter().zip(front).map(|(x, y)| [*x, *y]).collect();
-        Scene { curve, ..Scene::of_mesh(*t, *step, mesh, vec![("u".into(), columns.joined(u))]) }
+        let (_, u) = self.front.shown(&self.course.state);
+        Scene { curve, ..Scene::of_mesh(*t, *step, mesh, vec![("u".into(), columns.joined(&u))]) }
     }
 
     /// Fronts over time, the last good one among them.
@@ -203,13 +220,42 @@ impl FrontRun {
         if !schedule.is_automatic() {
             return schedule.step_from(state.step).map(|_| schedule.time(state.step + 1));
         }
-        let span = schedule.end() - schedule.start();
+        let slow = || OF_THE_ROOM * front.passage(&self.given, state);
         let dt = match front.stepping {
             // the schedule may lengthen a step by a third
-            Stepping::Explicit => (OF_THE_LIMIT * front.limit(state)).min(span / PARTS),
-            Stepping::Implicit => span / IMPLICIT_PARTS,
+            Stepping::Explicit => (OF_THE_LIMIT * front.limit(state)).min(slow()) * 0.5_f64.powi(halvings),
+            Stepping::Implicit => self.course.pace.unwrap_or_else(slow),
         };
-        schedule.after(state.t, dt * 0.5_f64.powi(halvings))
+        let longest = self.span() / PARTS;
+        schedule.after(state.t, dt.min(longest))
+    }
+
+    /// Warns once where a phase would appear that cannot.
+    fn warn_of_overdue(&mut self) {
+        const NO_SEED: &str = "would appear at its wall, where a flux is given";
+        let Some(phase) = self.front.overdue(&self.given, &self.course.state) else { return };
+        if !self.course.warnings.iter().any(|warning| warning.contains(NO_SEED)) {
+            let t = self.course.state.t;
+            let what =
+                format!("at t = {t:.6} the {phase} phase {NO_SEED}, and is left out; give its temperature there");
+            self.course.warnings.push(what);
+        }
+    }
+
+    fn span(&self) -> f64 {
+        self.schedule.end() - self.schedule.start()
+    }
+
+    /// Whether an automatic step of this length with this error will do; sets the length of the next one.
+    fn judge(&mut self, dt: f64, error: Option<f64>, rejections: usize) -> bool {
+        let Some(error) = error.filter(|_| self.schedule.is_automatic()) else { return true };
+        let [shorter, longer] = PACE;
+        let next = dt * (0.9 * (TOLERANCE / error).cbrt()).clamp(shorter, longer);
+        let good = error <= TOLERANCE || rejections == REJECTIONS;
+        // a step that ends at a report may be shorter than it could be
+        let before = self.course.pace.filter(|before| good && dt < *before).unwrap_or(0.0);
+        self.course.pace = Some(next.max(before));
+        good
     }
 }
 
@@ -223,16 +269,19 @@ impl Running for FrontRun {
             self.tables = stage.directory.map(|to| Tables::create(to.path(), x)).transpose()?;
         }
         self.tell(stage.begins, 0.0, stage)?;
-        let mut halvings = 0;
+        let (mut halvings, mut rejections) = (0, 0);
         while let Some(t) = self.next(halvings) {
             let (began, dt) = (Instant::now(), t - self.course.state.t);
-            let stepped = self.front.step(&self.given, &mut self.course.state, t);
+            let attempt = self.front.attempt(&self.given, &self.course.state, t);
             self.course.seconds.parts.pde += began.elapsed().as_secs_f64();
-            self.course.work.work += match stepped {
-                Ok(work) => work,
+            let Attempt { state, work, error, event } = match attempt {
+                Ok(attempt) => attempt,
                 // the state is as it was
-                Err(Error::Failed { .. }) if self.schedule.is_automatic() && halvings < HALVINGS => {
+                Err(Error::Failed { .. })
+                    if self.schedule.is_automatic() && halvings < HALVINGS && dt > SHORTEST * self.span() =>
+                {
                     halvings += 1;
+                    self.course.pace = Some(0.5 * dt);
                     self.course.work.rejected_steps += 1;
                     continue;
                 }
@@ -242,7 +291,16 @@ impl Running for FrontRun {
                 }
                 Err(other) => return Err(other),
             };
-            halvings = 0;
+            self.course.work.work += work;
+            if !self.judge(dt, error, rejections) {
+                rejections += 1;
+                self.course.work.rejected_steps += 1;
+                continue;
+            }
+            (halvings, rejections) = (0, 0);
+            self.course.state = state;
+            self.course.phases.extend(event);
+            self.warn_of_overdue();
             self.course.work.steps += 1;
             self.tell(Event::Stepped, dt, stage)?;
         }
@@ -284,8 +342,8 @@ impl Running for FrontRun {
     }
 
     fn tell(&self, summary: &mut Summary<FrontSummary>) {
-        let FrontCourse { seconds, work, reports, warnings, .. } = self.course.clone();
-        summary.figures = FrontSummary { work, reports };
+        let FrontCourse { seconds, work, reports, warnings, phases, .. } = self.course.clone();
+        summary.figures = FrontSummary { work, reports, phases };
         (summary.seconds, summary.warnings) = (seconds, warnings);
     }
 

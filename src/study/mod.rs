@@ -6,6 +6,7 @@ mod dimension;
 mod equidistribution;
 mod front_checks;
 mod front_figures;
+mod front_given;
 mod front_run;
 mod kind;
 mod line_checks;

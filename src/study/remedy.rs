@@ -40,6 +40,7 @@ fn keys(setting: Setting) -> &'static [&'static str] {
         Setting::Grading => &["grid.grading", "grid.grading.power", "grid.grading.ratio"],
         Setting::Slopes => &["sides.neumann", "walls.sides"],
         Setting::Stepping => &["front.stepping"],
+        Setting::Undercooled => &["front.undercooled"],
     }
 }
 

@@ -3,6 +3,7 @@
 use super::LaplacianTable;
 use super::common::{Header, Output};
 use super::mapped::Ends;
+use crate::physics::Condition;
 use crate::setting::{Auto, fixed, pair};
 use crate::stefan::{Filter, Method, Stepping, Transfer};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -85,23 +86,39 @@ pub struct Phases {
 }
 
 /// `[phase.lower]` or `[phase.upper]`: one of the two phases.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhaseTable {
-    /// Thermal diffusivity D of this phase, above 0.
-    pub diffusivity: f64,
+    /// Thermal diffusivity D of this phase, above 0; 1 where nothing is said. Goes with `front.mobility`;
+    /// `conductivity` and `capacity` may stand in its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffusivity: Option<f64>,
+    /// Thermal conductivity k, with D = k/C. Goes with `capacity` and `front.latent_heat`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conductivity: Option<f64>,
+    /// Volumetric heat capacity C: heat for each volume and degree. Goes with `conductivity`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub capacity: Option<f64>,
     /// Temperature at the start, a formula of x and y.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub initial: Option<String>,
-    /// Temperature of the wall, a formula of x, y and t.
+    /// What holds on the wall: its temperature, a formula of x, y and t; `"no-flux"`; or `{ flux = "…" }`, what flows
+    /// in, a formula of u, x, y and t.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub boundary: Option<String>,
+    #[schemars(schema_with = "wall_schema")]
+    pub boundary: Option<Condition>,
 }
 
-impl Default for PhaseTable {
-    fn default() -> Self {
-        Self { diffusivity: 1.0, initial: None, boundary: None }
-    }
+fn wall_schema(_: &mut SchemaGenerator) -> Schema {
+    let flux = json_schema!({
+        "type": "object", "properties": { "flux": { "type": ["string", "number"] } }, "required": ["flux"],
+        "additionalProperties": false, "description": "What flows in: a formula of u, x, y and t."
+    });
+    json_schema!({ "anyOf": [
+        { "const": "no-flux", "description": "Nothing flows through." },
+        { "type": ["string", "number"], "description": "The temperature: a formula of x, y and t." },
+        flux,
+    ] })
 }
 
 /// `[front]`: how the front between the phases moves.
@@ -109,8 +126,20 @@ impl Default for PhaseTable {
 #[serde(deny_unknown_fields, default)]
 pub struct FrontTable {
     /// L in h_t = L (1 + h_x²)(D₀ ∂u₀/∂y − D₁ ∂u₁/∂y), where h is the height of the front, 0 the upper and 1 the lower
-    /// phase: the inverse of the latent heat.
-    pub mobility: f64,
+    /// phase: the inverse of the latent heat; 1 where nothing is said. Goes with `diffusivity`; `latent_heat` may stand
+    /// in its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mobility: Option<f64>,
+    /// Volumetric latent heat Λ: heat for each volume that melts. Goes with `conductivity` and `capacity` of both
+    /// phases.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub latent_heat: Option<f64>,
+    /// Melting temperature T_m, that of the front; 0 where nothing is said. Goes with `latent_heat`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub melting: Option<f64>,
+    /// Whether a phase is a melt below its melting temperature, which freezes into it: the upper one if its initial
+    /// temperature is below melting anywhere, else the lower one.
+    pub undercooled: bool,
     /// How the front is moved: column by column as a graph over x, or by segments along their normals, as published and
     /// less accurate.
     pub method: Method,
@@ -122,15 +151,18 @@ pub struct FrontTable {
     #[serde(serialize_with = "write_filter", deserialize_with = "read_filter")]
     #[schemars(schema_with = "filter_schema")]
     pub filter: Filter,
-    /// Whether a step of the front uses the temperatures at its start ("explicit", with a longest stable step) or at
-    /// its end ("implicit", without).
+    /// How a step advances front and temperatures: together and implicitly, of second order in time ("implicit"), or
+    /// the front from the temperatures at the start of the step ("explicit", with a longest stable step).
     pub stepping: Stepping,
 }
 
 impl Default for FrontTable {
     fn default() -> Self {
         Self {
-            mobility: 1.0,
+            mobility: None,
+            latent_heat: None,
+            melting: None,
+            undercooled: false,
             method: Method::default(),
             transfer: Transfer::default(),
             filter: Filter::default(),
@@ -240,8 +272,7 @@ pub struct FrontTime {
     /// Length of the run, from its start to its end; instead of `end`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duration: Option<f64>,
-    /// Longest time step. "auto" takes half of the stable step, but at most a fiftieth of the run; with an implicit
-    /// front, a hundredth of the run.
+    /// Longest time step. "auto" follows the estimated error; with an explicit front it takes half of the stable step.
     #[serde(default)]
     pub step: Auto<f64>,
     /// Times at which `summary.json` reports; the end where none are given.

@@ -23,9 +23,13 @@ fn problem(across: usize, rows: usize, front: &str, end: f64) -> Result<Ran> {
         "front = \"1 + cos(x)/4\"\n[grid]\ncells = [{across}, {rows}, {rows}]\n\
          [phase.lower]\ninitial = \"1 + cos(x)/4 - y\"\nboundary = \"1 + (t+1)*cos(x)/4\"\n\
          [phase.upper]\ninitial = \"1 + cos(x)/4 - y\"\nboundary = \"-1 + (t/4-1)*cos(x)/4\"\n\
-         [front]\nmobility = 1.0\n{front}[time]\nend = {end:?}\nstep = 0.01\nreport = [{report}]\n"
+         [front]\nmobility = 1.0\n{}{front}[time]\nend = {end:?}\nstep = 0.01\nreport = [{report}]\n",
+        if front.contains("stepping") { "" } else { EXPLICIT }
     ))
 }
+
+/// The slides move the front before the temperatures.
+const EXPLICIT: &str = "stepping = \"explicit\"\n";
 
 /// What the slides have: segments that shift along their normals, temperatures interpolated, their weights, no filter.
 const LITERAL: &str =
@@ -160,10 +164,10 @@ const CASES: [Case; 3] = [
 ];
 const SETTINGS: [(&str, &str); 8] = [
     ("graph, ale", ""),
-    ("(1,2,1)/4", "[front]\nfilter = [1, 2, 1]\n"),
-    ("implicit", "[front]\nstepping = \"implicit\"\n"),
-    ("segments", "[front]\nmethod = \"segments\"\n"),
-    (INTERPOLATE, "[front]\ntransfer = \"interpolate\"\n"),
+    ("(1,2,1)/4", "filter = [1, 2, 1]\n"),
+    ("implicit", "stepping = \"implicit\"\n"),
+    ("segments", "method = \"segments\"\n"),
+    (INTERPOLATE, "transfer = \"interpolate\"\n"),
     ("harmonic", "[laplacian]\nkind = \"harmonic\"\n"),
     ("published, printed", "[laplacian]\nkind = \"published\"\n"),
     ("published, harmonic", "[laplacian]\nkind = \"published\"\npolynomials = \"harmonic\"\n"),
@@ -238,10 +242,11 @@ fn refined(
     let mut found = Refined { errors: Vec::new(), temperature: f64::NAN, failure: None };
     for n in [1, 2, 4].into_iter().take(sizes) {
         let text = format!(
-            "[grid]\ncells = [{}, {}, {}]\n{more}{walls}[exact]\n{exact}[time]\nduration = 0.1\nstep = {}\n",
+            "[grid]\ncells = [{}, {}, {}]\n[front]\n{}{more}{walls}[exact]\n{exact}[time]\nduration = 0.1\nstep = {}\n",
             10 * n,
             8 * n,
             8 * n,
+            if more.contains("stepping") { "" } else { EXPLICIT },
             0.01 / (n * n) as f64
         );
         let (run, failure) = compute(&text)?;

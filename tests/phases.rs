@@ -1,0 +1,179 @@
+//! Phases that vanish and appear, and melts below their melting temperature, against exact solutions.
+
+use driftmesh::stefan::{Change, LOWER, UPPER};
+use driftmesh::study::{FrontCourse, Kind, Source, StefanStudy, Study};
+
+fn source(text: &str, set: &[&str]) -> Source {
+    let mut source = Source::new("front", text.to_string());
+    set.iter().for_each(|assignment| source.set(assignment).unwrap());
+    source
+}
+
+/// A run to its end.
+fn course(text: &str, set: &[&str]) -> FrontCourse {
+    let (run, failure) = StefanStudy::from_source(&source(text, set)).unwrap().compute().unwrap();
+    assert!(failure.is_none(), "{set:?}: {failure:?}");
+    run.course
+}
+
+/// u = exp(t − y) − 1 below h = t, and ice at its melting point above: the ice is gone at t = 1.
+const MELT_OUT: &str = r#"
+[study]
+name = "melt-out"
+kind = "stefan"
+[domain]
+x = [0.0, 0.5]
+bottom = "0"
+top = "1"
+front = "0.1"
+[grid]
+cells = [4, 20, 10]
+[phase.lower]
+initial = "exp(0.1 - y) - 1"
+boundary = "exp(t) - 1"
+[phase.upper]
+initial = "0"
+boundary = "0"
+[time]
+start = 0.1
+end = 1.5
+"#;
+
+/// By automatic and given steps, with either front, and with a flux at the bottom.
+#[test]
+fn a_phase_vanishes_and_the_run_goes_on() {
+    for set in [
+        &[][..],
+        &["time.step=0.01"],
+        &["front.stepping=\"explicit\""],
+        &["phase.lower.boundary={ flux = \"exp(t)\" }", "phase.upper.boundary=\"no-flux\""],
+    ] {
+        let course = course(MELT_OUT, set);
+        println!("{set:?}: {:?} {} steps", course.phases, course.work.steps);
+        let [event] = &course.phases[..] else { panic!("{set:?}: {:?}", course.phases) };
+        assert!((event.t - 1.0).abs() <= 1e-3, "{set:?}: {event:?}");
+        assert_eq!((event.event, event.phase.as_str()), (Change::Vanished, "upper"));
+        assert_eq!((course.state.t, course.state.alone), (1.5, Some(LOWER)));
+        assert!(course.state.front.iter().all(|h| *h == 1.0));
+    }
+}
+
+/// With no flux through the top, what flows in once the ice is gone heats the water: ∫u grows by ∫exp(t) dt.
+#[test]
+fn what_is_left_keeps_its_energy() {
+    let set = ["phase.lower.boundary={ flux = \"exp(t)\" }", "phase.upper.boundary=\"no-flux\""];
+    let course = course(MELT_OUT, &set);
+    let energy = course.reports[0].energy_imbalance.unwrap();
+    println!("{energy:e}");
+    assert!(energy <= 2e-3, "{energy:e}");
+}
+
+/// Neumann's problem from t = 0: water at 1 where there was ice of −.5; λ = .469851.
+const FROM_NOTHING: &str = r#"
+[study]
+name = "from-nothing"
+kind = "stefan"
+[domain]
+x = [0.0, 0.5]
+bottom = "0"
+top = "6"
+front = "0"
+[grid]
+cells = [4, 20, 40]
+[phase.lower]
+initial = "1"
+boundary = "1"
+[phase.upper]
+initial = "-0.5"
+boundary = "-0.5"
+[time]
+end = 1.0
+"#;
+
+#[test]
+fn a_phase_appears_at_a_warm_wall() {
+    let course = course(FROM_NOTHING, &[]);
+    let h = course.state.front[0];
+    println!("{:?} {h} {:e} {} steps", course.phases, h / (2.0 * 0.469851) - 1.0, course.work.steps);
+    let [event] = &course.phases[..] else { panic!("{:?}", course.phases) };
+    assert_eq!((event.t, event.event, event.phase.as_str()), (0.0, Change::Appeared, "lower"));
+    assert!((h / (2.0 * 0.469851) - 1.0).abs() <= 1e-3, "{h}");
+}
+
+/// The same upside down: ice of −1 grows down into water of .5.
+#[test]
+fn a_phase_appears_at_a_cold_wall() {
+    let set = [
+        "domain.front=\"6\"",
+        "phase.lower.initial=\"0.5\"",
+        "phase.lower.boundary=\"0.5\"",
+        "phase.upper.initial=\"-1\"",
+        "phase.upper.boundary=\"-1\"",
+        "grid.cells=[4, 40, 20]",
+    ];
+    let course = course(FROM_NOTHING, &set);
+    let h = 6.0 - course.state.front[0];
+    println!("{:?} {h}", course.phases);
+    assert_eq!(course.phases[0].phase, "upper");
+    assert!((h / (2.0 * 0.469851) - 1.0).abs() <= 1e-3, "{h}");
+}
+
+/// Growth into a melt whose undercooling is half of Λ/C: h = 2λ√t with √π λ exp(λ²) erfc(λ) = 1/2, from h = .1.
+const UNDERCOOLED: &str = r#"
+[study]
+name = "undercooled"
+kind = "stefan"
+[domain]
+x = [0.0, 0.2]
+bottom = "0"
+top = "4"
+front = "0.1"
+[grid]
+cells = [4, 8, 60]
+[phase.lower]
+initial = "0"
+boundary = "0"
+[phase.upper]
+initial = "-0.5*(1 - (1 - erf(y/(2*sqrt(T0))))/(1 - erf(LAMBDA)))"
+boundary = "-0.5"
+[front]
+undercooled = true
+[time]
+start = T0
+end = 0.4
+"#;
+const LAMBDA: f64 = 0.4327515993663081;
+
+fn undercooled() -> String {
+    UNDERCOOLED.replace("T0", &format!("{:?}", (0.05 / LAMBDA).powi(2))).replace("LAMBDA", &format!("{LAMBDA:?}"))
+}
+
+#[test]
+fn an_undercooled_melt_freezes() {
+    let growth = std::f64::consts::PI.sqrt() * LAMBDA * (LAMBDA * LAMBDA).exp() * libm::erfc(LAMBDA);
+    assert!((growth - 0.5).abs() < 1e-9);
+    let course = course(&undercooled(), &[]);
+    let (h, exact) = (course.state.front[0], 2.0 * LAMBDA * course.state.t.sqrt());
+    println!("{h} {exact} {:e} {} steps", h / exact - 1.0, course.work.steps);
+    assert!((h / exact - 1.0).abs() <= 5e-3, "{h}, not {exact}");
+}
+
+/// Upside down the melt is the lower phase; without the key that is refused with its name, and the key without such a
+/// melt, too.
+#[test]
+fn an_undercooled_melt_is_named() {
+    let turned = undercooled().replace("erf(y/", "erf((4 - y)/");
+    let turned =
+        turned.replace("front = \"0.1\"", "front = \"3.9\"").replace("cells = [4, 8, 60]", "cells = [4, 60, 8]");
+    let turned = turned.replace("phase.lower", "phase.other").replace("phase.upper", "phase.lower");
+    let turned = turned.replace("phase.other", "phase.upper");
+    let course = course(&turned, &[]);
+    let (h, exact) = (4.0 - course.state.front[0], 2.0 * LAMBDA * course.state.t.sqrt());
+    assert!((h / exact - 1.0).abs() <= 5e-3, "{h}, not {exact}");
+    let error = Study::from_source(&source(&turned, &["front.undercooled=false"])).unwrap_err();
+    let said = format!("{error} {:?}", error.help());
+    assert!(["ill-posed", "front.undercooled"].iter().all(|word| said.contains(word)), "{said}");
+    let error = Study::from_source(&source(MELT_OUT, &["front.undercooled=true"])).unwrap_err();
+    assert!(error.to_string().contains("front.undercooled"), "{error}");
+    assert_eq!((LOWER, UPPER), (0, 1));
+}
