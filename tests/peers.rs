@@ -57,8 +57,8 @@ fn a_ring_has_less_error_than_equal_cells() {
     }
 }
 
-/// Layers along an arc, as a solution of Poisson's equation may have: a tenth of the error of equal cells, which is what
-/// error-driven moving meshes of finite elements report.
+/// Layers along an arc, as a solution of Poisson's equation may have: a tenth of the error of equal cells, which is
+/// what error-driven moving meshes of finite elements report.
 #[test]
 fn an_arc_has_a_tenth() {
     for steep in [50.0, 100.0, 200.0] {

@@ -16,7 +16,7 @@ const WINDOW: usize = 4;
 /// What a mesh that is not even keeps of these limits: it goes back to equal cells only where these resolve u this much
 /// better. On its way back a front would leave the nodes behind, which have to travel far, and pass through cells wider
 /// than equal ones; and were the limits the same, a solution near them would send the mesh to and fro.
-const KEPT: f64 = 0.3;
+const KEPT: f64 = 0.25;
 /// One less the smallest cell over an equal one, from which on a mesh begins not to be even, and is not.
 const UNEVEN: [f64; 2] = [0.4, 0.7];
 

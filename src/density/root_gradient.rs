@@ -22,7 +22,7 @@ use std::borrow::Cow;
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
 /// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
 /// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. On a mesh that is not even
-/// any more these limits are down to 0.3 times as large: it goes back to equal cells late. Where the steepest slope
+/// any more these limits are down to a quarter as large: it goes back to equal cells late. Where the steepest slope
 /// is less than twice (⟨|∇u|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could
 /// be taken, and s is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and
 /// 500 around jumps.

@@ -105,6 +105,12 @@ pub trait Physics<const D: usize = 2>: Send {
         Vec::new()
     }
 
+    /// For each node and unknown, as the solution has them, the rate at which its own source lets a small change of it
+    /// grow, ∂S/∂u where that is above 0; empty if it does so nowhere.
+    fn growth_rates(&self, _t: f64, _mesh: &Mesh<D>, _u: &Field) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// Whether the solution is given for every time and place, so that nothing is carried from mesh to mesh.
     fn is_given(&self) -> bool {
         false

@@ -284,6 +284,7 @@ impl Free {
         };
         let tried = self.dt;
         self.dt = (self.dt * factor).min(self.longest);
+        self.dt = self.dt.min(simulation.longest_of_growth(after));
         // of a solution that is given nothing is lost where nodes pass a jump in it
         if simulation.physics.is_given() {
             self.dt = self.dt.max(GIVEN * self.longest);

@@ -141,6 +141,16 @@ where
         if widest.iter().all(|w| w.is_infinite()) { Vec::new() } else { widest }
     }
 
+    fn growth_rates(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Vec<f64> {
+        if !(0..B).any(|c| self.of_unknowns[Self::SOURCE * B + c]) {
+            return Vec::new();
+        }
+        let nodes = self.nodes(t, &mesh.images(), u.values().as_chunks::<B>().0);
+        let rates = nodes.iter().flat_map(|node| (0..B).map(|c| Self::slope(node, Self::SOURCE, c, c).max(0.0)));
+        let rates: Vec<f64> = rates.collect();
+        if rates.iter().any(|rate| *rate > 0.0) { rates } else { Vec::new() }
+    }
+
     fn known(&self) -> Vec<usize> {
         self.exact.iter().map(|(c, _)| *c).collect()
     }
