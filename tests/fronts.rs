@@ -219,3 +219,23 @@ fn a_wall_has_a_temperature_or_a_flux() {
         }
     }
 }
+
+/// Both phases at the melting temperature, and a wall that begins to melt one of them: nothing is on the wrong side.
+#[test]
+fn phases_at_their_melting_temperature_begin_to_melt() {
+    let start =
+        ["phase.lower.initial=\"0\"", "phase.upper.boundary=\"no-flux\"", "domain.front=\"0.5\"", "time.end=0.4"];
+    for (wall, melts) in [("\"1\"", true), ("{ flux = \"1\" }", true), ("\"1 - exp(0.1 - t)\"", true), ("\"0\"", false)]
+    {
+        let set = start.iter().map(|set| set.to_string()).chain([format!("phase.lower.boundary={wall}")]);
+        let course = course(EXPONENTIAL, &set.collect::<Vec<_>>());
+        assert_eq!(course.state.front[0] > 0.5 + 1e-3, melts, "{wall}: {}", course.state.front[0]);
+    }
+    // the same front on twice as many cells
+    let set = start.iter().map(|set| set.to_string()).chain(["phase.lower.boundary=\"1\"".to_string()]);
+    let [coarse, fine] = [1, 2].map(|n| {
+        let set = set.clone().chain([format!("grid.cells=[4, {}, {}]", 20 * n, 10 * n)]);
+        course(EXPONENTIAL, &set.collect::<Vec<_>>()).state.front[0]
+    });
+    assert!((coarse - fine).abs() < 1e-3 * (fine - 0.5), "{coarse} and {fine}");
+}

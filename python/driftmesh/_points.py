@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def interpolate(mesh: Mesh, u: ArrayLike, coordinates: Sequence[ArrayLike], order: int) -> Floats:
     """See :meth:`driftmesh.Mesh.interpolate`."""
-    if order not in (1, 3):
+    if isinstance(order, bool) or order not in (1, 3):
         raise ValueError(f"`order` is {order!r}, but must be 1 or 3")
     fields = finite("u", u)
     leading = fields.shape[: fields.ndim - mesh.dimensions]
@@ -33,7 +33,7 @@ def interpolate(mesh: Mesh, u: ArrayLike, coordinates: Sequence[ArrayLike], orde
         raise ValueError(f"`x` and `y` have shapes {shapes}, which do not fit together") from None
     shape = points.shape[:-1]
     rows = np.ascontiguousarray(points.reshape(-1, mesh.dimensions))
-    flat = fields.reshape(int(np.prod(leading)), -1)
+    flat = fields.reshape(int(np.prod(leading)), int(np.prod(mesh.shape)))
     values, outside = _driftmesh.interpolate(mesh._given(), flat, rows, order == 3)
     if values is None:
         index = tuple(int(k) for k in np.unravel_index(outside, shape))

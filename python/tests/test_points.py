@@ -213,3 +213,21 @@ def test_the_jacobian_is_that_of_the_map():
     slope = 1 + 0.2 * np.pi * np.cos(2 * np.pi * np.linspace(0, 1, 201))
     np.testing.assert_allclose(graded(200).jacobian, slope, atol=1e-3)
     np.testing.assert_allclose(Mesh.uniform((6, 1), upper=(3, 2), periodic=(False, True)).jacobian, 6)
+
+
+def test_no_fields_have_no_values():
+    mesh = Mesh.uniform(cells=(4, 3))
+    assert mesh.interpolate(np.zeros((0, *mesh.shape)), [0.1, 0.2], [0.3, 0.4]).shape == (0, 2)
+
+
+def test_a_folded_line_has_no_gradient():
+    with pytest.raises(MeshFolded, match="node 2 is not above node 1"):
+        gradient(Mesh([0.0, 0.5, 0.4, 0.8, 1.0]))
+
+
+def test_cubics_do_not_mind_where_the_box_lies():
+    line = Mesh.uniform(cells=20, lower=2000.0, upper=2001.0)
+    line = line.moved(line.x + 0.05 * np.sin(2 * np.pi * (line.x - 2000)))
+    x = 2000 + np.linspace(0.01, 0.99, 200)
+    found = line.interpolate(np.sin(5 * (line.x - 2000)), x, order=3)
+    np.testing.assert_allclose(found, np.sin(5 * (x - 2000)), atol=1e-3)

@@ -115,7 +115,7 @@ where
 
 /// The image of a point that is nearest to where its place says it is.
 fn nearest_image<const D: usize>(mesh: &Mesh<D>, place: Place<D>, point: [f64; D]) -> [f64; D] {
-    let (there, _) = mapped(mesh, place, 2);
+    let (there, _) = mapped(mesh, place, 2, [0.0; D]);
     let (extent, periodic) = (mesh.extent(), mesh.lattice().periodic());
     std::array::from_fn(|d| {
         let turns = if periodic[d] { ((there[d] - point[d]) / extent[d]).round() } else { 0.0 };
@@ -126,8 +126,11 @@ fn nearest_image<const D: usize>(mesh: &Mesh<D>, place: Place<D>, point: [f64; D
 /// ξ of a point in the cubic map, by Newton's method; nothing where it does not lie near the cell.
 fn refined<const D: usize>(mesh: &Mesh<D>, place: Place<D>, point: [f64; D]) -> Option<[f64; D]> {
     let mut at = place;
+    // from a corner of the cell, so that round-off is that of the cell, wherever the box lies
+    let corner = mesh.x()[mesh.lattice().index(place.cell)];
+    let point: [f64; D] = std::array::from_fn(|d| point[d] - corner[d]);
     for _ in 0..NEWTON_STEPS {
-        let (there, derivatives) = mapped(mesh, at, 4);
+        let (there, derivatives) = mapped(mesh, at, 4, corner);
         let (cofactors, determinant) = (cofactors(derivatives), determinant(derivatives));
         let change: [f64; D] =
             std::array::from_fn(|d| (0..D).map(|c| cofactors[d][c] * (point[c] - there[c])).sum::<f64>() / determinant);
@@ -142,8 +145,13 @@ fn refined<const D: usize>(mesh: &Mesh<D>, place: Place<D>, point: [f64; D]) -> 
     None
 }
 
-/// x at a place, and ∂x/∂ξ_d of the map through so many nodes along an axis.
-fn mapped<const D: usize>(mesh: &Mesh<D>, place: Place<D>, nodes: usize) -> ([f64; D], [[f64; D]; D]) {
+/// x at a place, from an origin, and ∂x/∂ξ_d of the map through so many nodes along an axis.
+fn mapped<const D: usize>(
+    mesh: &Mesh<D>,
+    place: Place<D>,
+    nodes: usize,
+    origin: [f64; D],
+) -> ([f64; D], [[f64; D]; D]) {
     let (lattice, extent) = (mesh.lattice(), mesh.extent());
     let axes: [Axis; D] = std::array::from_fn(|d| Axis::new(lattice, d, place, nodes));
     let (mut x, mut derivatives) = ([0.0; D], [[0.0; D]; D]);
@@ -152,7 +160,7 @@ fn mapped<const D: usize>(mesh: &Mesh<D>, place: Place<D>, nodes: usize) -> ([f6
         let along = |d: usize| (0..D).map(|e| if e == d { axes[d].slopes[at[d]] } else { weights[e] }).product::<f64>();
         let (weight, slopes) = (weights.iter().product::<f64>(), std::array::from_fn::<f64, D, _>(along));
         for c in 0..D {
-            let there = mesh.x()[k][c] + axes[c].turns[at[c]] * extent[c];
+            let there = mesh.x()[k][c] - origin[c] + axes[c].turns[at[c]] * extent[c];
             x[c] += weight * there;
             (0..D).for_each(|d| derivatives[d][c] += slopes[d] * there);
         }
@@ -256,6 +264,25 @@ mod tests {
             let [coarse, fine] = [24, 48].map(|n| error(&bent(n, periodic), degree, wave));
             let order = (coarse / fine).log2();
             assert!((order - expected).abs() < 0.4, "observed order {order:.2}, expected {expected}, {periodic}");
+        }
+    }
+
+    /// As good in a box far from the origin, up to the round-off of its coordinates.
+    #[test]
+    fn a_box_may_lie_anywhere() {
+        let wave = |x: f64| (2.0 * PI * x).sin();
+        let error = |offset: f64| {
+            let mesh = Mesh::uniform(Lattice::bounded([40]).unwrap(), [offset], [offset + 1.0]).unwrap();
+            let bend = |x: f64| x + 0.1 * x * (1.0 - x);
+            let mesh = mesh.moved(mesh.x().iter().map(|[x]| [offset + bend(x - offset)]).collect()).unwrap();
+            let u: Vec<f64> = mesh.x().iter().map(|[x]| wave(x - offset)).collect();
+            let points: Vec<[f64; 1]> = (0..500).map(|k| [offset + (k as f64 + 0.5) / 500.0]).collect();
+            let found = Interpolator::new(&mesh, &points, Degree::Cubic).unwrap().values(&u);
+            found.iter().zip(&points).map(|(found, [x])| (found - wave(x - offset)).abs()).fold(0.0, f64::max)
+        };
+        let near = error(0.0);
+        for offset in [1e2, 2e3, 1e6] {
+            assert!(error(offset) < 1.1 * near, "{offset}: {:e} for {near:e}", error(offset));
         }
     }
 

@@ -117,16 +117,17 @@ pub(super) fn jump(slopes: &[Vec<f64>; 2], conductivity: [f64; 2]) -> Vec<f64> {
     pairs.map(|(above, below)| conductivity[UPPER] * above - conductivity[LOWER] * below).collect()
 }
 
-/// Refuses a front with the warm phase above it.
+/// Refuses a front with the warm phase above it, where more than a `negligible` flux tells of that.
 pub(super) fn check_warm_below(
     columns: &Columns,
     h: &[f64],
     slopes: &[Vec<f64>; 2],
     conductivity: [f64; 2],
+    negligible: f64,
 ) -> Result<(), Failure> {
     for (i, (above, below)) in slopes[UPPER].iter().zip(&slopes[LOWER]).enumerate() {
         let (above, below) = (conductivity[UPPER] * above, conductivity[LOWER] * below);
-        if above + below > 1e-12 * (above.abs() + below.abs()) {
+        if above + below > negligible + 1e-12 * (above.abs() + below.abs()) {
             return Err(Failure::WrongSide { x: [columns.x()[i], h[i]], slope: above + below });
         }
     }

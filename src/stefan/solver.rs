@@ -124,6 +124,10 @@ impl FrontState {
     }
 }
 
+/// Where a phase at its melting temperature begins to be warmed from a wall, its gradient at the front is below the
+/// round-off and the overshoot of a step, which is this share of the one across the phase at most and may have any sign.
+const OVERSHOOT: f64 = 1e-6;
+
 /// What a step comes to.
 #[derive(Debug, Clone)]
 pub struct Attempt {
@@ -207,7 +211,15 @@ impl Front {
             return Ok(());
         }
         let slopes = self.slopes(&state.front, &state.u);
-        front::check_warm_below(&self.columns, &state.front, &slopes, self.material.conductivity)
+        let conductivity = self.material.conductivity;
+        // of the largest difference of temperature over the height of a phase
+        let flux = |phase: usize| {
+            let most = state.u[phase].iter().fold(0.0_f64, |most, u| most.max((u - self.material.melting).abs()));
+            let y = self.columns.heights(phase, &state.front);
+            conductivity[phase] * most / (y[self.columns.rows(phase)] - y[0]).abs()
+        };
+        let negligible = OVERSHOOT * flux(LOWER).max(flux(UPPER));
+        front::check_warm_below(&self.columns, &state.front, &slopes, conductivity, negligible)
     }
 
     pub(super) fn heights(&self, h: &[f64]) -> [Vec<f64>; 2] {

@@ -122,7 +122,7 @@ fn wall_schema(_: &mut SchemaGenerator) -> Schema {
 }
 
 /// `[front]`: how the front between the phases moves.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FrontTable {
     /// L in h_t = L (1 + h_x²)(D₀ ∂u₀/∂y − D₁ ∂u₁/∂y), where h is the height of the front, 0 the upper and 1 the lower
@@ -154,21 +154,6 @@ pub struct FrontTable {
     /// How a step advances front and temperatures: together and implicitly, of second order in time ("implicit"), or
     /// the front from the temperatures at the start of the step ("explicit", with a longest stable step).
     pub stepping: Stepping,
-}
-
-impl Default for FrontTable {
-    fn default() -> Self {
-        Self {
-            mobility: None,
-            latent_heat: None,
-            melting: None,
-            undercooled: false,
-            method: Method::default(),
-            transfer: Transfer::default(),
-            filter: Filter::default(),
-            stepping: Stepping::default(),
-        }
-    }
 }
 
 fn filter_schema(_: &mut SchemaGenerator) -> Schema {

@@ -72,8 +72,8 @@ where
         let sources = self.timed.at(t, x, |k| u[k]);
         let mut all = Vec::with_capacity(B * x.len());
         for ((k, x), beyond) in x.iter().enumerate().zip(beyond) {
-            for c in 0..B {
-                let mut forcing = Forcing { source: sources[k][c], ..Forcing::default() };
+            for (c, source) in sources[k].into_iter().enumerate() {
+                let mut forcing = Forcing { source, ..Forcing::default() };
                 for (d, end) in timed(c).filter(|&(d, end)| beyond[d][end]) {
                     match &self.sides[c][d][end] {
                         Open::Value(formula) => {
