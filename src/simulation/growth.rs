@@ -18,8 +18,8 @@ const FRONT: f64 = 0.18;
 /// A node is ahead of a front, or behind it, where its value is within this share of the range from an end of the
 /// range.
 const AHEAD: f64 = 1e-3;
-/// How far small values ahead of a front may grow in a step, as the exponent: a step of TR-BDF2 is then off by 0.04 times
-/// its square, as a share of the growth, and so is the speed of a front that is pulled by it.
+/// How far small values ahead of a front may grow in a step, as the exponent: a step of TR-BDF2 is then off by 0.04
+/// times its square, as a share of the growth, and so is the speed of a front that is pulled by it.
 const GROWN: f64 = 0.2;
 /// Cells wider than this multiple of w = √(D/k) are warned of: values in them grow before the front arrives.
 const OUTRUNS: f64 = 2.0;
@@ -29,8 +29,8 @@ impl<const D: usize> Simulation<D>
 where
     Mesh<D>: Movable<D>,
 {
-    /// The longest step in which small values ahead of fronts grow as they should. At the nodes of a mesh that goes along
-    /// with a front little changes, so that nothing else would limit the step.
+    /// The longest step in which small values ahead of fronts grow as they should. At the nodes of a mesh that goes
+    /// along with a front little changes, so that nothing else would limit the step.
     pub(super) fn longest_of_growth(&self, state: &State<D>) -> f64 {
         let State { t, mesh, u, .. } = state;
         let rates = self.physics.growth_rates(*t, mesh, u);

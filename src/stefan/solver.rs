@@ -125,7 +125,7 @@ impl FrontState {
 }
 
 /// Where a phase at its melting temperature begins to be warmed from a wall, its gradient at the front is below the
-/// round-off and the overshoot of a step, which is this share of the one across the phase at most and may have any sign.
+/// round-off and the overshoot of a step: at most this share of the gradient across the phase, of any sign.
 const OVERSHOOT: f64 = 1e-6;
 
 /// What a step comes to.
