@@ -55,8 +55,8 @@ def gradient(mesh: Mesh) -> tuple[csr_matrix, ...]:
         place = tuple(int(k) for k in np.argwhere(~(jacobian > 0))[0])
         raise MeshFolded(f"the mesh is folded: its Jacobian is {jacobian[place]} at node {place}")
     if mesh.dimensions == 1 and not (np.diff(mesh.x) > 0).all():
-        place = int(np.argmin(np.diff(mesh.x) > 0))
-        raise MeshFolded(f"the mesh is folded: node {place + 1} is not above node {place}")
+        below = int(np.argmin(np.diff(mesh.x) > 0))
+        raise MeshFolded(f"the mesh is folded: node {below + 1} is not above node {below}")
     inverse = np.linalg.inv(metric)
     axes = range(mesh.dimensions)
     return tuple(
