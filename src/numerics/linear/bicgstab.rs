@@ -1,4 +1,4 @@
-use super::krylov::{Krylov, add};
+use super::krylov::{Krylov, MAX_PRODUCTS, add};
 use super::{LatticeMatrix, LinearSolver, adi::Adi, refill, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::work::Work;
@@ -69,7 +69,8 @@ impl<const D: usize, const S: usize, const K: usize> LinearSolver<D, S, K> for B
                 break;
             }
         }
-        let iterations = krylov.solve(a, b, x, tolerance, adi.sweeps(), |v, x| adi.cycle(a, v, x, scratch))?;
+        let iterations =
+            krylov.solve(a, b, x, tolerance, (adi.sweeps(), MAX_PRODUCTS), |v, x| adi.cycle(a, v, x, scratch))?;
         Ok(solved_in::<K, f64>(products + iterations))
     }
 }

@@ -1,4 +1,5 @@
-use super::{BlockMatrix, LinearSolver, krylov::Krylov, refill, solved, solved_in, stalled};
+use super::krylov::{Krylov, MAX_PRODUCTS};
+use super::{BlockMatrix, LinearSolver, refill, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::parallel;
 use crate::work::Work;
@@ -40,7 +41,7 @@ impl<const D: usize, const S: usize, const B: usize> LinearSolver<D, S, B, [[f64
         if !sizes.iter().chain(inverses.as_flattened().as_flattened()).all(|v| v.is_finite()) {
             return Err(stalled(a.rows.len() * B, sizes, tolerance, 0));
         }
-        let iterations = krylov.solve(a, b, x, tolerance, 1, |v, x| {
+        let iterations = krylov.solve(a, b, x, tolerance, (1, MAX_PRODUCTS), |v, x| {
             parallel::for_each_row(x, n + 2, |q, x| {
                 let Some(p) = a.patch.pencil_in_row(q) else { return };
                 let inner = v[q * (n + 2) + 1..].iter().zip(&inverses[p * n..]);

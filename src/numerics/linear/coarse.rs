@@ -86,6 +86,16 @@ impl<const B: usize> Cycle<B> {
         true
     }
 
+    /// Whether the matrix has a coarse level.
+    pub fn has_levels(&self) -> bool {
+        self.count > 0
+    }
+
+    /// The same by incomplete elimination of the matrix alone.
+    pub fn eliminate(&self, a: &BlockMatrix<2, 9, B>, v: &[[f64; B]], x: &mut [[f64; B]]) {
+        self.finest.ilu.solve(a, v, x);
+    }
+
     /// Sets x to about A⁻¹ v, with its ring ready for a product with the matrix.
     pub fn solve(&mut self, a: &BlockMatrix<2, 9, B>, v: &[[f64; B]], x: &mut [[f64; B]]) {
         cycle(a, &mut self.finest, &mut self.coarse[..self.count], v, x);

@@ -9,7 +9,7 @@ pub(super) struct Krylov<const K: usize> {
 }
 
 /// Iterations (products with the matrix, or sweeps of the preconditioner) after which a system counts as not solved.
-const MAX_PRODUCTS: usize = 2000;
+pub(super) const MAX_PRODUCTS: usize = 2000;
 /// Largest number of starts from the residual b − A x. The one that the iteration updates drifts from it by rounding,
 /// which each start makes good.
 const RESTARTS: usize = 4;
@@ -23,14 +23,14 @@ impl<const K: usize> Krylov<K> {
     }
 
     /// Solves from the guess in `x`, after [`prepare`](Self::prepare). `precondition` sets its second argument with its
-    /// ring, and counts as `cost` iterations.
+    /// ring, and counts as `cost` iterations, of which there may be about `most`.
     pub fn solve<const D: usize, const S: usize, E: Entry<K>>(
         &mut self,
         a: &LatticeMatrix<D, S, E>,
         b: &[[f64; K]],
         x: &mut [[f64; K]],
         tolerance: [f64; K],
-        cost: usize,
+        (cost, most): (usize, usize),
         mut precondition: impl FnMut(&[[f64; K]], &mut [[f64; K]]),
     ) -> Result<usize, Failure> {
         let [r, shadow, p, v, t, hat] = &mut self.space;
@@ -64,7 +64,7 @@ impl<const K: usize> Krylov<K> {
                 let rho_before = std::mem::replace(&mut rho, dot(shadow, r));
                 let (gain, step) = (divide(active, rho, rho_before), divide(active, alpha, omega));
                 update(p, r, v, |c, p, r, v| r + gain[c] * step[c] * (p - omega[c] * v));
-                if products > MAX_PRODUCTS || !sizes.iter().all(|s| s.is_finite()) {
+                if products > most || !sizes.iter().all(|s| s.is_finite()) {
                     return Err(stalled(a.rows.len() * E::COUPLED, sizes, tolerance, products));
                 }
             }

@@ -1,5 +1,6 @@
 use super::coarse::Cycle;
-use super::{BlockMatrix, LinearSolver, krylov::Krylov, solved, solved_in, stalled};
+use super::krylov::{Krylov, MAX_PRODUCTS};
+use super::{BlockMatrix, LinearSolver, solved, solved_in, stalled};
 use crate::error::Failure;
 use crate::work::Work;
 
@@ -8,7 +9,7 @@ use crate::work::Work;
 ///
 /// For implicit steps of convection and diffusion, whose matrices are neither symmetric nor dominated by their star.
 /// Couplings around periodic axes are left to the iteration on each level. The iterations counted are products with the
-/// matrix.
+/// matrix. Where cells are so flat and sheared that coarse levels do harm, elimination alone takes over.
 ///
 /// # Source
 /// Trottenberg, Oosterlee, Schüller, *Multigrid*, Academic Press (2001), 7.8; van der Vorst, *Bi-CGSTAB* (1992).
@@ -17,6 +18,9 @@ pub struct TransportBicgstab<const B: usize> {
     cycle: Cycle<B>,
     krylov: Krylov<B>,
 }
+
+/// Products that a solve with coarse levels may take. It takes four to ten where these are of use, on any lattice.
+const PATIENCE: usize = 24;
 
 impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for TransportBicgstab<B> {
     fn solve(
@@ -35,7 +39,18 @@ impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for TransportBicgstab<
         if !sizes.iter().all(|size| size.is_finite()) || !cycle.build(a) {
             return Err(stalled(a.rows.len() * B, sizes, tolerance, 0));
         }
-        let iterations = krylov.solve(a, b, x, tolerance, 1, |v, x| cycle.solve(a, v, x))?;
+        let guess = x.to_vec();
+        let most = if cycle.has_levels() { PATIENCE } else { MAX_PRODUCTS };
+        let iterations = match krylov.solve(a, b, x, tolerance, (1, most), |v, x| cycle.solve(a, v, x)) {
+            Ok(iterations) => iterations,
+            Err(Failure::LinearStalled { iterations, .. }) if cycle.has_levels() => {
+                x.copy_from_slice(&guess);
+                krylov.prepare(a.patch.padded_len());
+                let eliminate = |v: &[[f64; B]], x: &mut [[f64; B]]| cycle.eliminate(a, v, x);
+                iterations + krylov.solve(a, b, x, tolerance, (1, MAX_PRODUCTS), eliminate)?
+            }
+            Err(other) => return Err(other),
+        };
         Ok(solved_in::<B, [[f64; B]; B]>(iterations))
     }
 }
