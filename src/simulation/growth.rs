@@ -33,8 +33,11 @@ where
     /// along with a front little changes, so that nothing else would limit the step.
     pub(super) fn longest_of_growth(&self, state: &State<D>) -> f64 {
         let State { t, mesh, u, .. } = state;
+        if !self.mover.generator.moves() {
+            return f64::INFINITY;
+        }
         let rates = self.physics.growth_rates(*t, mesh, u);
-        if rates.is_empty() || !self.mover.generator.moves() {
+        if rates.is_empty() {
             return f64::INFINITY;
         }
         let fastest = (0..u.components()).fold(0.0, |most, c| {
