@@ -4,7 +4,7 @@
 //!     cargo bench -p driftmesh --bench subdomains
 
 use driftmesh::density::{Arclength, Monitor};
-use driftmesh::geometry::{Lattice, Mesh, compare};
+use driftmesh::geometry::{Density, Lattice, Mesh, compare};
 use driftmesh::meshing::{
     EstimatorKind, MeshGenerator, Mmpde, Moved, ResidualWalk, Schwarz, Stochastic, Strip, Transmission, Whole,
 };
@@ -14,7 +14,7 @@ const DT: f64 = 1e-3;
 const STEPS: usize = 50;
 
 /// The mesh that follows the exact solution, and its density.
-fn developed(n: usize) -> driftmesh::Result<(Mesh<2>, Vec<f64>)> {
+fn developed(n: usize) -> driftmesh::Result<(Mesh<2>, Density)> {
     let density = |mesh: &Mesh<2>, step: usize| {
         let t = 0.25 + step as f64 * DT;
         let u: Vec<f64> = mesh.x().iter().map(|[x, y]| 1.0 / (1.0 + ((x + y - t) / 0.01).exp())).collect();

@@ -1,6 +1,6 @@
 //! M^kP and (MP)^l, with a density that is a known function of x and physics that stands still or moves.
 
-use driftmesh::density::{Arclength, Monitor};
+use driftmesh::density::{Arclength, Density, Monitor};
 use driftmesh::geometry::{Field, Lattice, Mesh};
 use driftmesh::meshing::{Mmpde, Whole};
 use driftmesh::mover::Mover;
@@ -12,7 +12,7 @@ use driftmesh::{Failure, Work};
 struct Bump;
 
 impl Monitor for Bump {
-    fn density(&self, mesh: &Mesh<2>, _u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Vec<f64>, Failure> {
+    fn density(&self, mesh: &Mesh<2>, _u: &[f64], _gradient: Option<&[[f64; 2]]>) -> Result<Density, Failure> {
         Ok(mesh.x().iter().map(|[x, y]| 1.0 + 5.0 * (-30.0 * ((x - 0.5).powi(2) + (y - 0.5).powi(2))).exp()).collect())
     }
 }

@@ -1,6 +1,6 @@
 //! The same generator in one, two and three dimensions.
 
-use driftmesh::geometry::{Lattice, Mesh, check_unfolded};
+use driftmesh::geometry::{Density, Lattice, Mesh, check_unfolded};
 use driftmesh::meshing::{MeshGenerator, Mmpde, Moved, Whole};
 
 /// ρ(x) = Π_d exp(x_d) has the mesh of its factors: along each axis ∫eˣ is the same in all cells.
@@ -16,7 +16,7 @@ where
     let mut mesh = Mesh::uniform(Lattice::bounded([cells; D]).unwrap(), [0.0; D], [1.0; D]).unwrap();
     let mut whole = Whole::<D>::to(1e-9);
     for _ in 0..200 {
-        let rho: Vec<f64> = mesh.x().iter().map(|x| x.iter().sum::<f64>().exp()).collect();
+        let rho: Density = mesh.x().iter().map(|x| x.iter().sum::<f64>().exp()).collect();
         let Moved { mesh: moved, work, .. } = whole.step(&Mmpde::default(), &mesh, &rho, 1.0).unwrap();
         assert_eq!(work.direct_solves(), 0, "{D} dimensions: left to elimination");
         let way = moved.farthest(&mesh);

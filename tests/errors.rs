@@ -3,7 +3,7 @@
 use driftmesh::density::{Arclength, Given, Monitor};
 use driftmesh::equidistribution::{Coarse, FaceDensity, Line, LineDensity, Measure, Method, Stop, Sweep};
 use driftmesh::error::Unfit;
-use driftmesh::geometry::{Field, Lattice, Mesh, Patch, check_unfolded};
+use driftmesh::geometry::{Density, Field, Lattice, Mesh, Patch, check_unfolded};
 use driftmesh::meshing::{EstimatorKind, GridWalk, MeshGenerator, Mmpde, Schwarz, Stochastic, Whole};
 use driftmesh::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use driftmesh::output::RunDirectory;
@@ -202,7 +202,7 @@ fn linear_stalled() {
 
 /// One step of a generator under a density that rises at once.
 fn step(mut generator: impl MeshGenerator, height: f64, dt: f64) -> Failure {
-    let rho: Vec<f64> = mesh().x().iter().map(|[x, _]| if *x < 0.4 { 1.0 } else { height }).collect();
+    let rho: Density = mesh().x().iter().map(|[x, _]| if *x < 0.4 { 1.0 } else { height }).collect();
     generator.step(&Mmpde::published(), &mesh(), &rho, dt).unwrap_err()
 }
 
@@ -271,7 +271,7 @@ fn formulas() {
 fn not_a_box() {
     let mut x = mesh().x().to_vec();
     x[0] = [0.01, 0.0];
-    let error = Whole::default().step(&Mmpde::default(), &mesh().moved(x).unwrap(), &[1.0; 81], 1e-3).unwrap_err();
+    let error = Whole::default().step(&Mmpde::default(), &mesh().moved(x).unwrap(), &vec![1.0; 81].into(), 1e-3).unwrap_err();
     assert_eq!(error.name(), "not-a-box");
     let message = "the mesh does not fill its box: node (0, 0) of a side across axis 0, x = 0.0100, y = 0.0000, is off";
     assert_says(error, &[message, "by 1.0e-2"], Some("map it to the domain"), true);
@@ -279,14 +279,14 @@ fn not_a_box() {
 
 #[test]
 fn out_of_range() {
-    let error = Whole::default().step(&Mmpde::default(), &mesh(), &[1.0; 81], -1.0).unwrap_err();
+    let error = Whole::default().step(&Mmpde::default(), &mesh(), &vec![1.0; 81].into(), -1.0).unwrap_err();
     assert_eq!(error.name(), "out-of-range");
     assert_says(error, &["the time step is -1, but must be a finite number above 0"], Some("give a value"), true);
 }
 
 #[test]
 fn wrong_length() {
-    let error = Whole::default().step(&Mmpde::published(), &mesh(), &[1.0; 3], 1e-3).unwrap_err();
+    let error = Whole::default().step(&Mmpde::published(), &mesh(), &vec![1.0; 3].into(), 1e-3).unwrap_err();
     assert_eq!(error.name(), "wrong-length");
     assert_says(error, &["the density has 3 values, but the lattice has 81 nodes"], Some("lattice order"), true);
     assert!(matches!(mesh().moved(vec![]).unwrap_err(), Failure::WrongLength { found: 0, expected: 81, .. }));

@@ -1,7 +1,7 @@
 //! What a user of the library gives wrongly is refused by name: it is not computed with, and nothing panics.
 
 use driftmesh::density::{Arclength, Given, Monitor, RootGradient, Strength, smooth};
-use driftmesh::geometry::{Field, Lattice, Mesh, check_unfolded, quality};
+use driftmesh::geometry::{Density, Field, Lattice, Mesh, check_unfolded, quality};
 use driftmesh::laplacian::{Laplacian, stencils};
 use driftmesh::meshing::{
     Decomposition, Estimates, Estimator, EstimatorKind, Fixed, GridWalk, MeshGenerator, Mmpde, Moved, Problem,
@@ -17,7 +17,7 @@ fn square(n: usize) -> Mesh<2> {
 }
 
 fn step(equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
-    Whole::default().step(equation, mesh, rho, dt)
+    Whole::default().step(equation, mesh, &rho.to_vec().into(), dt)
 }
 
 #[track_caller]
@@ -64,17 +64,18 @@ fn a_mapped_mesh_is_refused() {
     let unit = Mesh::uniform(lattice, [0.0; 2], [1.0; 2]).unwrap();
     let mesh = Mesh::mapped(lattice, unit.x().iter().map(|&x| ring(x)).collect()).unwrap();
     let rho = vec![1.0; mesh.x().len()];
+    let density = Density::from(rho.clone());
     let failure = step(&Mmpde::default(), &mesh, &rho, DT).unwrap_err();
     assert_eq!(failure.name(), "not-a-box");
     assert!(failure.to_string().starts_with("the mesh does not fill its box: node ("), "{failure}");
     let generators: [Box<dyn MeshGenerator>; 2] =
         [Box::new(Schwarz::new([2, 2], 2)), Box::new(Stochastic::new([2, 2], 1, EstimatorKind::default()))];
     for mut generator in generators {
-        assert!(matches!(generator.step(&Mmpde::default(), &mesh, &rho, DT), Err(Failure::NotABox { .. })));
+        assert!(matches!(generator.step(&Mmpde::default(), &mesh, &density, DT), Err(Failure::NotABox { .. })));
     }
-    let moved = Mover::new(Whole::default()).step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &rho }, DT);
+    let moved = Mover::new(Whole::default()).step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &density }, DT);
     assert!(matches!(moved, Err(Failure::NotABox { .. })));
-    assert_eq!(Fixed::default().step(&Mmpde::default(), &mesh, &rho, DT).unwrap().mesh, mesh);
+    assert_eq!(Fixed::default().step(&Mmpde::default(), &mesh, &density, DT).unwrap().mesh, mesh);
     // a mesh that is mapped onto a box is one of a box
     let stretched = Mesh::mapped(lattice, unit.x().iter().map(|[x, y]| [x * x, 2.0 * y]).collect()).unwrap();
     step(&Mmpde::default(), &stretched, &rho, DT).unwrap();
@@ -106,20 +107,21 @@ fn a_step_refuses_what_it_cannot_begin_with() {
     let predicted = Mmpde { relaxation: steps, ..Mmpde::default() };
     assert_out_of_range(step(&predicted, &mesh, &rho, DT), &["`relaxation.prediction` is 0.2", "Mover"]);
     assert_wrong_length(step(&Mmpde::default(), &mesh, &[1.0; 5], DT), 5, 25);
+    let density = Density::from(rho.clone());
     // what the mover does with the same settings is what they say
     Mover::by(Box::<Whole>::default(), predicted)
-        .step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &rho }, DT)
+        .step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &density }, DT)
         .unwrap();
     let mut mover = Mover::new(Whole::default());
-    assert_wrong_length(mover.step(&mesh, &Gait::at_rest(&mesh), Followed { u: &[0.0; 5], rho: &rho }, DT), 5, 25);
-    assert_wrong_length(mover.step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &[1.0; 5] }, DT), 5, 25);
+    assert_wrong_length(mover.step(&mesh, &Gait::at_rest(&mesh), Followed { u: &[0.0; 5], rho: &density }, DT), 5, 25);
+    assert_wrong_length(mover.step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &vec![1.0; 5].into() }, DT), 5, 25);
 }
 
 /// Settings of generators are checked by their steps, those of an estimator of one's own, too.
 #[test]
 fn generators_check_their_settings() {
     let (mesh, rho) = (square(8), vec![1.0; 81]);
-    let step = |mut generator: Box<dyn MeshGenerator>| generator.step(&Mmpde::default(), &mesh, &rho, DT);
+    let step = |mut generator: Box<dyn MeshGenerator>| generator.step(&Mmpde::default(), &mesh, &rho.clone().into(), DT);
     assert_out_of_range(step(Box::new(Schwarz::new([2, 2], 0))), &["`overlap` is 0", "set it to 1 or more"]);
     let mut schwarz = Schwarz::new([2, 2], 2);
     schwarz.tolerance = Some(-1.0);

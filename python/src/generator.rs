@@ -90,7 +90,7 @@ impl Generator {
                 check_unfolded(&mesh)?;
                 parts.monitor.density(&mesh, &u, None)
             })?;
-            array(py, &lattice, &rho.map_err(|failure| plain(py, failure))?)
+            array(py, &lattice, rho.map_err(|failure| plain(py, failure))?.largest())
         }
         in_dimensions!(mesh, of(self, py, &mesh, &u))
     }

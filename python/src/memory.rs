@@ -93,7 +93,7 @@ impl<const D: usize> Part<D> {
             .and_then(|lattice| Mesh::uniform(lattice, fixed(&lower)?, fixed(&upper)?))
             .and_then(|mesh| Ok(mesh.moved(x.as_chunks::<D>().0.to_vec())?))?;
         let damaged = |error| unfit(format!("{error:?}"), OURS);
-        gait.check(mesh.x().len()).map_err(damaged)?;
+        gait.check(&mesh).map_err(damaged)?;
         parts.mover.generator.resume(&mesh, &self.generator).map_err(damaged)?;
         parts.last = Some((mesh, gait));
         Ok(())

@@ -2,7 +2,7 @@
 
 use driftmesh::density::{Arclength, Strength};
 use driftmesh::error::{Failure, Result};
-use driftmesh::geometry::{Lattice, Mesh};
+use driftmesh::geometry::{Density, Lattice, Mesh};
 use driftmesh::meshing::{
     Decomposition, Estimator, MeshGenerator, MeshOperator, Mmpde, Problem, Strips, Whole, move_sides,
 };
@@ -16,7 +16,7 @@ use std::time::Instant;
 pub struct InterfaceStep {
     equation: Mmpde,
     mesh: Mesh<2>,
-    rho: Vec<f64>,
+    rho: Density,
     dt: f64,
     operator: MeshOperator<2>,
     /// New positions on the sides, old ones elsewhere.
@@ -77,7 +77,7 @@ impl InterfaceStep {
     /// A [`Failure`] where the step cannot be solved.
     pub fn new(
         mesh: Mesh<2>,
-        rho: Vec<f64>,
+        rho: Density,
         equation: Mmpde,
         dt: f64,
         subdomains: [usize; 2],

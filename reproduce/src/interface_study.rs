@@ -4,7 +4,7 @@ use driftmesh::Auto;
 use driftmesh::Work;
 use driftmesh::density::Arclength;
 use driftmesh::error::{Failure, Result};
-use driftmesh::geometry::{Lattice, Mesh, compare};
+use driftmesh::geometry::{Density, Lattice, Mesh, compare};
 use driftmesh::meshing::{
     Decomposition, Estimator, EstimatorKind, GridWalk, Interpolation, MeshGenerator, Mmpde, MonteCarlo, Moved,
     Placement, Problem, ResidualWalk, Stochastic, Strip, Strips, Whole, move_sides,
@@ -190,7 +190,7 @@ struct SweepsAlone {
 }
 
 impl MeshGenerator for SweepsAlone {
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &Density, dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();

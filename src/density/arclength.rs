@@ -1,4 +1,4 @@
-use super::{MAX_SMOOTHING, Monitor, smooth};
+use super::{Density, MAX_SMOOTHING, Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Mesh, check_length};
 use crate::numerics::difference::Metrics;
@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 /// let ramp: Vec<f64> = mesh.x().iter().map(|x| 2.0 * x[0]).collect();
 /// // a ramp of slope 2 with α = 2 has ρ = √(1 + 2·2²) = 3
 /// let rho = Arclength { strength: Strength::Absolute(2.0), smoothing: 2 }.density(&mesh, &ramp, None)?;
-/// assert!(rho.iter().all(|r| (r - 3.0).abs() < 1e-14));
+/// assert!(rho.largest().iter().all(|r| (r - 3.0).abs() < 1e-14));
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 ///
@@ -74,7 +74,7 @@ impl Arclength {
 }
 
 impl<const D: usize> Monitor<D> for Arclength {
-    fn density(&self, mesh: &Mesh<D>, u: &[f64], gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], gradient: Option<&[[f64; D]]>) -> Result<Density, Failure> {
         self.check().map_err(Failure::refusing)?;
         check_length(mesh.lattice(), "what the mesh follows", u.len())?;
         let differenced: Vec<[f64; D]>;
@@ -99,7 +99,7 @@ impl<const D: usize> Monitor<D> for Arclength {
         let mut rho: Vec<f64> = slope2.into_iter().map(|s| (1.0 + alpha * s).sqrt()).collect();
         smooth(mesh.lattice(), &mut rho, self.smoothing)?;
         match rho.iter().position(|r| !r.is_finite()) {
-            None => Ok(rho),
+            None => Ok(rho.into()),
             Some(k) => {
                 let (node, x) = mesh.told(k);
                 Err(Failure::NonFinite { what: "the mesh density", value: rho[k], node, x })

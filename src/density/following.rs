@@ -1,4 +1,4 @@
-use super::Monitor;
+use super::{Density, Monitor};
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Program};
 use crate::geometry::{Field, Mesh};
@@ -31,7 +31,7 @@ impl<const D: usize> Following<D> {
 
 impl<const D: usize> Monitor<D> for Following<D> {
     /// The gradient at hand is that of the first unknown, not of what is followed.
-    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Density, Failure> {
         self.monitor.density(mesh, u, None)
     }
 

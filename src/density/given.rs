@@ -1,4 +1,4 @@
-use super::{MAX_SMOOTHING, Monitor, smooth};
+use super::{Density, MAX_SMOOTHING, Monitor, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Mesh, check_length, check_positive};
 
@@ -25,12 +25,12 @@ impl Given {
 }
 
 impl<const D: usize> Monitor<D> for Given {
-    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Density, Failure> {
         self.check().map_err(Failure::refusing)?;
         check_length(mesh.lattice(), "the density", u.len())?;
         check_positive(mesh, "the mesh density", u)?;
         let mut rho = u.to_vec();
         smooth(mesh.lattice(), &mut rho, self.smoothing)?;
-        Ok(rho)
+        Ok(rho.into())
     }
 }

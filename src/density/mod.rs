@@ -21,6 +21,7 @@ pub use smoothing::smooth;
 pub use tables::{ArclengthTable, GivenTable, RootGradientTable};
 
 use crate::error::{Failure, Result};
+pub use crate::geometry::Density;
 use crate::geometry::{Cells, Field, Mesh};
 use crate::kind::kinds;
 use crate::numerics::difference::Gradient;
@@ -37,7 +38,7 @@ pub trait Monitor<const D: usize = 2>: Send {
     ///
     /// # Errors
     /// [`Failure::NonFinite`] names the first node where ρ is not a finite number.
-    fn density(&self, mesh: &Mesh<D>, u: &[f64], gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure>;
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], gradient: Option<&[[f64; D]]>) -> Result<Density, Failure>;
 
     /// ρ at every node from all unknowns: that of what is [`followed`](Self::followed) where nothing else is said.
     ///
@@ -49,7 +50,7 @@ pub trait Monitor<const D: usize = 2>: Send {
         mesh: &Mesh<D>,
         unknowns: &Field,
         gradient: Option<&[[f64; D]]>,
-    ) -> Result<Vec<f64>, Failure> {
+    ) -> Result<Density, Failure> {
         self.density(mesh, &self.followed(t, mesh, unknowns)?, gradient)
     }
 

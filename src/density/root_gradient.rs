@@ -1,31 +1,34 @@
 use super::need::{Need, bends, between};
-use super::{Monitor, smoothing::smooth_widely};
+use super::{Density, Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
-use crate::geometry::{Cells, Field, Lattice, Mesh, check_length, strides};
+use crate::geometry::{Cells, Field, Lattice, Mesh, check_length, dot, strides};
 use crate::numerics::{ends, larger, sum};
 use std::borrow::Cow;
 
 /// The root of the slope, over its mean: no number to set
 ///
 /// ```text
-/// ρ = 1 + 4 s r / ⟨r⟩,   r = max(√|∇u| − b, 0),   b = ⟨|∇u|^⅛⟩⁴,   ⟨·⟩ the mean over the domain
+/// ρ_d = 1 + 4 s_d r / ⟨r⟩,   r = max(√|g_d| − b, 0),   b = ⟨|g_d|^⅛⟩⁴,   ⟨·⟩ the mean over the domain
 /// ```
 ///
-/// with ∇u in each mesh cell, per uniform cell along each axis: |∇u|² = (h_x u_x)² + (h_y u_y)², so that a box of any
-/// shape is treated alike. A layer of any width gets the same share of the nodes, about half of them: the mean of the
-/// root falls with the width as fast as its largest value grows. The background b is 0 where u is flat outside its
-/// layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes otherwise.
+/// for each axis d, with g the gradient of u in each mesh cell per uniform cell along each axis, (h_x u_x, h_y u_y), so
+/// that a box of any shape is treated alike. A layer of any width gets the same share of the nodes, about half of them:
+/// the mean of the root falls with the width as fast as its largest value grows. The background b is 0 where u is flat
+/// outside its layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes
+/// otherwise. With a density for each axis, layers along two adjacent sides, or across each other, have their nodes
+/// both.
 ///
-/// Of several unknowns, each in units of its range, the largest |∇u| counts, and the largest need: what equal cells
+/// Of several unknowns, each in units of its range, the largest |g_d| counts, and the largest need: what equal cells
 /// resolve of one unknown would not be resolved any more where all nodes go to a layer of another.
 ///
 /// The need s is 0 where equal cells resolve u: where it changes by less than 0.18 of its range over a uniform cell
 /// everywhere, and by less than 0.06 within a few nodes bends both ways. It is 1 where it changes by more than a
-/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. On a mesh that is not even
-/// any more these limits are down to a quarter as large: it goes back to equal cells late. Where the steepest slope
-/// is less than twice (⟨|∇u|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could
-/// be taken, and s is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and
-/// 500 around jumps.
+/// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. Along an axis it is no
+/// larger than what √D g_d, or the bends along that axis, have by the same limits. On a mesh that is not even any more
+/// these limits are down to a quarter as large: it goes back to equal cells late. Where the largest |g_d| is less than
+/// twice (⟨|g_d|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could be taken, and
+/// s_d is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and 500 around
+/// jumps.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
@@ -64,7 +67,7 @@ impl<const D: usize> Monitor<D> for RootGradient
 where
     Mesh<D>: Cells<D>,
 {
-    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Vec<f64>, Failure> {
+    fn density(&self, mesh: &Mesh<D>, u: &[f64], _gradient: Option<&[[f64; D]]>) -> Result<Density, Failure> {
         check_length(mesh.lattice(), "what the mesh follows", u.len())?;
         Self::of_all(mesh, &[Cow::Borrowed(u)])
     }
@@ -75,7 +78,7 @@ where
         mesh: &Mesh<D>,
         unknowns: &Field,
         _gradient: Option<&[[f64; D]]>,
-    ) -> Result<Vec<f64>, Failure> {
+    ) -> Result<Density, Failure> {
         let all = (0..unknowns.components()).map(|c| unknowns.component(c).collect());
         Self::of_all(mesh, &all.collect::<Vec<Cow<[f64]>>>())
     }
@@ -83,59 +86,69 @@ where
 
 impl RootGradient {
     /// ρ of unknowns with one value a node each.
-    fn of_all<const D: usize>(mesh: &Mesh<D>, unknowns: &[Cow<[f64]>]) -> Result<Vec<f64>, Failure>
+    fn of_all<const D: usize>(mesh: &Mesh<D>, unknowns: &[Cow<[f64]>]) -> Result<Density, Failure>
     where
         Mesh<D>: Cells<D>,
     {
         let lattice = mesh.lattice();
-        let even = || Ok(vec![1.0; lattice.len()]);
-        let Followed { slopes, need, step } = Followed::of(mesh, unknowns);
-        if slopes.is_empty() {
-            return even();
-        }
-        let Roots { mut roots, background, mean, steepest } = Roots::of(mesh, slopes);
-        if mean <= ROUNDING * background {
-            return even();
-        }
-        let beta = BETA * need * between(STEEPER, steepest / (background * background));
-        if beta == 0.0 {
-            return even();
-        }
+        let Followed { slopes, needs, step } = Followed::of(mesh, unknowns);
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
         let contrast = CONTRAST * (CONTRAST_OF_JUMPS / CONTRAST).powf(between(JUMPS, step));
-        let mean = mean.max(BETA * (steepest.sqrt() - background) / contrast);
-        roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
-        let mut rho = roots;
-        let (cells, layers) = (lattice.cells(), layers(lattice, &rho));
-        let passes = std::array::from_fn(|d| {
-            let passes = (PASSES * ((cells[d] + 1) as f64 / 41.0).powi(2)).round() * (FEW / layers[d].max(FEW)).powi(2);
-            // taking cell values to nodes is one pass already
-            (passes - 1.0).max(0.0)
-        });
-        smooth_widely(cells, lattice.periodic(), &mut rho, passes);
-        let nodal = Mesh::<D>::at_nodes(lattice, rho);
-        match nodal.iter().position(|rho| !rho.is_finite()) {
-            None => Ok(nodal),
-            Some(k) => {
-                let (node, x) = mesh.told(k);
-                Err(Failure::NonFinite { what: "the mesh density", value: nodal[k], node, x })
-            }
+        let axes = slopes.into_iter().zip(needs).map(|(slopes, need)| along(mesh, slopes, need, contrast));
+        let axes: Vec<Option<Vec<f64>>> = axes.collect();
+        if axes.iter().all(Option::is_none) {
+            return Ok(vec![1.0; lattice.len()].into());
         }
+        let mut axes = axes.into_iter().map(|rho| rho.unwrap_or_else(|| vec![1.0; lattice.len()]));
+        let axes: [Vec<f64>; D] = std::array::from_fn(|_| axes.next().expect("one for each axis"));
+        let bad = |rho: &Vec<f64>| rho.iter().position(|rho| !rho.is_finite()).map(|k| (k, rho[k]));
+        if let Some((k, value)) = axes.iter().find_map(bad) {
+            let (node, x) = mesh.told(k);
+            return Err(Failure::NonFinite { what: "the mesh density", value, node, x });
+        }
+        Ok(Density::of_axes(axes).expect("one value a node each"))
     }
 }
 
+/// ρ along an axis from |g_d| of the cells and the need; nothing where it is even.
+fn along<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>, need: f64, contrast: f64) -> Option<Vec<f64>>
+where
+    Mesh<D>: Cells<D>,
+{
+    if need == 0.0 {
+        return None;
+    }
+    let lattice = mesh.lattice();
+    let Roots { mut roots, background, mean, steepest } = Roots::of(mesh, slopes);
+    let beta = BETA * need * between(STEEPER, steepest / (background * background));
+    if beta == 0.0 || mean <= ROUNDING * background {
+        return None;
+    }
+    let mean = mean.max(BETA * (steepest.sqrt() - background) / contrast);
+    roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
+    let mut rho = roots;
+    let (cells, layers) = (lattice.cells(), layers(lattice, &rho));
+    let passes = std::array::from_fn(|d| {
+        let passes = (PASSES * ((cells[d] + 1) as f64 / 41.0).powi(2)).round() * (FEW / layers[d].max(FEW)).powi(2);
+        // taking cell values to nodes is one pass already
+        (passes - 1.0).max(0.0)
+    });
+    smooth_widely(cells, lattice.periodic(), &mut rho, passes);
+    Some(Mesh::<D>::at_nodes(lattice, rho))
+}
+
 /// What the mesh follows.
-struct Followed {
-    /// The largest |∇u| in each cell; empty where all unknowns are constant.
-    slopes: Vec<f64>,
-    /// The largest need.
-    need: f64,
+struct Followed<const D: usize> {
+    /// The largest |g_d| in each cell, for each axis; empty where all unknowns are constant.
+    slopes: Vec<Vec<f64>>,
+    /// The largest need along each axis.
+    needs: [f64; D],
     /// The largest change over an edge of the mesh, as a share of the range of its unknown.
     step: f64,
 }
 
-impl Followed {
-    fn of<const D: usize>(mesh: &Mesh<D>, unknowns: &[Cow<[f64]>]) -> Self
+impl<const D: usize> Followed<D> {
+    fn of(mesh: &Mesh<D>, unknowns: &[Cow<[f64]>]) -> Self
     where
         Mesh<D>: Cells<D>,
     {
@@ -145,31 +158,65 @@ impl Followed {
         let ends: Vec<[f64; 2]> = ends.collect();
         let sizes = ends.iter().map(|[low, high]| high.max(-low));
         let largest = sizes.clone().fold(0.0, larger);
-        let needs = Need::on(mesh);
-        let (mut slopes, mut need, mut step) = (Vec::new(), 0.0, 0.0);
+        let need = Need::on(mesh);
+        let (mut slopes, mut needs, mut step) = (Vec::new(), [0.0; D], 0.0);
         for ((u, [low, high]), size) in unknowns.iter().zip(&ends).zip(sizes) {
             let range = high - low;
             if range <= OF_ROUNDING * largest {
                 continue;
             }
-            // with room for one a node, too
-            let mut own = Vec::with_capacity(lattice.cells().map(|n| n + 1).iter().product());
-            own.extend(mesh.slopes(u, range).map(|(slope, _)| slope));
-            let steepest = own.iter().copied().fold(0.0, larger);
+            let Slopes { along, steepest, axes } = Slopes::of(mesh, u, range);
             if steepest * range * longest <= ROUNDING * size {
                 continue;
             }
             step = larger(step, largest_step(lattice, u) / range);
-            need = f64::max(need, needs.by_slopes(steepest));
-            if need < 1.0 {
-                need = need.max(needs.by_bends(bends(mesh, u) / range));
+            // a slope across the axes has 1/√D of itself along each
+            let by_slopes = axes.map(|slope| need.by_slopes((D as f64).sqrt() * slope));
+            let all = need.by_slopes(steepest);
+            let bends = if all < 1.0 || by_slopes.iter().any(|s| *s < 1.0) { bends(mesh, u) } else { [0.0; D] };
+            let by_bends = bends.map(|bend| need.by_bends(bend / range));
+            let all = by_bends.iter().copied().fold(all, f64::max);
+            for d in 0..D {
+                // u that is not finite everywhere is told of by its density
+                let own = if steepest.is_finite() { all.min(by_slopes[d].max(by_bends[d])) } else { 1.0 };
+                needs[d] = f64::max(needs[d], own);
             }
             match slopes.is_empty() {
-                true => slopes = own,
-                false => slopes.iter_mut().zip(own).for_each(|(slope, own)| *slope = larger(*slope, own)),
+                true => slopes = along,
+                false => slopes.iter_mut().zip(along).for_each(|(slopes, along)| {
+                    slopes.iter_mut().zip(along).for_each(|(slope, own)| *slope = larger(*slope, own));
+                }),
             }
         }
-        Self { slopes, need, step }
+        Self { slopes, needs, step }
+    }
+}
+
+/// Slopes of one unknown.
+struct Slopes<const D: usize> {
+    /// |g_d| in each cell, for each axis.
+    along: Vec<Vec<f64>>,
+    /// The largest |g|.
+    steepest: f64,
+    /// The largest |g_d| along each axis.
+    axes: [f64; D],
+}
+
+impl<const D: usize> Slopes<D> {
+    fn of(mesh: &Mesh<D>, u: &[f64], range: f64) -> Self
+    where
+        Mesh<D>: Cells<D>,
+    {
+        // with room for one a node, too
+        let room: usize = mesh.lattice().cells().map(|n| n + 1).iter().product();
+        let mut along = vec![Vec::with_capacity(room); D];
+        let mut steepest2 = 0.0;
+        for g in mesh.slopes(u, range) {
+            steepest2 = larger(steepest2, dot(g, g));
+            along.iter_mut().zip(g).for_each(|(along, g)| along.push(g.abs()));
+        }
+        let axes = std::array::from_fn(|d| along[d].iter().copied().fold(0.0, larger));
+        Self { along, steepest: steepest2.sqrt(), axes }
     }
 }
 
@@ -186,20 +233,20 @@ pub(crate) fn largest_step<const D: usize>(lattice: &Lattice<D>, u: &[f64]) -> f
     })
 }
 
-/// √|∇u| of the cells of a mesh.
+/// √|g_d| of the cells of a mesh.
 struct Roots {
     /// One a cell, last axis fastest.
     roots: Vec<f64>,
-    /// ⟨|∇u|^⅛⟩⁴.
+    /// ⟨|g_d|^⅛⟩⁴.
     background: f64,
-    /// Mean of √|∇u| less the background, where that is above 0.
+    /// Mean of √|g_d| less the background, where that is above 0.
     mean: f64,
-    /// The largest |∇u|.
+    /// The largest |g_d|.
     steepest: f64,
 }
 
 impl Roots {
-    /// From |∇u| of the cells.
+    /// From |g_d| of the cells.
     fn of<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>) -> Self
     where
         Mesh<D>: Cells<D>,
@@ -254,8 +301,8 @@ mod tests {
             let u: Vec<f64> = mesh.x().iter().map(|x| (w * (x[0] - 0.5)).tanh()).collect();
             RootGradient::default().density(&mesh, &u, None).unwrap()
         };
-        assert_eq!(density(8.0), vec![1.0; mesh.x().len()]);
-        assert!(density(80.0).iter().fold(0.0, |m: f64, rho| m.max(*rho)) > 10.0);
+        assert_eq!(density(8.0), vec![1.0; mesh.x().len()].into());
+        assert!(density(80.0).largest().iter().fold(0.0, |m: f64, rho| m.max(*rho)) > 10.0);
     }
 
     /// A box of any shape has the same density: slopes count by the cell.
@@ -267,7 +314,7 @@ mod tests {
             RootGradient::default().density(&mesh, &u, None).unwrap()
         };
         let (square, thin) = (density(1.0), density(1e-4));
-        assert!(square.iter().zip(&thin).all(|(a, b)| (a / b - 1.0).abs() < 1e-9));
+        assert!(square.largest().iter().zip(thin.largest()).all(|(a, b)| (a / b - 1.0).abs() < 1e-9));
     }
 
     /// A constant has the density 1 to the last bit, and so has its rounding.
@@ -276,7 +323,7 @@ mod tests {
         let mesh = Mesh::uniform(Lattice::new([7, 5], [true, false]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
         for noise in [0.0, 1e-15] {
             let u: Vec<f64> = (0..mesh.x().len()).map(|k| 3.0 + noise * (k % 3) as f64).collect();
-            assert_eq!(RootGradient::default().density(&mesh, &u, None).unwrap(), vec![1.0; mesh.x().len()]);
+            assert_eq!(RootGradient::default().density(&mesh, &u, None).unwrap(), vec![1.0; mesh.x().len()].into());
         }
     }
 
@@ -289,7 +336,7 @@ mod tests {
             let mesh = Mesh::uniform(Lattice::new(cells, [true, false]).unwrap(), [0.0; 2], [fronts, 1.0]).unwrap();
             let u: Vec<f64> = mesh.x().iter().map(|x| (50.0 * (PI * (x[0] + 0.2)).sin()).tanh()).collect();
             let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
-            let [low, high] = rho.iter().fold([f64::INFINITY, 0.0], |[l, h], rho| [l.min(*rho), h.max(*rho)]);
+            let [low, high] = rho.largest().iter().fold([f64::INFINITY, 0.0], |[l, h], rho| [l.min(*rho), h.max(*rho)]);
             high / low
         };
         let (few, many) = (contrast(2.0), contrast(8.0));
@@ -305,11 +352,11 @@ mod tests {
         for unit in [1.0, 1e-6, 1e200, 1e-200] {
             let u: Vec<f64> = mesh.x().iter().map(|[x, y]| unit * (3.0 * x - 2.0 * y)).collect();
             let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
-            assert!(rho.iter().all(|rho| (rho - 1.0).abs() < 1e-9), "{rho:?}");
+            assert!(rho.largest().iter().all(|rho| (rho - 1.0).abs() < 1e-9), "{rho:?}");
         }
         // a slope that is steep in one cell of three alone is not even any more
         let u: Vec<f64> = mesh.x().iter().map(|[x, y]| 3.0 * x - 2.0 * y + 100.0 * (x - 1.4).max(0.0)).collect();
         let rho = RootGradient::default().density(&mesh, &u, None).unwrap();
-        assert!(rho.iter().any(|rho| (rho - 1.0).abs() > 0.1), "{rho:?}");
+        assert!(rho.largest().iter().any(|rho| (rho - 1.0).abs() > 0.1), "{rho:?}");
     }
 }

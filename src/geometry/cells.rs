@@ -18,9 +18,9 @@ pub trait Cells<const D: usize>: Sized {
     /// Areas of the cells, lengths in one dimension, in lattice order.
     fn volumes(&self) -> impl Iterator<Item = f64>;
 
-    /// |∇u| in each cell, in lattice order, the length of a uniform cell being the unit along each axis; and the volume
-    /// of the cell. u is measured in `unit`.
-    fn slopes(&self, u: &[f64], unit: f64) -> impl Iterator<Item = (f64, f64)>;
+    /// ∇u in each cell, in lattice order, the length of a uniform cell being the unit along each axis. u is measured in
+    /// `unit`.
+    fn slopes(&self, u: &[f64], unit: f64) -> impl Iterator<Item = [f64; D]>;
 
     /// The area of each node: an equal share of every cell around it. These add up to the area of the box.
     fn node_volumes(&self) -> Vec<f64>;

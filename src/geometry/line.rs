@@ -21,13 +21,10 @@ impl Cells<1> for Mesh<1> {
         (0..x.len() - 1).map(move |k| x[k + 1][0] - x[k][0])
     }
 
-    fn slopes(&self, u: &[f64], unit: f64) -> impl Iterator<Item = (f64, f64)> {
+    fn slopes(&self, u: &[f64], unit: f64) -> impl Iterator<Item = [f64; 1]> {
         let (x, u) = (self.closed(), self.lattice().closed(u));
         let h = self.extent()[0] / self.lattice().cells()[0] as f64;
-        (0..x.len() - 1).map(move |k| {
-            let length = x[k + 1][0] - x[k][0];
-            (h * ((u[k + 1] - u[k]) / unit).abs() / length, length)
-        })
+        (0..x.len() - 1).map(move |k| [h * ((u[k + 1] - u[k]) / unit) / (x[k + 1][0] - x[k][0])])
     }
 
     fn node_volumes(&self) -> Vec<f64> {

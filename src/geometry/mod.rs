@@ -1,6 +1,7 @@
 //! The lattice of computational nodes, the mesh over it, fields on it, and the quality of the mesh.
 
 mod cells;
+mod density;
 mod determinant;
 mod dual;
 mod field;
@@ -21,6 +22,7 @@ mod vector;
 pub use cells::{
     Cells, Comparison, cell_areas, cell_jacobians, cell_qualities, compare, interpolate, node_areas, quality,
 };
+pub use density::Density;
 pub(crate) use determinant::{cofactors, determinant};
 pub use dual::{DualCells, padded};
 pub use field::Field;

@@ -20,7 +20,7 @@ impl Cells<2> for Mesh<2> {
         lower_corners(n, m).map(move |k| 0.5 * twice_area(diagonals(&x, k, m)))
     }
 
-    fn slopes(&self, u: &[f64], unit: f64) -> impl Iterator<Item = (f64, f64)> {
+    fn slopes(&self, u: &[f64], unit: f64) -> impl Iterator<Item = [f64; 2]> {
         let ([n, m], [width, height]) = (self.lattice().cells(), self.extent());
         let (x, u) = (self.closed(), self.lattice().closed(u));
         let h = [width / n as f64, height / m as f64];
@@ -28,8 +28,7 @@ impl Cells<2> for Mesh<2> {
             let diagonals @ ([px, py], [qx, qy]) = diagonals(&x, k, m);
             let (p, q) = ((u[k + m + 2] - u[k]) / unit, (u[k + 1] - u[k + m + 1]) / unit);
             let twice = twice_area(diagonals);
-            let (gx, gy) = (h[0] * (p * qy - q * py), h[1] * (q * px - p * qx));
-            ((gx * gx + gy * gy).sqrt() / twice, 0.5 * twice)
+            [h[0] * (p * qy - q * py) / twice, h[1] * (q * px - p * qx) / twice]
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Mmpde, Moved, Relaxation, Steps};
 use crate::error::Failure;
-use crate::geometry::{Mesh, check_length, check_positive, check_unfolded};
+use crate::geometry::{Density, Mesh, check_unfolded};
 
 /// A folded mesh is blamed on noise where the standard error of the interface values exceeds this share of its shortest
 /// edge.
@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 pub(super) fn check_given<const D: usize>(
     equation: &Mmpde,
     mesh: &Mesh<D>,
-    rho: &[f64],
+    rho: &Density,
     dt: f64,
 ) -> Result<(), Failure> {
     if !(dt.is_finite() && dt > 0.0) {
@@ -27,8 +27,7 @@ pub(super) fn check_given<const D: usize>(
         let rule = "a generator by itself keeps no velocity of the nodes; set it to 0, or step with a Mover";
         return Err(Failure::out_of_range("`relaxation.prediction`", prediction, rule));
     }
-    check_length(mesh.lattice(), "the density", rho.len())?;
-    check_positive(mesh, "the mesh density", rho)
+    rho.check(mesh)
 }
 
 /// Refuses a mesh whose bounded sides do not lie on the box around it: nodes on sides move along straight lines.

@@ -1,6 +1,6 @@
 use super::{MeshGenerator, Mmpde, Moved};
 use crate::error::{Failure, Result};
-use crate::geometry::Mesh;
+use crate::geometry::{Density, Mesh};
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub struct Fixed {}
 
 impl<const D: usize> MeshGenerator<D> for Fixed {
-    fn solve(&mut self, _: &Mmpde, mesh: &Mesh<D>, _rho: &[f64], _dt: f64) -> Result<Moved<D>, Failure> {
+    fn solve(&mut self, _: &Mmpde, mesh: &Mesh<D>, _rho: &Density, _dt: f64) -> Result<Moved<D>, Failure> {
         Ok(Moved { mesh: mesh.clone(), work: Work::default(), interface: None })
     }
 

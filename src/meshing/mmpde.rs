@@ -1,6 +1,6 @@
 use super::Relaxation;
 use crate::error::{Failure, Result};
-use crate::geometry::{Lattice, Mesh, Patch, check_length, strides};
+use crate::geometry::{Density, Lattice, Mesh, Patch, check_length, strides};
 use crate::numerics::difference::Gradient;
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Pcg};
@@ -40,9 +40,9 @@ pub enum Form {
     /// W_i (xⁿ⁺¹ − xⁿ)_i = Δt/(τh²) Σ_e ρ_e (x_e − x_i)ⁿ⁺¹
     /// ```
     ///
-    /// ρ is averaged from the nodes to the mesh cells; ρ_e is the mean over the cells beside an edge, W_i the one over
-    /// the cells around a node. Multiplied by W, the matrix is a symmetric M-matrix for any ρ, and the same for x and
-    /// y.
+    /// ρ is averaged from the nodes to the mesh cells; ρ_e is the mean over the cells beside an edge of the density
+    /// along its axis, W_i the mean over the cells around a node, the largest over the axes. Multiplied by W, the matrix is a
+    /// symmetric M-matrix for any ρ, and the same for x and y.
     Conservative,
 }
 
@@ -82,15 +82,15 @@ impl Mmpde {
     pub fn operator<const D: usize>(
         &self,
         lattice: &Lattice<D>,
-        rho: &[f64],
+        rho: &Density,
         dt: f64,
     ) -> Result<MeshOperator<D>, Failure> {
-        check_length(lattice, "the density", rho.len())?;
+        check_length(lattice, "the density", rho.largest().len())?;
         let Form::Gradient(gradient) = self.form else {
             return Ok(self.on_cells(lattice, &cell_means(lattice, rho), dt));
         };
         let (h, a) = (lattice.spacing(), self.stiffness(lattice, dt));
-        let b = gradient.of_log(lattice, rho);
+        let b = gradient.of_log(lattice, rho.largest());
         let weights = b
             .into_iter()
             .map(|b| {
@@ -103,24 +103,24 @@ impl Mmpde {
         Ok(MeshOperator { lattice: *lattice, weights, volumes: None })
     }
 
-    /// The conservative form from one value of ρ for each mesh cell. Nodes on sides, which have no row, have weights of
-    /// zero.
-    pub(super) fn on_cells<const D: usize>(&self, lattice: &Lattice<D>, cells: &[f64], dt: f64) -> MeshOperator<D> {
+    /// The conservative form from ρ in the mesh cells, one array for all axes or one for each. Nodes on sides, which have
+    /// no row, have weights of zero.
+    pub(super) fn on_cells<const D: usize>(&self, lattice: &Lattice<D>, parts: &[Vec<f64>], dt: f64) -> MeshOperator<D> {
         let a = self.stiffness(lattice, dt);
         let mut weights = vec![[[0.0; 2]; D]; lattice.len()];
         let mut volumes = vec![1.0; lattice.len()];
-        let cells = around_nodes(lattice, cells);
+        let parts: Vec<Vec<f64>> = parts.iter().map(|cells| around_nodes(lattice, cells)).collect();
+        let along: [&[f64]; D] = std::array::from_fn(|d| &parts[if parts.len() == 1 { 0 } else { d }][..]);
         // the cells around a node have its indices, or one less along some of the axes
         let below = strides(lattice.nodes().map(|n| n + 1));
         let patch = Patch::whole(lattice);
         for (k, place) in patch.nodes(lattice).zip(places(&patch, below)) {
-            let (mut sums, mut volume) = ([[0.0; 2]; D], 0.0);
+            let mut sums = [[0.0; 2]; D];
             for corner in 0..1 << D {
-                let rho = cells[place + (0..D).map(|d| (corner >> d & 1) * below[d]).sum::<usize>()];
-                volume += rho;
-                (0..D).for_each(|d| sums[d][corner >> d & 1] += rho);
+                let cell = place + (0..D).map(|d| (corner >> d & 1) * below[d]).sum::<usize>();
+                (0..D).for_each(|d| sums[d][corner >> d & 1] += along[d][cell]);
             }
-            volumes[k] = volume / (1 << D) as f64;
+            volumes[k] = sums.iter().map(|[below, above]| below + above).fold(0.0, f64::max) / (1 << D) as f64;
             let share = 1.0 / ((1 << (D - 1)) as f64 * volumes[k]);
             weights[k] = std::array::from_fn(|d| sums[d].map(|sum| a[d] * share * sum));
         }
@@ -166,8 +166,12 @@ fn around_nodes<const D: usize>(lattice: &Lattice<D>, cells: &[f64]) -> Vec<f64>
     out
 }
 
-/// Means of nodal values over the mesh cells, in an array with the last axis fastest.
-pub(super) fn cell_means<const D: usize>(lattice: &Lattice<D>, values: &[f64]) -> Vec<f64> {
+/// Means of each array of a density over the mesh cells, in arrays with the last axis fastest.
+pub(super) fn cell_means<const D: usize>(lattice: &Lattice<D>, rho: &Density) -> Vec<Vec<f64>> {
+    rho.parts().iter().map(|part| means(lattice, part)).collect()
+}
+
+fn means<const D: usize>(lattice: &Lattice<D>, values: &[f64]) -> Vec<f64> {
     let (cells, closed) = (lattice.cells(), lattice.closed(values));
     let strides = strides(cells.map(|n| n + 1));
     let patch = Patch { origin: [0; D], size: cells, wraps: [false; D] };

@@ -25,7 +25,7 @@ pub use stochastic::{
 pub use whole::{Movable, Whole};
 
 use crate::error::{Failure, Result, Unfit};
-use crate::geometry::{Lattice, Mesh};
+use crate::geometry::{Density, Lattice, Mesh};
 use crate::kept::Kept;
 use crate::kind::kinds;
 use crate::work::Work;
@@ -50,11 +50,11 @@ pub trait MeshGenerator<const D: usize = 2>: Send {
     /// use driftmesh::geometry::{Lattice, Mesh};
     /// use driftmesh::{Failure, meshing::{MeshGenerator, Mmpde, Whole}};
     /// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0; 2], [1.0; 2])?;
-    /// let refused = Whole::default().step(&Mmpde::default(), &mesh, &[0.0; 25], 1e-3);
+    /// let refused = Whole::default().step(&Mmpde::default(), &mesh, &vec![0.0; 25].into(), 1e-3);
     /// assert!(matches!(refused, Err(Failure::NotPositive { node: [0, 0], .. })));
     /// # Ok::<(), driftmesh::Error>(())
     /// ```
-    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &[f64], dt: f64) -> Result<Moved<D>, Failure> {
+    fn step(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &Density, dt: f64) -> Result<Moved<D>, Failure> {
         checked::check_given(equation, mesh, rho, dt)?;
         if self.moves() {
             checked::check_box(mesh)?;
@@ -66,7 +66,7 @@ pub trait MeshGenerator<const D: usize = 2>: Send {
     ///
     /// # Errors
     /// A [`Failure`] where a system cannot be solved or the settings do not fit the lattice.
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &[f64], dt: f64) -> Result<Moved<D>, Failure>;
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &Density, dt: f64) -> Result<Moved<D>, Failure>;
 
     /// Whether the method moves the mesh at all; a mesh that stays is not predicted either.
     fn moves(&self) -> bool {

@@ -3,7 +3,7 @@ use super::ring::{Trace, ring, traces};
 use super::sides::size;
 use super::{Contraction, Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Lattice, Mesh};
+use crate::geometry::{Density, Lattice, Mesh};
 use crate::numerics::larger;
 use crate::numerics::linear::Robust;
 use crate::parallel;
@@ -313,7 +313,7 @@ impl Parts {
 }
 
 impl MeshGenerator for Schwarz {
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &Density, dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         self.parts.prepare(lattice, self.subdomains, self.overlap)?;
         self.check(lattice).map_err(Failure::refusing)?;

@@ -1,7 +1,7 @@
 use super::mmpde::cell_means;
 use super::{Form, Mmpde};
 use crate::error::{Failure, Result};
-use crate::geometry::{Lattice, Mesh, Patch, diagonal, strides};
+use crate::geometry::{Density, Lattice, Mesh, Patch, diagonal, strides};
 use crate::numerics::linear::{LinearSolver, Robust};
 use crate::work::Work;
 
@@ -16,7 +16,7 @@ use crate::work::Work;
 pub fn move_sides<const D: usize>(
     equation: &Mmpde,
     mesh: &Mesh<D>,
-    rho: &[f64],
+    rho: &Density,
     dt: f64,
     x: &mut [[f64; D]],
     solver: &mut Robust<1>,
@@ -37,14 +37,14 @@ pub fn move_sides<const D: usize>(
 struct Sides<'a, const D: usize> {
     equation: &'a Mmpde,
     mesh: &'a Mesh<D>,
-    rho: &'a [f64],
+    rho: &'a Density,
     /// ρ in the mesh cells; in the conservative form only.
-    cells: Option<Vec<f64>>,
+    cells: Option<Vec<Vec<f64>>>,
     dt: f64,
 }
 
 impl<'a, const D: usize> Sides<'a, D> {
-    fn new(equation: &'a Mmpde, mesh: &'a Mesh<D>, rho: &'a [f64], dt: f64) -> Self {
+    fn new(equation: &'a Mmpde, mesh: &'a Mesh<D>, rho: &'a Density, dt: f64) -> Self {
         let cells = match equation.form {
             Form::Gradient(_) => None,
             Form::Conservative => Some(cell_means(mesh.lattice(), rho)),
@@ -87,7 +87,8 @@ impl<'a, const D: usize> Sides<'a, D> {
             Places { along, origin: at_ends(lattice.strides(), cells, &along, &upper), strides: lattice.strides() };
         let operator = match &self.cells {
             None => {
-                let rho: Vec<f64> = (0..side.len()).map(|k| self.rho[place.of(side.node(k))]).collect();
+                let rho = self.rho.largest();
+                let rho: Density = (0..side.len()).map(|k| rho[place.of(side.node(k))]).collect();
                 self.equation.operator(&side, &rho, self.dt)?
             }
             Some(rho) => {
@@ -97,7 +98,11 @@ impl<'a, const D: usize> Sides<'a, D> {
                     Places { along, origin: at_ends(steps, cells.map(|n| n - 1), &along, &upper), strides: steps };
                 let size = side.cells();
                 let node = |k: usize| std::array::from_fn(|e| k / strides(size)[e] % size[e]);
-                let rho: Vec<f64> = (0..size.iter().product()).map(|k| rho[beside.of(node(k))]).collect();
+                let of = |part: &Vec<f64>| (0..size.iter().product()).map(|k| part[beside.of(node(k))]).collect();
+                let rho: Vec<Vec<f64>> = match &rho[..] {
+                    [one] => vec![of(one)],
+                    each => along.iter().map(|&d| of(&each[d])).collect(),
+                };
                 self.equation.on_cells(&side, &rho, self.dt)
             }
         };

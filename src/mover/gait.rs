@@ -1,5 +1,5 @@
 use crate::error::{Failure, Result, Unfit};
-use crate::geometry::{Cells, DualCells, Mesh, check_unfolded, dot, length};
+use crate::geometry::{Cells, Density, DualCells, Mesh, check_unfolded, dot, length};
 use crate::kept::{check_nodal, nodal};
 use crate::meshing::{Relaxation, STEPS_TO_BEGIN_WITH};
 use crate::numerics::difference::{Metrics, derivative, scaled_gradient};
@@ -32,8 +32,8 @@ pub struct Gait<const D: usize = 2> {
     /// Share of the recent steps in which the mesh turned back: a running mean with the weight [`REMEMBERED`] on the
     /// past.
     unrest: f64,
-    /// The density that moved the mesh last, a mean over steps.
-    rho: Vec<f64>,
+    /// The density that moved the mesh last, a mean over steps; none before the first.
+    rho: Option<Density>,
     /// The last step; none before the first.
     last: Option<Last<D>>,
 }
@@ -94,7 +94,7 @@ impl<const D: usize> Gait<D> {
     pub fn at_rest(mesh: &Mesh<D>) -> Self {
         let still = vec![[0.0; D]; mesh.x().len()];
         let steps = STEPS_TO_BEGIN_WITH;
-        Self { velocity: still.clone(), correction: still, steps, unrest: 0.0, rho: Vec::new(), last: None }
+        Self { velocity: still.clone(), correction: still, steps, unrest: 0.0, rho: None, last: None }
     }
 
     /// Velocity with which each node is predicted to go on.
@@ -119,11 +119,12 @@ impl<const D: usize> Gait<D> {
 
     /// The density that is to move the mesh: where it is predicted, mixed with the one that moved it last. On the
     /// flanks of thin layers mesh and density would otherwise take turns from step to step.
-    pub(crate) fn mixed(&self, rho: &[f64], relaxation: Relaxation) -> Vec<f64> {
-        if relaxation.prediction() == 0.0 || self.rho.len() != rho.len() {
-            return rho.to_vec();
+    pub(crate) fn mixed(&self, rho: &Density, relaxation: Relaxation) -> Density {
+        let last = self.rho.as_ref().filter(|last| last.largest().len() == rho.largest().len());
+        match last.filter(|_| relaxation.prediction() != 0.0) {
+            Some(last) => rho.mixed(NEWEST, last),
+            None => rho.clone(),
         }
-        rho.iter().zip(&self.rho).map(|(newest, last)| NEWEST * newest + (1.0 - NEWEST) * last).collect()
     }
 
     /// What is known after a step from the `predicted` mesh to `mesh`, which was moved by the density `rho`; `u` is
@@ -133,7 +134,7 @@ impl<const D: usize> Gait<D> {
         &self,
         predicted: &Predicted<D>,
         mesh: &Mesh<D>,
-        [rho, u]: [Vec<f64>; 2],
+        (rho, u): (Density, Vec<f64>),
         [gain, share]: [f64; 2],
         dt: f64,
         chooses: bool,
@@ -162,7 +163,7 @@ impl<const D: usize> Gait<D> {
         }
         let ways = predicted.velocity.iter().zip(&correction);
         let way = ways.map(|(v, e)| std::array::from_fn(|d| dt * v[d] + e[d])).collect();
-        Self { velocity, correction, steps, unrest, rho, last: Some(Last { took: dt, way, u }) }
+        Self { velocity, correction, steps, unrest, rho: Some(rho), last: Some(Last { took: dt, way, u }) }
     }
 
     /// The velocity with which u, what the mesh follows, moves as a whole along periodic axes, 0 along others
@@ -218,15 +219,16 @@ impl<const D: usize> Gait<D> {
         })
     }
 
-    /// Refuses the gait of another mesh than one with this number of nodes.
+    /// Refuses the gait of a mesh over another lattice.
     ///
     /// # Errors
     /// [`Unfit::Damaged`].
-    pub fn check(&self, nodes: usize) -> Result<(), Unfit> {
+    pub fn check(&self, mesh: &Mesh<D>) -> Result<(), Unfit> {
+        let nodes = mesh.lattice().len();
         check_nodal("velocity", &self.velocity, nodes)?;
         check_nodal("correction", &self.correction, nodes)?;
-        if !self.rho.is_empty() {
-            check_nodal("last density", self.rho.as_chunks::<1>().0, nodes)?;
+        if let Some(rho) = &self.rho {
+            rho.check(mesh).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
         }
         if let Some(Last { took, way, u }) = &self.last {
             check_nodal("last way", way, nodes)?;
@@ -237,9 +239,7 @@ impl<const D: usize> Gait<D> {
                 return Err(Unfit::Damaged(format!("its last mesh step is {took} long")));
             }
         }
-        match self.rho.iter().all(|rho| *rho > 0.0)
-            && [self.steps, 1.0 + self.unrest].iter().all(|v| v.is_finite() && *v > 0.0)
-        {
+        match [self.steps, 1.0 + self.unrest].iter().all(|v| v.is_finite() && *v > 0.0) {
             true => Ok(()),
             false => Err(Unfit::Damaged("its mesh cannot have gone so".into())),
         }

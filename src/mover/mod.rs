@@ -10,7 +10,7 @@ pub(crate) use start::adapted_to_all;
 pub use start::{Ending, Start, adapted, steps_to_rest};
 
 use crate::error::{Failure, Result};
-use crate::geometry::{Cells, Mesh, check_length, check_unfolded, interpolate};
+use crate::geometry::{Cells, Density, Mesh, check_length, check_unfolded, interpolate};
 use crate::meshing::{Interface, MeshGenerator, Mmpde, Moved, Relaxation};
 use crate::work::Work;
 pub(crate) use gait::Predicted;
@@ -59,7 +59,7 @@ pub struct Followed<'a> {
     /// where there is nothing else.
     pub u: &'a [f64],
     /// The density.
-    pub rho: &'a [f64],
+    pub rho: &'a Density,
 }
 
 /// A step of a [`Mover`].
@@ -113,14 +113,14 @@ where
     ) -> Result<Step<D>, Failure> {
         let Followed { u, rho } = followed;
         check_length(mesh.lattice(), "what the mesh follows", u.len())?;
-        check_length(mesh.lattice(), "the density", rho.len())?;
         check_unfolded(mesh)?;
+        rho.check(mesh)?;
         let mut retries = Retries::default();
         let stride = Stride { dt, scale: dt, parts: 1, share: 1.0 };
         let predicted = self.predict(mesh, gait, u, stride)?;
         let mixed = gait.mixed(rho, self.equation.relaxation);
         let moved = self.relax(&predicted, &mixed, stride, &mut retries)?;
-        let gait = self.learn(gait, &predicted, &moved.mesh, [mixed, u.to_vec()], stride);
+        let gait = self.learn(gait, &predicted, &moved.mesh, (mixed, u.to_vec()), stride);
         Ok(Step { moved, gait, retries })
     }
 
@@ -143,7 +143,7 @@ where
     pub(crate) fn relax(
         &mut self,
         predicted: &Predicted<D>,
-        rho: &[f64],
+        rho: &Density,
         stride: Stride,
         retries: &mut Retries,
     ) -> Result<Moved<D>, Failure> {
@@ -156,7 +156,7 @@ where
                 generator,
                 &equation,
                 &predicted.mesh,
-                &retries::smoother(&predicted.mesh, rho, smoothing)?,
+                retries::smoother(&predicted.mesh, rho, smoothing)?.as_ref(),
                 stride.dt,
                 parts,
             )
@@ -170,7 +170,7 @@ where
         gait: &Gait<D>,
         predicted: &Predicted<D>,
         mesh: &Mesh<D>,
-        made: [Vec<f64>; 2],
+        made: (Density, Vec<f64>),
         stride: Stride,
     ) -> Gait<D> {
         let gains = [self.equation.relaxation.prediction() * stride.dt / stride.scale, stride.share];
@@ -184,7 +184,7 @@ fn relaxed<const D: usize>(
     generator: &mut dyn MeshGenerator<D>,
     equation: &Mmpde,
     start: &Mesh<D>,
-    rho: &[f64],
+    rho: &Density,
     dt: f64,
     parts: usize,
 ) -> Result<Moved<D>, Failure>
@@ -196,8 +196,8 @@ where
     let mut last: Option<Moved<D>> = None;
     for part in 0..parts {
         let mesh = last.as_ref().map_or(start, |moved| &moved.mesh);
-        let carried = if part == 0 { None } else { Some(interpolate(start, rho, mesh)) };
-        let moved = generator.step(equation, mesh, carried.as_deref().unwrap_or(rho), dt / parts as f64)?;
+        let carried = if part == 0 { None } else { Some(rho.map(|part| interpolate(start, part, mesh))) };
+        let moved = generator.step(equation, mesh, carried.as_ref().unwrap_or(rho), dt / parts as f64)?;
         work += moved.work;
         seconds += moved.interface.map_or(0.0, |i| i.seconds);
         last = Some(moved);

@@ -1,6 +1,6 @@
 use crate::density::smooth;
 use crate::error::{Failure, Result};
-use crate::geometry::Mesh;
+use crate::geometry::{Density, Mesh};
 use std::borrow::Cow;
 
 /// Tries of a mesh step that failed and were done again.
@@ -71,15 +71,18 @@ impl Care {
 /// A density after further passes of the filter.
 pub(super) fn smoother<'a, const D: usize>(
     mesh: &Mesh<D>,
-    rho: &'a [f64],
+    rho: &'a Density,
     passes: usize,
-) -> Result<Cow<'a, [f64]>, Failure> {
+) -> Result<Cow<'a, Density>, Failure> {
     if passes == 0 {
         return Ok(Cow::Borrowed(rho));
     }
-    let mut smoother = rho.to_vec();
-    smooth(mesh.lattice(), &mut smoother, passes)?;
-    Ok(Cow::Owned(smoother))
+    rho.check(mesh)?;
+    Ok(Cow::Owned(rho.map(|part| {
+        let mut part = part.clone();
+        smooth(mesh.lattice(), &mut part, passes).expect("one value a node");
+        part
+    })))
 }
 
 #[cfg(test)]

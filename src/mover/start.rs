@@ -1,7 +1,7 @@
 use super::{Followed, Gait, Mover};
 use crate::density::Monitor;
 use crate::error::Result;
-use crate::geometry::{Mesh, check_unfolded, interpolate, strides};
+use crate::geometry::{Density, Mesh, check_unfolded, interpolate, strides};
 use crate::meshing::{Form, Mmpde, Movable, Relaxation};
 use crate::numerics::ends;
 
@@ -56,7 +56,7 @@ const AT_REST: f64 = 4e-3;
 pub fn adapted<const D: usize>(
     mesh: Mesh<D>,
     form: Form,
-    mut followed: impl FnMut(&Mesh<D>) -> Result<(Vec<f64>, Vec<f64>)>,
+    mut followed: impl FnMut(&Mesh<D>) -> Result<(Vec<f64>, Density)>,
 ) -> Result<Start<D>>
 where
     Mesh<D>: Movable<D>,
@@ -73,7 +73,7 @@ where
 }
 
 /// Some u and ρ on a mesh.
-pub(crate) type FollowedOn<'a, const D: usize> = &'a mut dyn FnMut(&Mesh<D>) -> Result<(Vec<Vec<f64>>, Vec<f64>)>;
+pub(crate) type FollowedOn<'a, const D: usize> = &'a mut dyn FnMut(&Mesh<D>) -> Result<(Vec<Vec<f64>>, Density)>;
 
 fn from_coarser<const D: usize>(mesh: Mesh<D>, form: Form, followed: FollowedOn<'_, D>) -> Result<Start<D>>
 where

@@ -12,7 +12,7 @@ where
     /// Quality of the mesh, and the error where an exact solution is known.
     pub(super) fn assess(&self, state: &State<D>) -> (Quality, Option<ErrorNorms>) {
         let Some(exact) = self.physics.exact(state.t, &state.mesh) else {
-            return (state.mesh.quality_and_integral(&state.rho, &state.rho).0, None);
+            return (state.mesh.quality_and_integral(state.rho.largest(), state.rho.largest()).0, None);
         };
         let known = self.physics.known();
         let (mut linf, mut squares) = (0.0_f64, vec![0.0; state.mesh.x().len()]);
@@ -21,7 +21,7 @@ where
             linf = linf.max(largest(&errors));
             squares.iter_mut().zip(&errors).for_each(|(square, error)| *square += error * error);
         }
-        let (quality, integral) = state.mesh.quality_and_integral(&state.rho, &squares);
+        let (quality, integral) = state.mesh.quality_and_integral(state.rho.largest(), &squares);
         let mean = integral / (state.mesh.extent().iter().product::<f64>() * known.len() as f64);
         (quality, Some(ErrorNorms { linf, l2: mean.sqrt() }))
     }

@@ -5,7 +5,7 @@ use super::forced::Forced;
 use super::pace::Pace;
 use super::{Record, Safety, Schedule, State};
 use crate::error::{Result, Unfit};
-use crate::geometry::{Field, Mesh, check_unfolded};
+use crate::geometry::{Density, Field, Mesh, check_unfolded};
 use crate::kept::{Kept, check_nodal, nodal};
 use crate::mover::Gait;
 use crate::physics::Physics;
@@ -41,7 +41,7 @@ pub(crate) struct Checkpoint<const D: usize = 2> {
     #[serde(with = "nodal")]
     x: Vec<[f64; D]>,
     u: Vec<f64>,
-    rho: Vec<f64>,
+    rho: Density,
     gait: Gait<D>,
     own_change: f64,
     pub record: Record,
@@ -80,13 +80,10 @@ impl<const D: usize> Checkpoint<D> {
         let Self { t, step, x, u, rho, gait, own_change, course, .. } = self;
         check_nodal("mesh", x, nodes)?;
         check_nodal("solution", u.as_chunks::<1>().0, nodes * components)?;
-        check_nodal("density", rho.as_chunks::<1>().0, nodes)?;
-        gait.check(nodes)?;
+        rho.check(mesh).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+        gait.check(mesh)?;
         if !(*own_change >= 0.0 && own_change.is_finite()) {
             return damaged(format!("its solution cannot have changed by {own_change}"));
-        }
-        if let Some(k) = rho.iter().position(|rho| *rho <= 0.0) {
-            return damaged(format!("its density is {} at node {k}", rho[k]));
         }
         if !schedule.meets(*step, *t) {
             return damaged(format!("its step {step} at t = {t} is none of the run"));

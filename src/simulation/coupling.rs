@@ -1,7 +1,7 @@
 use super::{Record, Schedule, Simulation, State, growth, journey, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Cells, Field, Mesh, check_unfolded};
+use crate::geometry::{Cells, Density, Field, Mesh, check_unfolded};
 use crate::meshing::{Interface, Moved, Relaxation};
 use crate::mover::{Mover, Predicted, Retries, Stride};
 use crate::numerics::larger;
@@ -67,7 +67,7 @@ impl Coupling {
         &self,
         mover: &mut Mover<D>,
         predicted: &Predicted<D>,
-        rho: &[f64],
+        rho: &Density,
         stride: Stride,
         record: &mut Record,
     ) -> Result<Moved<D>, Failure>
@@ -154,7 +154,7 @@ where
     let predicted = timed(&mut record.seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
     // a mesh whose way nobody has set goes no faster than is good for the solution
     let guarded = mover.equation.relaxation == Relaxation::Auto && !physics.is_given();
-    type Round<const D: usize> = (Mesh<D>, Field, Option<Vec<f64>>, Vec<f64>, f64);
+    type Round<const D: usize> = (Mesh<D>, Field, Option<Vec<f64>>, Density, f64);
     let mut latest: Option<Round<D>> = None;
     for _ in 0..coupling.iterations {
         let mixed = state.gait.mixed(&rho, mover.equation.relaxation);
@@ -177,7 +177,7 @@ where
         }
     }
     let (mesh, u, errors, mixed, share) = latest.expect("a coupling has at least one iteration");
-    let gait = mover.learn(&state.gait, &predicted, &mesh, [mixed, followed], Stride { share, ..stride });
+    let gait = mover.learn(&state.gait, &predicted, &mesh, (mixed, followed), Stride { share, ..stride });
     let own_change = if guarded { journey::own_change(state, &mesh, &u, dt) } else { 0.0 };
     let state = State { t, step: state.step + 1, mesh, u, rho, gait, own_change };
     Ok(Advanced { state, work, interface, errors })
@@ -244,14 +244,14 @@ pub(super) fn density<const D: usize>(
     t: f64,
     mesh: &Mesh<D>,
     u: &Field,
-) -> Result<Vec<f64>, Failure>
+) -> Result<Density, Failure>
 where
     Mesh<D>: Cells<D>,
 {
     let gradient = physics.gradient(t, mesh);
     let rho = monitor.density_of(t, mesh, u, gradient.as_deref())?;
     let widest = physics.widest_cells(t, mesh, u);
-    Ok(if widest.is_empty() { rho } else { growth::narrowed(mesh, rho, &widest) })
+    Ok(if widest.is_empty() { rho } else { growth::narrowed(mesh, &rho, &widest) })
 }
 
 #[cfg(test)]

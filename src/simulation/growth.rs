@@ -2,7 +2,7 @@
 
 use super::doubts::named;
 use super::{Record, Simulation, State};
-use crate::geometry::{Cells, Mesh, node_areas};
+use crate::geometry::{Cells, Density, Mesh, node_areas};
 use crate::meshing::Movable;
 use crate::numerics::{ends, larger, sum};
 
@@ -111,7 +111,9 @@ fn equal_cell<const D: usize>(mesh: &Mesh<D>) -> f64 {
 /// ```text
 /// min(h/w, 1/1.05) ⟨ρ⟩,   h the width of equal cells, w that of `widest`, ⟨ρ⟩ the mean of the result
 /// ```
-pub(super) fn narrowed<const D: usize>(mesh: &Mesh<D>, rho: Vec<f64>, widest: &[f64]) -> Vec<f64>
+///
+/// along each axis.
+pub(super) fn narrowed<const D: usize>(mesh: &Mesh<D>, rho: &Density, widest: &[f64]) -> Density
 where
     Mesh<D>: Cells<D>,
 {
@@ -119,12 +121,14 @@ where
     let shares: Vec<f64> = widest.iter().map(|widest| (equal / widest).min(1.0 / WIDER)).collect();
     let areas = node_areas(mesh);
     let whole = sum(areas.iter().copied());
-    let held = |mean: f64, k: usize| shares[k] * mean > rho[k];
-    let integral = |of: &dyn Fn(usize) -> f64| sum((0..rho.len()).map(|k| areas[k] * of(k)));
-    let mut mean = integral(&|k| rho[k]) / whole;
-    for _ in 0..MEANS {
-        let free = integral(&|k| if held(mean, k) { 0.0 } else { rho[k] });
-        mean = free / (whole - integral(&|k| if held(mean, k) { shares[k] } else { 0.0 }));
-    }
-    (0..rho.len()).map(|k| rho[k].max(shares[k] * mean)).collect()
+    let integral = |of: &dyn Fn(usize) -> f64| sum((0..areas.len()).map(|k| areas[k] * of(k)));
+    rho.map(|rho| {
+        let held = |mean: f64, k: usize| shares[k] * mean > rho[k];
+        let mut mean = integral(&|k| rho[k]) / whole;
+        for _ in 0..MEANS {
+            let free = integral(&|k| if held(mean, k) { 0.0 } else { rho[k] });
+            mean = free / (whole - integral(&|k| if held(mean, k) { shares[k] } else { 0.0 }));
+        }
+        (0..rho.len()).map(|k| rho[k].max(shares[k] * mean)).collect()
+    })
 }

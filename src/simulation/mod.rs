@@ -34,7 +34,7 @@ pub use schedule::Schedule;
 
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Moment, Result};
-use crate::geometry::{Field, Mesh, check_unfolded};
+use crate::geometry::{Density, Field, Mesh, check_unfolded};
 use crate::kept::Kept;
 use crate::meshing::Movable;
 use crate::mover::{self, Gait, Mover, Start};
@@ -59,7 +59,7 @@ pub struct State<const D: usize = 2> {
     /// The solution on it.
     pub u: Field,
     /// The density that follows from both: what moves the mesh next.
-    pub rho: Vec<f64>,
+    pub rho: Density,
     /// The mover's memory of the last steps: velocity of the nodes, τ, and how the mesh was going.
     pub gait: Gait<D>,
     /// How fast the solution changes by itself: the largest change at a fixed place in the last step, as a share of its

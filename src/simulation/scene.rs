@@ -102,7 +102,7 @@ where
     /// The mesh with the unknowns, by their names, and with its density.
     pub fn scene(&self, unknowns: &[String]) -> Scene {
         let named = unknowns.iter().enumerate().map(|(c, name)| (name.clone(), self.u.component(c).collect()));
-        let density = Some(self.mesh.lattice().closed(&self.rho).into_owned());
+        let density = Some(self.mesh.lattice().closed(self.rho.largest()).into_owned());
         Scene { density, ..Scene::of_mesh(self.t, self.step, &self.mesh, named.collect()) }
     }
 }

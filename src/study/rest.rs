@@ -41,7 +41,7 @@ where
     let equation = Mmpde { relaxation: 1.0.into(), form: Form::Conservative };
     let moved = Mesh::<D>::whole(CLOSE).step(&equation, mesh, &state.rho, 1.0)?;
     let asks = moved.mesh.farthest(mesh) / cell;
-    let reason = match spread(&state.rho) {
+    let reason = match spread(state.rho.largest()) {
         _ if asks > ASKS => held_back(study, record),
         // equal cells are enough
         spread
@@ -144,7 +144,7 @@ where
         ));
     }
     let bare = bare.into_monitor(&simulation.physics.unknowns())?;
-    let without = self::spread(&bare.density(&state.mesh, &followed, None)?);
+    let without = self::spread(bare.density(&state.mesh, &followed, None)?.largest());
     Ok(match without > NOT_FLAT {
         true => format!(
             "its density is flat, largest over smallest {spread:.3}: `monitor.smoothing` = {smoothing} passes leave \

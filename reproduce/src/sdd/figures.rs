@@ -100,7 +100,7 @@ impl Shown {
 }
 
 fn row(figure: &Shown, t: f64, s: usize, state: &State, whole: &State) -> Result<Vec<String>> {
-    let quality = quality(&state.mesh, &state.rho)?;
+    let quality = quality(&state.mesh, state.rho.largest())?;
     let rms = compare(&state.mesh, &whole.mesh).mesh_rms / state.mesh.extent()[0];
     let cell = 1.0 / state.mesh.lattice().cells()[0] as f64;
     let verdict = match s {

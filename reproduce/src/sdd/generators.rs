@@ -5,7 +5,7 @@ use crate::{Options, Rerun, Table};
 use driftmesh::Work;
 use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
 use driftmesh::error::{Failure, Result};
-use driftmesh::geometry::{Lattice, Mesh};
+use driftmesh::geometry::{Density, Lattice, Mesh};
 use driftmesh::meshing::{MeshGenerator, Mmpde, Moved, Whole};
 use driftmesh::mover::Mover;
 use driftmesh::simulation::{Record, Simulation};
@@ -38,8 +38,8 @@ fn by_inverse(line: &Line) -> Result<Vec<f64>> {
     Ok((0..=n).map(place).collect())
 }
 
-/// Makes a density.
-type Density = fn() -> Result<LineDensity>;
+/// Makes a density given by a formula.
+type Analytic = fn() -> Result<LineDensity>;
 
 fn inverse() -> Result<Table> {
     let mut table = Table::new(
@@ -47,7 +47,7 @@ fn inverse() -> Result<Table> {
          interpolation",
         &["ρ", "cells", "error of x, (2.1)", "order", "error of x, (2.2)", "order", "Newton steps of (2.1)"],
     );
-    let densities: [(&str, Density); 3] = [
+    let densities: [(&str, Analytic); 3] = [
         ("x² + 1", || LineDensity::formula("x^2 + 1")),
         ("boundary layer", || LineDensity::arclength("(1 - exp(20*x)) / (1 - exp(20))")),
         ("1 + 100 exp(−1000(x − ½)²)", || LineDensity::formula("1 + 100*exp(-1000*(x - 0.5)^2)")),
@@ -92,7 +92,7 @@ impl Undivided {
     fn relaxed<const D: usize>(
         equation: &Mmpde,
         lattice: &Lattice<D>,
-        rho: &[f64],
+        rho: &Density,
         dt: f64,
         x: &mut [f64],
     ) -> Result<(), Failure> {
@@ -111,7 +111,7 @@ impl Undivided {
             for &k in &inner {
                 let (mut sum, mut drawn) = (0.0, 0.0);
                 for d in 0..D {
-                    let [below, above] = operator.weights()[k][d].map(|w| w * rho[k]);
+                    let [below, above] = operator.weights()[k][d].map(|w| w * rho.largest()[k]);
                     sum += below + above;
                     drawn += below * x[k - strides[d]] + above * x[k + strides[d]];
                 }
@@ -128,7 +128,7 @@ impl Undivided {
 }
 
 impl MeshGenerator for Undivided {
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &Density, dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let (cells, nodes, strides) = (lattice.cells(), lattice.nodes(), lattice.strides());
         let mut x = mesh.x().to_vec();
@@ -141,7 +141,7 @@ impl MeshGenerator for Undivided {
             })?;
             for end in [0, cells[across]] {
                 let place = |i: usize| end * strides[across] + i * strides[along];
-                let side: Vec<f64> = (0..nodes[along]).map(|i| rho[place(i)]).collect();
+                let side: Density = (0..nodes[along]).map(|i| rho.largest()[place(i)]).collect();
                 let mut own: Vec<f64> = (0..nodes[along]).map(|i| x[place(i)][along]).collect();
                 Self::relaxed(equation, &line, &side, dt, &mut own)?;
                 own.iter().enumerate().for_each(|(i, v)| x[place(i)][along] = *v);

@@ -3,7 +3,7 @@ use super::super::mmpde::exactness;
 use super::super::overlap::share_of_largest;
 use super::Problem;
 use crate::error::Failure;
-use crate::geometry::{Lattice, Patch};
+use crate::geometry::{Density, Lattice, Patch};
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use crate::parallel;
 use crate::work::Work;
@@ -38,8 +38,8 @@ struct Level {
     up: Transfer,
     matrix: LatticeMatrix<2, 5>,
     plane: Robust<2>,
-    /// The density on the next finer lattice, and on this one.
-    densities: [Vec<[f64; 1]>; 2],
+    /// The density on the next finer lattice, and on this one, once there is a step.
+    densities: Option<[Density; 2]>,
 }
 
 /// Fewest cells along an axis of a coarse lattice: the interpolating cubic needs four nodes.
@@ -74,8 +74,8 @@ impl Coarse {
 
     /// Sets up the mesh equation of a step on both lattices.
     pub fn prepare(&mut self, problem: &Problem<'_>) -> Result<(), Failure> {
-        self.near.prepare(problem, problem.rho.as_chunks::<1>().0)?;
-        self.far.prepare(problem, &self.near.densities[1])
+        self.near.prepare(problem, problem.rho)?;
+        self.far.prepare(problem, &self.near.densities()[1])
     }
 
     /// The correction at all fine nodes for a residual there, zero on bounded sides; and the root mean square of what
@@ -110,13 +110,14 @@ impl Level {
         let down = Transfer::new([0, 1].map(|d| hats(fine, &lattice, d)), fine.nodes()[1]);
         let up = Transfer::new([0, 1].map(|d| cubics(fine, &lattice, d)), lattice.nodes()[1]);
         let matrix = LatticeMatrix::zero(Patch::whole(&lattice));
-        Some(Self { lattice, down, up, matrix, plane: Robust::default(), densities: Default::default() })
+        Some(Self { lattice, down, up, matrix, plane: Robust::default(), densities: None })
     }
 
     /// Sets up the mesh equation with the mean of a density on the next finer lattice.
-    fn prepare(&mut self, problem: &Problem<'_>, fine: &[[f64; 1]]) -> Result<(), Failure> {
-        self.densities = [fine.to_vec(), self.down.apply(fine)];
-        let rho = self.densities[1].as_flattened();
+    fn prepare(&mut self, problem: &Problem<'_>, fine: &Density) -> Result<(), Failure> {
+        let down = |part: &Vec<f64>| self.down.apply(part.as_chunks::<1>().0).into_flattened();
+        let [_, rho] = self.densities.insert([fine.clone(), fine.map(down)]);
+        let rho = &*rho;
         let mut equation = *problem.equation;
         let mut operator = equation.operator(&self.lattice, rho, problem.dt)?;
         if operator.negative_weight().is_some() {
@@ -129,12 +130,17 @@ impl Level {
         Ok(())
     }
 
+    /// The densities of the step that was prepared.
+    fn densities(&self) -> &[Density; 2] {
+        self.densities.as_ref().expect("a step is prepared before it is solved")
+    }
+
     /// Means of values on the next finer lattice, with the density as weight.
     fn restrict(&self, values: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let [fine, here] = &self.densities;
-        let weighted: Vec<[f64; 2]> = values.iter().zip(fine).map(|(v, [rho])| v.map(|v| rho * v)).collect();
+        let [fine, here] = self.densities().each_ref().map(Density::largest);
+        let weighted: Vec<[f64; 2]> = values.iter().zip(fine).map(|(v, rho)| v.map(|v| rho * v)).collect();
         let sums = self.down.apply(&weighted);
-        sums.into_iter().zip(here).map(|(sum, [rho])| sum.map(|sum| sum / rho)).collect()
+        sums.into_iter().zip(here).map(|(sum, rho)| sum.map(|sum| sum / rho)).collect()
     }
 
     fn solve(&mut self, right: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, Work), Failure> {

@@ -23,7 +23,7 @@ use strips::Corrected;
 use super::sides::size;
 use super::{Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
 use crate::error::{Error, Failure, Result, Unfit};
-use crate::geometry::{Lattice, Mesh, Patch};
+use crate::geometry::{Density, Lattice, Mesh, Patch};
 use crate::kept::Kept;
 use crate::kind::kinds;
 use crate::numerics::linear::Robust;
@@ -92,7 +92,7 @@ pub struct Problem<'a> {
     /// The mesh at the start of the step.
     pub mesh: &'a Mesh<2>,
     /// The density at its nodes.
-    pub rho: &'a [f64],
+    pub rho: &'a Density,
     /// Length of the step.
     pub dt: f64,
     /// New positions of nodes on bounded sides, and old ones elsewhere.
@@ -111,7 +111,7 @@ impl<'a> Problem<'a> {
         equation: &'a Mmpde,
         operator: &'a MeshOperator<2>,
         mesh: &'a Mesh<2>,
-        rho: &'a [f64],
+        rho: &'a Density,
         dt: f64,
         new: &'a [[f64; 2]],
         seed: u64,
@@ -193,7 +193,7 @@ impl Estimates {
 /// }
 ///
 /// let mesh = Mesh::uniform(Lattice::bounded([16, 16])?, [0.0; 2], [1.0; 2])?;
-/// let rho: Vec<f64> = mesh.x().iter().map(|[x, y]| 1.0 + (x * y).sin()).collect();
+/// let rho: Density = mesh.x().iter().map(|[x, y]| 1.0 + (x * y).sin()).collect();
 /// let equation = Mmpde::default();
 /// let ours = Stochastic::new([2, 2], 1, Oracle).step(&equation, &mesh, &rho, 0.1)?.mesh;
 /// let whole = Whole::to(1e-9).step(&equation, &mesh, &rho, 0.1)?.mesh;
@@ -287,7 +287,7 @@ impl Parts {
 }
 
 impl<E: Estimator> MeshGenerator for Stochastic<E> {
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64], dt: f64) -> Result<Moved, Failure> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &Density, dt: f64) -> Result<Moved, Failure> {
         let lattice = mesh.lattice();
         let parts = match self.parts.take().filter(|parts| parts.lattice == *lattice) {
             Some(parts) => parts,
@@ -302,7 +302,7 @@ impl<E: Estimator> MeshGenerator for Stochastic<E> {
         let started = Instant::now();
         let problem = Problem::new(equation, &operator, mesh, rho, dt, &x, self.seed, self.steps);
         self.steps = self.steps.wrapping_add(1);
-        let sample = self.interface.as_ref().map(|i| i.sample(&parts.decomposition, rho));
+        let sample = self.interface.as_ref().map(|i| i.sample(&parts.decomposition, rho.largest()));
         let points = sample.as_ref().unwrap_or(&parts.points);
         let mut interface = None;
         if !points.is_empty() {

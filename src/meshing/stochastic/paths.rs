@@ -55,7 +55,7 @@ impl Domain {
             Form::Gradient(gradient) => gradient,
             Form::Conservative => Gradient::Log,
         };
-        let b = gradient.of_log(lattice, problem.rho);
+        let b = gradient.of_log(lattice, problem.rho.largest());
         let drift: Vec<[f64; 2]> = b.iter().map(|b| [b[0] * n[0] * ds, b[1] * n[1] * ds]).collect();
         let jump = mesh.jump();
         let [along_xi, along_eta] = [0, 1].map(|d| derivative(lattice, mesh.x(), d, jump[d]));

@@ -10,7 +10,7 @@ fn mesh(cells: [usize; 2], periodic: [bool; 2]) -> Mesh<2> {
 }
 
 /// A smooth density with a ridge and a bump of the given height.
-fn density(mesh: &Mesh<2>, height: f64) -> Vec<f64> {
+fn density(mesh: &Mesh<2>, height: f64) -> Density {
     let wave = |s: f64| (TAU * s).cos() - 1.0;
     let at = |[x, y]: [f64; 2]| [0.5 * (x + 1.0), y - 2.0];
     let rho = |[s, r]: [f64; 2]| 1.0 + height * ((2.0 * wave(s + r)).exp() + (3.0 * (wave(s - 0.3) + wave(r))).exp());
@@ -21,7 +21,7 @@ fn density(mesh: &Mesh<2>, height: f64) -> Vec<f64> {
 struct Step {
     equation: Mmpde,
     mesh: Mesh<2>,
-    rho: Vec<f64>,
+    rho: Density,
     dt: f64,
     operator: MeshOperator<2>,
     new: Vec<[f64; 2]>,
@@ -35,7 +35,7 @@ impl Step {
         Self::with(equation, mesh, rho, dt, subdomains)
     }
 
-    fn with(equation: Mmpde, mesh: Mesh<2>, rho: Vec<f64>, dt: f64, subdomains: [usize; 2]) -> Self {
+    fn with(equation: Mmpde, mesh: Mesh<2>, rho: Density, dt: f64, subdomains: [usize; 2]) -> Self {
         let operator = equation.operator(mesh.lattice(), &rho, dt).unwrap();
         let mut new = mesh.x().to_vec();
         move_sides(&equation, &mesh, &rho, dt, &mut new, &mut Robust::default()).unwrap();
@@ -106,7 +106,7 @@ fn what_lies_beyond_a_strip_does_not_matter() {
                 influence = own.iter().fold(influence, |m, &k| larger(m, nodal[k][0]));
             }
             let [low, high] =
-                [f64::min as fn(f64, f64) -> f64, f64::max].map(|f| step.rho.iter().copied().reduce(f).unwrap());
+                [f64::min as fn(f64, f64) -> f64, f64::max].map(|f| step.rho.largest().iter().copied().reduce(f).unwrap());
             // two cuts meet in a corner, and where √ρ bends down the influence of both falls more slowly
             let bound = 4.0 * strips::BEYOND * (high / low).sqrt();
             assert!(influence < bound, "a = {a}, {periodic:?}: {influence:e} above {bound:e}");

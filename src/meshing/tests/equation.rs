@@ -31,7 +31,7 @@ fn the_conservative_form_carries_any_density() {
         let exponents: Vec<f64> = start.x().iter().map(|&x| wave(x)).collect();
         let [low, high] =
             [f64::min as fn(f64, f64) -> f64, f64::max].map(|f| exponents.iter().copied().reduce(f).unwrap());
-        let rho: Vec<f64> = exponents.iter().map(|e| 10_f64.powf(contrast * (e - low) / (high - low))).collect();
+        let rho: Density = exponents.iter().map(|e| 10_f64.powf(contrast * (e - low) / (high - low))).collect();
 
         let lattice = *start.lattice();
         let operator = equation.operator(&lattice, &rho, DT).unwrap();
@@ -91,7 +91,7 @@ fn displacements_give_the_mesh_of_the_variables_themselves() {
         let rho = bump(&start, 5.0, 0.3);
         let moved = advance(&mut Whole::default(), &start, &rho, 3);
         let (equation, lattice, extent) = (Mmpde::published(), *start.lattice(), start.extent());
-        let b = Gradient::Central.of_log(&lattice, &rho);
+        let b = Gradient::Central.of_log(&lattice, rho.largest());
         // L ξ of every node, measured from the corner of the box: only for periodic axes are displacements periodic
         let linear: Vec<[f64; 2]> = start.x().to_vec();
         let patch = Patch::whole(&lattice);
@@ -127,7 +127,7 @@ fn the_mesh_equation_is_second_order_in_space() {
         let error = |n: usize| {
             let lattice = Lattice::bounded([n, n]).unwrap();
             let start = Mesh::uniform(lattice, [0.0; 2], [1.0; 2]).unwrap();
-            let rho: Vec<f64> = start.x().iter().map(|&[s, r]| 1.0 / (slope(s) * slope(r))).collect();
+            let rho: Density = start.x().iter().map(|&[s, r]| 1.0 / (slope(s) * slope(r))).collect();
             let equation = Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Gradient(gradient) };
             // three steps of 100 relaxation times leave 1e-9 of the start
             let steady =

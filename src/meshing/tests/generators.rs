@@ -8,18 +8,18 @@ use crate::setting::Auto;
 fn laws<G: MeshGenerator>(make: impl Fn() -> G) {
     let sides = [[false, false], [true, false], [false, true], [true, true]];
     for (equation, periodic) in forms().iter().flat_map(|form| sides.map(|periodic| (form, periodic))) {
-        let advance = |mesh: &Mesh<2>, rho: &[f64], steps: usize| advance_with(equation, &mut make(), mesh, rho, steps);
+        let advance = |mesh: &Mesh<2>, rho: &Density, steps: usize| advance_with(equation, &mut make(), mesh, rho, steps);
         let start = mesh([24, 17], periodic);
         // constant ρ leaves a uniform mesh at rest; a turn around the seam and back may cost the last bit
-        let rest = advance(&start, &vec![3.7; start.x().len()], 3);
+        let rest = advance(&start, &vec![3.7; start.x().len()].into(), 3);
         assert!(largest_difference(&rest, &start) < 1e-15, "periodic {periodic:?}");
         // ρ → cρ changes nothing; a power of two not even a bit
         let rho = bump(&start, 5.0, 0.3);
         let moved = advance(&start, &rho, 20);
         check_unfolded(&moved).unwrap();
-        let doubled: Vec<f64> = rho.iter().map(|r| 2.0 * r).collect();
+        let doubled: Density = rho.largest().iter().map(|r| 2.0 * r).collect();
         assert!(advance(&start, &doubled, 20) == moved, "ρ → 2ρ changed a bit");
-        let scaled: Vec<f64> = rho.iter().map(|r| 0.123 * r).collect();
+        let scaled: Density = rho.largest().iter().map(|r| 0.123 * r).collect();
         let difference = largest_difference(&advance(&start, &scaled, 20), &moved);
         assert!(difference < 1e-13, "ρ → cρ moved the mesh by {difference:e}");
         // side nodes stay exactly on the box
@@ -216,7 +216,7 @@ fn the_mesh_follows_its_density() {
     let mut generator = Whole::default();
     let moved = (0..300).fold(start.clone(), |mesh, _| {
         generator
-            .step(&Mmpde { relaxation: 0.1.into(), ..Mmpde::published() }, &mesh, &density(&mesh), DT)
+            .step(&Mmpde { relaxation: 0.1.into(), ..Mmpde::published() }, &mesh, &density(&mesh).into(), DT)
             .unwrap()
             .mesh
     });
@@ -227,6 +227,6 @@ fn the_mesh_follows_its_density() {
 #[test]
 fn a_density_that_does_not_fit_is_refused() {
     let start = mesh([5, 5], [false; 2]);
-    let error = Whole::default().step(&Mmpde::published(), &start, &[1.0; 7], DT).unwrap_err();
+    let error = Whole::default().step(&Mmpde::published(), &start, &vec![1.0; 7].into(), DT).unwrap_err();
     assert_eq!(error, Failure::WrongLength { what: "the density", found: 7, expected: 36 });
 }

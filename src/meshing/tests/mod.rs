@@ -14,13 +14,13 @@ fn mesh(cells: [usize; 2], periodic: [bool; 2]) -> Mesh<2> {
 }
 
 /// A smooth density with a bump of the given height, periodic on the box.
-fn bump(mesh: &Mesh<2>, height: f64, centre: f64) -> Vec<f64> {
+fn bump(mesh: &Mesh<2>, height: f64, centre: f64) -> Density {
     let wave = |s: f64| (2.0 * PI * (s - centre)).cos();
     let place = |x: [f64; 2]| [0.5 * (x[0] + 1.0), x[1] - 2.0];
     mesh.x().iter().map(|&x| place(x)).map(|[s, r]| 1.0 + height * (2.0 * (wave(s) + wave(r) - 2.0)).exp()).collect()
 }
 
-fn advance(generator: &mut dyn MeshGenerator, mesh: &Mesh<2>, rho: &[f64], steps: usize) -> Mesh<2> {
+fn advance(generator: &mut dyn MeshGenerator, mesh: &Mesh<2>, rho: &Density, steps: usize) -> Mesh<2> {
     advance_with(&Mmpde::published(), generator, mesh, rho, steps)
 }
 
@@ -28,7 +28,7 @@ fn advance_with(
     equation: &Mmpde,
     generator: &mut dyn MeshGenerator,
     mesh: &Mesh<2>,
-    rho: &[f64],
+    rho: &Density,
     steps: usize,
 ) -> Mesh<2> {
     (0..steps).fold(mesh.clone(), |mesh, _| generator.step(equation, &mesh, rho, DT).unwrap().mesh)
@@ -41,7 +41,7 @@ fn forms() -> [Mmpde; 2] {
 }
 
 /// A step solved by the direct solver.
-fn exact_step(equation: &Mmpde, mesh: &Mesh<2>, rho: &[f64]) -> Mesh<2> {
+fn exact_step(equation: &Mmpde, mesh: &Mesh<2>, rho: &Density) -> Mesh<2> {
     let (lattice, mut x) = (*mesh.lattice(), mesh.x().to_vec());
     move_sides(equation, mesh, rho, DT, &mut x, &mut Default::default()).unwrap();
     let (patch, [width, height]) = (Patch::whole(&lattice), mesh.extent());

@@ -114,7 +114,7 @@ fn paths_pay_moving_sides() {
     };
     let uniform = Mesh::uniform(Lattice::bounded([24, 24]).unwrap(), [0.0; 2], [1.0; 2]).unwrap();
     let positions = |s: f64| -> Vec<[f64; 2]> { uniform.x().iter().map(|&x| at_end(x, s)).collect() };
-    let (start, rho) = (uniform.moved(positions(0.0)).unwrap(), vec![1.0; uniform.x().len()]);
+    let (start, rho) = (uniform.moved(positions(0.0)).unwrap(), Density::from(vec![1.0; uniform.x().len()]));
     let equation = Mmpde::published();
     let operator = equation.operator(start.lattice(), &rho, dt).unwrap();
     let new = positions(dt);
@@ -187,7 +187,7 @@ fn sampled_interfaces_approach_the_full_ones() {
 #[test]
 fn steep_densities_are_named_and_the_safe_gradient_carries_them() {
     let start = mesh([20, 20], [false; 2]);
-    let rho: Vec<f64> = start.x().iter().map(|[x, _]| if *x < 0.0 { 1.0 } else { 1e4 }).collect();
+    let rho: Density = start.x().iter().map(|[x, _]| if *x < 0.0 { 1.0 } else { 1e4 }).collect();
     let mut generator = Stochastic::new([2, 2], 0, EstimatorKind::default());
     for gradient in [Gradient::Central, Gradient::Log] {
         let error = generator
