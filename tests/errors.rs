@@ -271,7 +271,8 @@ fn formulas() {
 fn not_a_box() {
     let mut x = mesh().x().to_vec();
     x[0] = [0.01, 0.0];
-    let error = Whole::default().step(&Mmpde::default(), &mesh().moved(x).unwrap(), &vec![1.0; 81].into(), 1e-3).unwrap_err();
+    let error =
+        Whole::default().step(&Mmpde::default(), &mesh().moved(x).unwrap(), &vec![1.0; 81].into(), 1e-3).unwrap_err();
     assert_eq!(error.name(), "not-a-box");
     let message = "the mesh does not fill its box: node (0, 0) of a side across axis 0, x = 0.0100, y = 0.0000, is off";
     assert_says(error, &[message, "by 1.0e-2"], Some("map it to the domain"), true);

@@ -73,7 +73,8 @@ fn a_mapped_mesh_is_refused() {
     for mut generator in generators {
         assert!(matches!(generator.step(&Mmpde::default(), &mesh, &density, DT), Err(Failure::NotABox { .. })));
     }
-    let moved = Mover::new(Whole::default()).step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &density }, DT);
+    let moved =
+        Mover::new(Whole::default()).step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &density }, DT);
     assert!(matches!(moved, Err(Failure::NotABox { .. })));
     assert_eq!(Fixed::default().step(&Mmpde::default(), &mesh, &density, DT).unwrap().mesh, mesh);
     // a mesh that is mapped onto a box is one of a box
@@ -114,14 +115,19 @@ fn a_step_refuses_what_it_cannot_begin_with() {
         .unwrap();
     let mut mover = Mover::new(Whole::default());
     assert_wrong_length(mover.step(&mesh, &Gait::at_rest(&mesh), Followed { u: &[0.0; 5], rho: &density }, DT), 5, 25);
-    assert_wrong_length(mover.step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &vec![1.0; 5].into() }, DT), 5, 25);
+    assert_wrong_length(
+        mover.step(&mesh, &Gait::at_rest(&mesh), Followed { u: &rho, rho: &vec![1.0; 5].into() }, DT),
+        5,
+        25,
+    );
 }
 
 /// Settings of generators are checked by their steps, those of an estimator of one's own, too.
 #[test]
 fn generators_check_their_settings() {
     let (mesh, rho) = (square(8), vec![1.0; 81]);
-    let step = |mut generator: Box<dyn MeshGenerator>| generator.step(&Mmpde::default(), &mesh, &rho.clone().into(), DT);
+    let step =
+        |mut generator: Box<dyn MeshGenerator>| generator.step(&Mmpde::default(), &mesh, &rho.clone().into(), DT);
     assert_out_of_range(step(Box::new(Schwarz::new([2, 2], 0))), &["`overlap` is 0", "set it to 1 or more"]);
     let mut schwarz = Schwarz::new([2, 2], 2);
     schwarz.tolerance = Some(-1.0);

@@ -75,13 +75,7 @@ impl InterfaceStep {
     ///
     /// # Errors
     /// A [`Failure`] where the step cannot be solved.
-    pub fn new(
-        mesh: Mesh<2>,
-        rho: Density,
-        equation: Mmpde,
-        dt: f64,
-        subdomains: [usize; 2],
-    ) -> Result<Self, Failure> {
+    pub fn new(mesh: Mesh<2>, rho: Density, equation: Mmpde, dt: f64, subdomains: [usize; 2]) -> Result<Self, Failure> {
         let lattice = *mesh.lattice();
         let operator = equation.operator(&lattice, &rho, dt)?;
         let mut new = mesh.x().to_vec();

@@ -105,7 +105,12 @@ impl Mmpde {
 
     /// The conservative form from ρ in the mesh cells, one array for all axes or one for each. Nodes on sides, which have
     /// no row, have weights of zero.
-    pub(super) fn on_cells<const D: usize>(&self, lattice: &Lattice<D>, parts: &[Vec<f64>], dt: f64) -> MeshOperator<D> {
+    pub(super) fn on_cells<const D: usize>(
+        &self,
+        lattice: &Lattice<D>,
+        parts: &[Vec<f64>],
+        dt: f64,
+    ) -> MeshOperator<D> {
         let a = self.stiffness(lattice, dt);
         let mut weights = vec![[[0.0; 2]; D]; lattice.len()];
         let mut volumes = vec![1.0; lattice.len()];

@@ -1,7 +1,7 @@
 use super::sides::size;
 use super::{MeshGenerator, Mmpde, Moved, move_sides};
 use crate::error::{Failure, Result, Unfit};
-use crate::geometry::{Density, Cells, Mesh, Patch};
+use crate::geometry::{Cells, Density, Mesh, Patch};
 use crate::kept::{Kept, check_nodal};
 use crate::numerics::linear::{LinearSolver, Pcg, Robust, SparseLu};
 use schemars::JsonSchema;
@@ -160,7 +160,13 @@ impl Movable<2> for Mesh<2> {
 macro_rules! generator {
     ($D:literal, $S:literal, $direct:ident) => {
         impl MeshGenerator<$D> for Whole<$D> {
-            fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<$D>, rho: &Density, dt: f64) -> Result<Moved<$D>, Failure> {
+            fn solve(
+                &mut self,
+                equation: &Mmpde,
+                mesh: &Mesh<$D>,
+                rho: &Density,
+                dt: f64,
+            ) -> Result<Moved<$D>, Failure> {
                 self.solve_with::<$S, _>(equation, mesh, (rho, dt), |whole| &mut whole.$direct)
             }
 

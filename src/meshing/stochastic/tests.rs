@@ -105,8 +105,8 @@ fn what_lies_beyond_a_strip_does_not_matter() {
                 patch.scatter(lattice, &w, &mut nodal, [[0.0]; 2]);
                 influence = own.iter().fold(influence, |m, &k| larger(m, nodal[k][0]));
             }
-            let [low, high] =
-                [f64::min as fn(f64, f64) -> f64, f64::max].map(|f| step.rho.largest().iter().copied().reduce(f).unwrap());
+            let [low, high] = [f64::min as fn(f64, f64) -> f64, f64::max]
+                .map(|f| step.rho.largest().iter().copied().reduce(f).unwrap());
             // two cuts meet in a corner, and where √ρ bends down the influence of both falls more slowly
             let bound = 4.0 * strips::BEYOND * (high / low).sqrt();
             assert!(influence < bound, "a = {a}, {periodic:?}: {influence:e} above {bound:e}");

@@ -8,7 +8,8 @@ use crate::setting::Auto;
 fn laws<G: MeshGenerator>(make: impl Fn() -> G) {
     let sides = [[false, false], [true, false], [false, true], [true, true]];
     for (equation, periodic) in forms().iter().flat_map(|form| sides.map(|periodic| (form, periodic))) {
-        let advance = |mesh: &Mesh<2>, rho: &Density, steps: usize| advance_with(equation, &mut make(), mesh, rho, steps);
+        let advance =
+            |mesh: &Mesh<2>, rho: &Density, steps: usize| advance_with(equation, &mut make(), mesh, rho, steps);
         let start = mesh([24, 17], periodic);
         // constant ρ leaves a uniform mesh at rest; a turn around the seam and back may cost the last bit
         let rest = advance(&start, &vec![3.7; start.x().len()].into(), 3);
