@@ -69,6 +69,30 @@ fn an_arc_has_a_tenth() {
     }
 }
 
+/// Layers that lie across different axes: along adjacent sides, of the same thickness or not, along all four sides, and
+/// across each other. Each draws its own nodes, and neither has those of the other.
+#[test]
+fn layers_that_meet_have_their_nodes_both() {
+    let side = |sign: &str, s: &str, d: f64| format!("(1 - exp(({sign}{s} - 1)/{d}))");
+    let wall = |s: f64, d: f64| 1.0 - ((s - 1.0) / d).exp();
+    for d in [0.1, 0.04, 0.01] {
+        for e in [d, 0.2] {
+            let text = format!("{}*{}", side("", "x", d), side("", "y", e));
+            let gain = gain(40, 1.0, &text, |x, y| wall(x, d) * wall(y, e));
+            assert!(gain <= 0.1, "layers of {d} and {e}: {gain:.3}");
+        }
+    }
+    let sides = [side("", "x", 0.04), side("-", "x", 0.04), side("", "y", 0.04), side("-", "y", 0.04)];
+    let all = |x: f64, y: f64| [x, -x, y, -y].map(|s| wall(s, 0.04)).iter().product();
+    let of_all = gain(40, 1.0, &sides.join("*"), all);
+    assert!(of_all <= 0.1, "four sides: {of_all:.3}");
+    for steep in [25.0, 100.0] {
+        let text = format!("tanh({steep}*(x + 0.2)) + tanh({steep}*(y - 0.3))");
+        let gain = gain(40, 1.0, &text, |x, y| (steep * (x + 0.2)).tanh() + (steep * (y - 0.3)).tanh());
+        assert!(gain <= 0.1, "a cross of tanh {steep}: {gain:.3}");
+    }
+}
+
 /// A flame of one step with the Zeldovich number 10: its speed is that on 480 cells within 1 %, whether equal cells
 /// resolve it or not; within 2.5 % where one of them is half as long again as the flame is thick.
 #[test]

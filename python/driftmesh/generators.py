@@ -175,7 +175,8 @@ class MeshGenerator:
             u: The solution on it, of its shape; None where the monitor is a density.
 
         Returns:
-            ρ above 0, of the shape of the mesh. Only its ratios matter.
+            ρ above 0, of the shape of the mesh. Only its ratios matter. Of :class:`RootGradient`, which makes a density
+            for each axis, it is the larger one.
 
         Raises:
             ValueError: Wrong shapes or values.

@@ -46,7 +46,10 @@ class Arclength(Kind):
 
 @dataclass(frozen=True)
 class RootGradient(Kind):
-    """ρ = 1 + 4 √|∇u| / mean of √|∇u|, smoothed, with nothing to set: ``monitor.kind = "auto"`` of a study.
+    """ρ = 1 + 4 √|u_x| / mean of √|u_x|, smoothed, with nothing to set: ``monitor.kind = "auto"`` of a study.
+
+    In the plane there is one such density for each axis, the second with u_y: layers that lie across different axes draw
+    their own nodes each.
 
     >>> from driftmesh import MeshGenerator, RootGradient
     >>> MeshGenerator().monitor == RootGradient()

@@ -66,7 +66,7 @@ pub trait Monitor<const D: usize = 2>: Send {
 kinds! {
     /// `[monitor]` of a study.
     MonitorKind {
-        "auto" = RootGradientTable: "rho = 1 + 4 sqrt(|grad u|) over its mean, smoothed; nothing to set",
+        "auto" = RootGradientTable: "rho = 1 + 4 sqrt(|du/dx|) over its mean along each axis, smoothed; nothing to set",
         "arclength" = ArclengthTable: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
         "given" = GivenTable: "rho = the unknown itself, smoothed",
     }

@@ -140,6 +140,35 @@ fn the_mesh_equation_is_second_order_in_space() {
     }
 }
 
+/// Of a density for each axis, which changes along its own axis alone, each spaces the nodes along its axis by itself:
+/// edges are inversely proportional to the mean of ρ at their ends, whatever the other density is, and whoever solves.
+#[test]
+fn each_axis_has_its_own_density() {
+    let start = mesh([24, 16], [false; 2]);
+    let [across, up] = [24, 16].map(|n| {
+        (0..=n).map(|i| 1.0 + 30.0 * (-0.5 * (i as f64 - 0.7 * n as f64).powi(2)).exp()).collect::<Vec<f64>>()
+    });
+    let lattice = *start.lattice();
+    let of = |d: usize, line: &[f64]| (0..lattice.len()).map(|k| line[lattice.node(k)[d]]).collect::<Vec<f64>>();
+    let rho = Density::of_axes([of(0, &across), of(1, &up)]).unwrap();
+    let place = |line: &[f64], i: usize| {
+        let edges: Vec<f64> = line.windows(2).map(|ends| 2.0 / (ends[0] + ends[1])).collect();
+        edges[..i].iter().sum::<f64>() / edges.iter().sum::<f64>()
+    };
+    let exact = (0..lattice.len())
+        .map(|k| lattice.node(k))
+        .map(|[i, j]| [start.lower()[0] + 2.0 * place(&across, i), start.lower()[1] + place(&up, j)]);
+    let exact = start.moved(exact.collect()).unwrap();
+    let equation = Mmpde { relaxation: Relaxation::Time(1.0), form: Form::Conservative };
+    let mut schwarz = Schwarz::new([2, 2], 3);
+    schwarz.tolerance = Some(1e-10);
+    let generators: [Box<dyn MeshGenerator>; 2] = [Box::new(Whole::to(1e-9)), Box::new(schwarz)];
+    for mut generator in generators {
+        let steady = (0..4).fold(start.clone(), |m, _| generator.step(&equation, &m, &rho, 1e3).unwrap().mesh);
+        assert!(largest_difference(&steady, &exact) < 1e-8, "{:e}", largest_difference(&steady, &exact));
+    }
+}
+
 /// Implicit Euler: with ρ frozen, halving the step halves the distance to the mesh of very small steps.
 #[test]
 fn the_mesh_equation_is_first_order_in_time() {

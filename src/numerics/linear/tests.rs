@@ -216,7 +216,8 @@ fn a_stalled_iteration_is_counted_with_its_reason() {
 }
 
 /// A step of diffusion in cells that are up to 30 times as long as wide, obliquely, with flow and with given values on
-/// one side: the number of products does not grow with the lattice, though a step couples ever more cells.
+/// one side: with coarse levels, which there are from 200² nodes on, the number of products does not grow with the
+/// lattice, though a step couples ever more cells.
 #[test]
 fn products_do_not_grow_with_the_lattice() {
     let products = |n: usize, wraps: [bool; 2]| {
@@ -245,7 +246,7 @@ fn products_do_not_grow_with_the_lattice() {
         work.linear_iterations
     };
     for wraps in [[false, false], [true, false], [true, true]] {
-        let counts = [32, 64, 128].map(|n| products(n, wraps));
+        let counts = [208, 304, 448].map(|n| products(n, wraps));
         println!("{wraps:?}: {counts:?}");
         assert!(counts.iter().all(|count| *count <= 16), "{wraps:?}: {counts:?}");
     }
