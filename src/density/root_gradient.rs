@@ -87,6 +87,8 @@ impl RootGradient {
     where
         Mesh<D>: Cells<D>,
     {
+        // in a domain with a chart equal cells are those of the unit box
+        let (domain, mesh) = (mesh, mesh.parameters());
         let lattice = mesh.lattice();
         let even = || Ok(vec![1.0; lattice.len()]);
         let Followed { slopes, need, step } = Followed::of(mesh, unknowns);
@@ -117,7 +119,7 @@ impl RootGradient {
         match nodal.iter().position(|rho| !rho.is_finite()) {
             None => Ok(nodal),
             Some(k) => {
-                let (node, x) = mesh.told(k);
+                let (node, x) = domain.told(k);
                 Err(Failure::NonFinite { what: "the mesh density", value: nodal[k], node, x })
             }
         }
