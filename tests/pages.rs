@@ -10,12 +10,20 @@ const SUBDOMAINS: &str = include_str!("../docs/subdomains.md");
 const LINE: &str = include_str!("../docs/one-dimension.md");
 const FRONTS: &str = include_str!("../docs/poisson-stefan.md");
 const RESUME: &str = include_str!("../docs/resume.md");
+const DOMAINS: &str = include_str!("../docs/domains.md");
 const SAFETY: &str = include_str!("../docs/safety.md");
 
 #[test]
 fn studies_on_the_pages_are_valid() {
     let mut kinds = BTreeSet::new();
-    for (page, text) in [("README", README), ("study", STUDY), ("one-dimension", LINE), ("poisson-stefan", FRONTS)] {
+    let pages = [
+        ("README", README),
+        ("study", STUDY),
+        ("one-dimension", LINE),
+        ("poisson-stefan", FRONTS),
+        ("domains", DOMAINS),
+    ];
+    for (page, text) in pages {
         let blocks = text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap_or_default());
         for block in blocks.filter(|block| block.starts_with("[study]")) {
             let study = Study::from_source(&Source::new(page, block)).unwrap_or_else(|error| panic!("{page}: {error}"));
@@ -50,7 +58,7 @@ fn pages_name_every_key() {
     let definitions = schema["$defs"].as_object().unwrap();
     let of_output = [STUDY, RESUME].concat();
     for (kind, page) in [
-        ("MovingMesh", [STUDY, SUBDOMAINS, SAFETY].concat()),
+        ("MovingMesh", [STUDY, SUBDOMAINS, SAFETY, DOMAINS].concat()),
         ("PoissonStudy", FRONTS.to_string()),
         ("StefanStudy", FRONTS.to_string()),
         ("EquidistributionStudy", LINE.to_string()),

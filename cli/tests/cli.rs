@@ -93,6 +93,7 @@ fn a_run_leaves_its_directory() {
         "error.svg",
         "final.npz",
         "final.state",
+        "final.vts",
         "frames",
         "history.csv",
         "mesh.png",

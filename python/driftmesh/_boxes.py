@@ -5,12 +5,14 @@ Nodes have shape (nx + 1, ny + 1, 2), of a line (nx + 1, 1).
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ._arrays import Floats, scalar
+from . import _driftmesh
+from ._arrays import Floats, finite, scalar
 
 #: A distance below this share of the size of the box is taken for round-off of positions.
 ROUNDING = 1e-9
@@ -35,13 +37,38 @@ def corner(name: str, values: float | Sequence[float], dimensions: int) -> Corne
     return tuple(scalar(name, value) for value in each_axis(name, values, dimensions))
 
 
-def flags(values: bool | Sequence[bool], dimensions: int) -> Flags:
+def flags(values: bool | Sequence[bool], dimensions: int, name: str = "periodic") -> Flags:
     """Which axes wrap around."""
-    entries = each_axis("periodic", values, dimensions)
+    entries = each_axis(name, values, dimensions)
     for value in entries:
         if isinstance(value, str) or value not in (False, True):
-            raise ValueError(f"`periodic` is {values!r}, but must be truth values, one an axis")
+            raise ValueError(f"`{name}` is {values!r}, but must be truth values, one an axis")
     return tuple(bool(value) for value in entries)
+
+
+def closed(nodes: Floats, periodic: Flags, given: Flags) -> Flags:
+    """Which axes are closed: those that are said to be, and periodic ones whose last nodes are the first ones."""
+    if nodes.ndim == 2 and any(given):
+        raise ValueError("`closed` is given, but a line has no axis whose ends are one curve; use `periodic`")
+
+    def meets(axis: int) -> bool:
+        gap = np.abs(np.take(nodes, -1, axis) - np.take(nodes, 0, axis)).max()
+        return bool(gap <= ROUNDING * np.ptp(nodes.reshape(-1, nodes.shape[-1]), axis=0).max())
+
+    plane = nodes.ndim == 3
+    return tuple(given[axis] or (plane and periodic[axis] and meets(axis)) for axis in range(len(periodic)))
+
+
+def structured(x: Any, y: Any) -> Floats:
+    """The nodes of a structured mesh, from arrays or from a file."""
+    if y is None and isinstance(x, (str, os.PathLike)):
+        return _driftmesh.read_nodes(x)
+    if y is None or isinstance(x, str) or isinstance(y, str):
+        raise ValueError("`x` and `y` must be two arrays of one shape, or two formulas of s and r; or `x` a file alone")
+    first = finite("x", x)
+    if first.ndim != 2 or min(first.shape) < 3:
+        raise ValueError(f"`x` has shape {first.shape}, but must have two axes of 3 nodes or more: (nx + 1, ny + 1)")
+    return np.stack([first, finite("y", y, first.shape, "`x`")], axis=-1)
 
 
 def box(
@@ -106,6 +133,15 @@ def check_box(nodes: Floats, lower: Corner, upper: Corner, periodic: Flags) -> N
                     f"the mesh does not fill its box: a node of the side {name} = {wall} is at {name} = {side[k]}; "
                     "generators move meshes of rectangles"
                 )
+
+
+def fills_box(nodes: Floats, lower: Corner, upper: Corner, periodic: Flags) -> bool:
+    """Whether the bounded sides of a mesh lie on its box."""
+    try:
+        check_box(nodes, lower, upper, periodic)
+    except ValueError:
+        return False
+    return True
 
 
 def images(nodes: Floats, lower: Corner, upper: Corner, periodic: Flags) -> Floats:

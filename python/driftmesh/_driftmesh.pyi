@@ -1,6 +1,7 @@
 """The native half of the package; private."""
 
 from collections.abc import Callable, Sequence
+from os import PathLike
 from pathlib import Path
 from typing import final
 
@@ -11,12 +12,14 @@ from .errors import MeshError
 
 __all__ = [
     "VERSION",
+    "Chart",
     "Generator",
     "areas",
     "check",
     "equidistribute",
     "interpolate",
     "quality",
+    "read_nodes",
     "run",
     "schwarz",
     "stencils",
@@ -27,7 +30,7 @@ __all__ = [
 VERSION: str
 
 _Floats = NDArray[np.float64]
-_Mesh = tuple[_Floats, tuple[float, ...], tuple[float, ...], tuple[bool, ...]]
+_Mesh = tuple[_Floats, tuple[float, ...], tuple[float, ...], tuple[bool, ...], "Chart | None"]
 _Density = tuple[str, str] | tuple[list[float], list[float]] | Callable[[_Floats], _Floats]
 
 @final
@@ -39,6 +42,15 @@ class Generator:
     def memory(self) -> bytes: ...
     def remember(self, memory: bytes) -> None: ...
 
+class Chart:
+    @staticmethod
+    def formulas(x: str, y: str, closed: Sequence[bool]) -> Chart: ...
+    @staticmethod
+    def nodes(nodes: _Floats, closed: Sequence[bool]) -> Chart: ...
+    def positions(self, places: _Floats) -> _Floats: ...
+    def ends(self) -> tuple[list[float], list[float]]: ...
+
+def read_nodes(path: str | PathLike[str]) -> _Floats: ...
 def uniform(
     cells: Sequence[int],
     lower: Sequence[float],

@@ -24,7 +24,7 @@ def interpolate(mesh: Mesh, u: ArrayLike, coordinates: Sequence[ArrayLike], orde
     leading = fields.shape[: fields.ndim - mesh.dimensions]
     if fields.shape[len(leading) :] != mesh.shape or fields.ndim < mesh.dimensions:
         raise ValueError(f"`u` has shape {fields.shape}, but the mesh has shape {mesh.shape}, which must come last")
-    periodic_values("u", fields, mesh.periodic)
+    periodic_values("u", fields, mesh._periodic)
     given = [finite(name, values) for name, values in zip("xy", coordinates)]
     try:
         points = np.stack(np.broadcast_arrays(*given), axis=-1)

@@ -111,7 +111,7 @@ def _along(mesh: Mesh) -> list[csr_matrix]:
     from scipy.sparse import csr_matrix, kron
 
     axes = range(mesh.dimensions)
-    lines = [_on_axis(n, wraps) for n, wraps in zip(mesh.cells, mesh.periodic, strict=True)]
+    lines = [_on_axis(n, wraps) for n, wraps in zip(mesh.cells, mesh._periodic, strict=True)]
     if mesh.dimensions == 1:
         return [lines[0][0]]
     # along one axis the difference, along the other the node itself

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from . import _driftmesh, _toml
 from ._arrays import Floats, count, finite, positive, real, scalar
 from ._arrays import threads as _threads
-from ._boxes import check_box, images, periodic_values
+from ._boxes import check_box, fills_box, images, periodic_values
 from ._toml import Kind
 from .mesh import Mesh
 from .methods import Fixed, Schwarz, Stochastic, Whole
@@ -141,7 +141,8 @@ class MeshGenerator:
         """The mesh at the end of a time step.
 
         Args:
-            mesh: The mesh now, of a box or a line.
+            mesh: The mesh now, of a box, a line or a domain of another shape (:meth:`Mesh.mapped`). Where the sides of
+                a mesh by arrays are not straight they are taken for curves through its nodes.
             u: The solution on it, of its shape; None where the monitor is a density.
             dt: Length of the step, in the unit of ``relaxation``, above 0.
 
@@ -157,9 +158,8 @@ class MeshGenerator:
         >>> MeshGenerator(monitor=1 + mesh.x).step(mesh, None, dt=0.1).quality().min_scaled_jacobian < 1
         True
         """
-        _check(mesh)
+        mesh = _movable(mesh)
         dt = positive("dt", dt)
-        check_box(*mesh._given())
         nodes, self._told = self._ready().step(mesh._given(), self._followed(mesh, u), dt)
         return Mesh._of(nodes, mesh)
 
@@ -223,8 +223,7 @@ class MeshGenerator:
         >>> bool(np.diff(mesh.x).min() < 0.3 / 40)
         True
         """
-        _check(mesh)
-        check_box(*mesh._given())
+        mesh = _movable(mesh)
         if not callable(u0):
             # looked at here, so that mistakes are named before anything is computed
             self._followed(mesh, u0, mesh)
@@ -277,7 +276,7 @@ class MeshGenerator:
         if isinstance(self._wanted(), Given) and not (values > 0).all():
             place = tuple(int(k) for k in np.argwhere(~(values > 0))[0])
             raise ValueError(f"the density is {values[place]} at index {place}, but must be above 0")
-        return periodic_values(name, values, mesh.periodic)
+        return periodic_values(name, values, mesh._periodic)
 
     def __repr__(self) -> str:
         monitor = self.monitor if isinstance(self.monitor, Kind) else "a density"
@@ -306,12 +305,22 @@ def _check(mesh: Mesh) -> None:
         raise ValueError(f"`mesh` is of type {type(mesh).__name__}, but must be a driftmesh.Mesh")
 
 
+def _movable(mesh: Mesh) -> Mesh:
+    """A mesh as a generator moves it: where its sides are not those of its box, they are curves through its nodes."""
+    _check(mesh)
+    if mesh._chart is not None or fills_box(mesh._nodes, mesh.lower, mesh.upper, mesh.periodic):
+        return mesh
+    if mesh.dimensions == 1 or any(mesh.periodic):
+        check_box(mesh._nodes, mesh.lower, mesh.upper, mesh.periodic)
+    return Mesh.mapped(mesh.x, mesh.y)
+
+
 def _values(u: Any, start: Mesh, on: Mesh) -> Any:
     """A function of the place, or values at the nodes of the mesh at the start, at the nodes of another one."""
     if u is None or on is start:
         return u
     if callable(u):
-        values = real("u0", u(*images(*on._given())))
+        values = real("u0", u(*(np.moveaxis(on._nodes, -1, 0) if on._chart else images(*on._given()[:4]))))
         return np.full(on.shape, values) if values.shape == () else values
     return start.interpolate(finite("u0", u, start.shape), *np.moveaxis(on._nodes, -1, 0))
 

@@ -138,11 +138,11 @@ def _matrix(mesh: Mesh, rows: Any, columns: Any, values: Any) -> csr_matrix:
     from scipy.sparse import csr_matrix
 
     # the node of each place: closing nodes of periodic axes are the first ones
-    i, j = (np.arange(n + 1) % (n if wraps else n + 1) for n, wraps in zip(mesh.cells, mesh.periodic, strict=True))
+    i, j = (np.arange(n + 1) % (n if wraps else n + 1) for n, wraps in zip(mesh.cells, mesh._periodic, strict=True))
     nodes = i.max() + 1, j.max() + 1
     own = (i[:, None] * nodes[1] + j).ravel()
     # and the first place of each node
     size = mesh.shape[0] * mesh.shape[1]
     place = np.arange(size).reshape(mesh.shape)[: nodes[0], : nodes[1]].ravel()
     open_rows = csr_matrix((values, (rows, place[columns])), shape=(len(place), size))
-    return open_rows[own] if any(mesh.periodic) else open_rows
+    return open_rows[own] if any(mesh._periodic) else open_rows

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +28,10 @@ class Mesh:
             it where the first nodes of a periodic axis have moved away from the corner.
         upper: Upper corner of the box; by default that of the smallest box around the nodes, and along a periodic axis
             as far from ``lower`` as the last nodes are from the first.
-        periodic: Which axes wrap around. The last node of such an axis is its first one, shifted by the box.
+        periodic: Which axes wrap around. The last node of such an axis is its first one, shifted by the box. Where
+            it is the first one itself, the axis is closed.
+        closed: Which axes are closed, as in a ring: their last nodes are their first ones again. The mesh is then
+            :meth:`mapped`.
 
     Raises:
         ValueError: Shapes that differ, values that are not finite, a box without extent, last nodes of a periodic axis
@@ -45,9 +49,11 @@ class Mesh:
     <Mesh of 3 cells, lower=(0.0,), upper=(1.0,)>
     """
 
-    __slots__ = ("_lower", "_nodes", "_periodic", "_upper")
+    __slots__ = ("_chart", "_lower", "_nodes", "_periodic", "_places", "_upper")
 
     _nodes: Floats
+    _chart: _driftmesh.Chart | None
+    _places: Floats | None
     _lower: tuple[float, ...]
     _upper: tuple[float, ...]
     _periodic: tuple[bool, ...]
@@ -60,6 +66,7 @@ class Mesh:
         lower: float | Sequence[float] | None = None,
         upper: float | Sequence[float] | None = None,
         periodic: bool | Sequence[bool] = False,
+        closed: bool | Sequence[bool] = False,
     ) -> None:
         first = finite("x", x)
         dimensions = 1 if y is None else 2
@@ -70,6 +77,10 @@ class Mesh:
         coordinates = [first] if y is None else [first, finite("y", y, first.shape, "`x`")]
         wraps = _boxes.flags(periodic, dimensions)
         nodes = np.stack(coordinates, axis=-1)
+        meets = _boxes.closed(nodes, wraps, _boxes.flags(closed, dimensions, "closed"))
+        if any(meets):
+            self.__setstate__(self.mapped(*coordinates, closed=meets).__getstate__())
+            return
         low, high = _boxes.box(nodes, lower, upper, wraps)
         _boxes.refuse_mirrored(nodes)
         _boxes.close(nodes, low, high, wraps)
@@ -83,15 +94,83 @@ class Mesh:
         lower: tuple[float, ...],
         upper: tuple[float, ...],
         periodic: tuple[bool, ...],
+        chart: _driftmesh.Chart | None = None,
+        places: Floats | None = None,
     ) -> None:
         nodes.flags.writeable = False
         self._nodes, self._lower, self._upper, self._periodic = nodes, lower, upper, periodic
+        self._chart, self._places = chart, places
 
     @classmethod
     def _of(cls, nodes: Floats, like: Mesh) -> Mesh:
-        """Nodes that the library computed, in the box of another mesh."""
+        """Nodes that the library computed, in the box or in the domain of another mesh."""
         mesh = cls.__new__(cls)
-        mesh._set(nodes, like._lower, like._upper, like._periodic)
+        if like._chart is None:
+            mesh._set(nodes, like._lower, like._upper, like._periodic)
+        else:
+            mesh._place(nodes, like._periodic, like._chart)
+        return mesh
+
+    def _place(self, places: Floats, closed: tuple[bool, ...], chart: _driftmesh.Chart) -> None:
+        """The image of places in the unit square."""
+        places.flags.writeable = False
+        lower, upper = chart.ends()
+        self._set(chart.positions(places), tuple(lower), tuple(upper), closed, chart, places)
+
+    @classmethod
+    def mapped(
+        cls,
+        x: ArrayLike | str | PathLike[str],
+        y: ArrayLike | str | None = None,
+        *,
+        cells: int | Sequence[int] | NDArray[np.integer[Any]] | None = None,
+        closed: bool | Sequence[bool] = False,
+    ) -> Mesh:
+        """A mesh of a domain that is no box: the image of equal cells of the unit square.
+
+        Args:
+            x: x of the nodes of a structured mesh, shape (nx + 1, ny + 1); or x as a formula of s and r in the unit
+                square, such as ``"(1 + s)*cos(pi*r)"``; or the path of a file with a structured mesh: ``.npz`` with
+                arrays x and y, ``.vts``, or a block of PLOT3D, ``.xyz`` or ``.x``.
+            y: The same for y; left out for a file.
+            cells: (nx, ny); by default those of the structured mesh. Formulas need it.
+            closed: Which axes are closed, so that their ends are the same curve, as in a mesh around an aerofoil. The
+                last nodes of such an axis are its first ones again. A closed axis that would turn the cells over is
+                taken from its other end.
+
+        Between the nodes of a structured mesh the domain goes on smoothly, with order 4: the nodes of moved meshes
+        slide along its sides. Where both axes are open, formulas of s and r make the one of them the first axis that
+        turns into the other against the clock.
+
+        Raises:
+            ValueError: A map or a mesh that folds, an axis whose ends do not meet, values that are not finite, or a
+                file that holds no structured mesh.
+
+        >>> import numpy as np
+        >>> from driftmesh import Mesh, MeshGenerator
+        >>> ring = Mesh.mapped("(1 + s)*cos(2*pi*r)", "(1 + s)*sin(2*pi*r)", cells=(20, 60), closed=(False, True))
+        >>> moved = MeshGenerator().step(ring, np.tanh(20 * (ring.x - 0.5)), dt=0.1)
+        >>> bool(np.allclose(np.hypot(moved.x[0], moved.y[0]), 1, atol=1e-14))
+        True
+        """
+        wraps = _boxes.flags(closed, 2, "closed")
+        numbers = None if cells is None else [count("cells", n) for n in _boxes.each_axis("cells", cells, 2)]
+        if isinstance(x, str) and isinstance(y, str):
+            if numbers is None:
+                raise ValueError("`cells` is not given, but a map by formulas needs it: (nx, ny)")
+            chart = _driftmesh.Chart.formulas(x, y, wraps)
+        else:
+            nodes = _boxes.structured(x, y)
+            chart = _driftmesh.Chart.nodes(nodes, wraps)
+            numbers = [nodes.shape[0] - 1, nodes.shape[1] - 1] if numbers is None else numbers
+        mesh = cls.__new__(cls)
+        mesh._place(_driftmesh.uniform(numbers, (0.0, 0.0), (1.0, 1.0), wraps), wraps, chart)
+        least = mesh.quality().min_scaled_jacobian
+        if not least > 0:
+            raise ValueError(
+                f"the map folds: the smallest corner Jacobian is {least} of that of equal cells; no point may be met "
+                "twice, and cells must follow the curves"
+            )
         return mesh
 
     @classmethod
@@ -172,8 +251,13 @@ class Mesh:
 
     @property
     def periodic(self) -> tuple[bool, ...]:
-        """Which axes wrap around."""
-        return self._periodic
+        """Which axes wrap around, by a shift by the box."""
+        return tuple(wraps and self._chart is None for wraps in self._periodic)
+
+    @property
+    def closed(self) -> tuple[bool, ...]:
+        """Which axes are closed, so that their ends are the same curve."""
+        return tuple(wraps and self._chart is not None for wraps in self._periodic)
 
     @property
     def areas(self) -> Floats:
@@ -285,7 +369,7 @@ class Mesh:
         return _points.sample(self, u, shape, order)
 
     def moved(self, x: ArrayLike, y: ArrayLike | None = None) -> Mesh:
-        """The same lattice and box with other positions.
+        """The same lattice and box with other positions; in a domain that is no box, the mesh that is mapped by them.
 
         Args:
             x: Positions of the nodes, shape (nx + 1, ny + 1), of a line (nx + 1,).
@@ -300,6 +384,8 @@ class Mesh:
         >>> mesh.moved(mesh.x**2, mesh.y).x[2, 0]
         np.float64(0.25)
         """
+        if self._chart is not None:
+            return self.mapped(x, y, closed=self.closed)
         given = zip("xy", self._coordinates(x, y))
         nodes = np.stack([finite(name, values, self.shape) for name, values in given], axis=-1)
         _boxes.close(nodes, self._lower, self._upper, self._periodic)
@@ -374,8 +460,11 @@ class Mesh:
             raise ValueError(f"`y` {rule}")
         return [x] if y is None else [x, y]
 
-    def _given(self) -> tuple[Floats, tuple[float, ...], tuple[float, ...], tuple[bool, ...]]:
-        return self._nodes, self._lower, self._upper, self._periodic
+    def _given(self) -> tuple[Floats, _boxes.Corner, _boxes.Corner, _boxes.Flags, _driftmesh.Chart | None]:
+        """The mesh in its box, or the places of its nodes in the unit square with the domain that is its image."""
+        if self._places is not None:
+            return self._places, (0.0, 0.0), (1.0, 1.0), self._periodic, self._chart
+        return self._nodes, self._lower, self._upper, self._periodic, None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Mesh):
@@ -386,12 +475,13 @@ class Mesh:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        wraps = f", periodic={self._periodic}" if any(self._periodic) else ""
+        wraps = f", periodic={self.periodic}" if any(self.periodic) else ""
+        wraps += f", closed={self.closed}" if any(self.closed) else ""
         cells = " × ".join(str(n) for n in self.cells)
         return f"<Mesh of {cells} cells, lower={self._lower}, upper={self._upper}{wraps}>"
 
     def __getstate__(self) -> tuple[Any, ...]:
-        return self._given()
+        return self._nodes, self._lower, self._upper, self._periodic, self._chart, self._places
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         self._set(*state)

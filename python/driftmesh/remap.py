@@ -59,7 +59,7 @@ def transfer(
         raise ValueError(f"`u` has shape {values.shape}, but the mesh has shape {old.shape}")
     out = np.empty_like(values)
     for c in np.ndindex(values.shape[old.dimensions :]):
-        unknown = periodic_values("u", np.ascontiguousarray(values[(..., *c)]), old.periodic)
+        unknown = periodic_values("u", np.ascontiguousarray(values[(..., *c)]), old._periodic)
         out[(..., *c)] = _driftmesh.transfer(unknown, old._given(), new._given(), method == "conservative", number)
     return out
 
@@ -81,6 +81,8 @@ def _check(old: Mesh, new: Mesh, method: str) -> None:
 
 def _refuse_moved_sides(old: Mesh, new: Mesh) -> None:
     """Refuses meshes whose sides enclose something else: there is no value for what a side sweeps."""
+    if old._chart is not None:
+        return  # of the same domain, as is checked before
     size = np.prod(np.subtract(old.upper, old.lower))
     for axis in np.flatnonzero(np.logical_not(old.periodic)):
         for end in (0, -1):

@@ -312,7 +312,9 @@ def _table(path: Path) -> dict[str, Floats]:
 
 
 def _domain(directory: Path) -> dict[str, Any]:
-    """The box of a run and the axes that wrap around, where its study says them."""
+    """The box of a run and the axes that wrap around or are closed, where its study says them."""
     study = directory / "study.toml"
     domain = tomllib.loads(study.read_text("utf-8")).get("domain", {}) if study.is_file() else {}
+    if {"map", "top", "mesh"} & domain.keys():
+        return {"closed": domain["closed"]} if any(domain.get("closed", [])) else {}
     return {key: domain[key] for key in ("lower", "upper", "periodic")} if "periodic" in domain else {}

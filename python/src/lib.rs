@@ -2,6 +2,7 @@
 //!
 //! What it exports is private to the package; `driftmesh/*.py` checks shapes and values and gives them names.
 
+mod chart;
 mod errors;
 mod generator;
 mod line;
@@ -16,6 +17,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _driftmesh {
+    #[pymodule_export]
+    use super::chart::{Chart, read_nodes};
     #[pymodule_export]
     use super::generator::Generator;
     #[pymodule_export]

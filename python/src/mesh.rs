@@ -1,5 +1,6 @@
 //! Meshes as arrays of shape (nx + 1, ny + 1, 2), of a line (nx + 1, 1), the closing nodes of periodic axes included.
 
+use crate::chart::Chart;
 use crate::errors::plain;
 use crate::threads::{Threads, compute};
 use driftmesh::Failure;
@@ -9,6 +10,8 @@ use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{IntoPyArray, PyArrayDyn, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use std::any::Any;
+use std::sync::Arc;
 
 /// Memory for each node while a mesh is moved, about.
 const BYTES_PER_NODE: u128 = 1000;
@@ -16,9 +19,10 @@ const BYTES_PER_NODE: u128 = 1000;
 /// An array of a shape that depends on the number of dimensions.
 pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// A mesh as the package hands it over: contiguous nodes and the box.
+/// A mesh as the package hands it over: contiguous nodes and the box; or the places of nodes in the unit square, which
+/// is then the box, which of its axes are closed, and the domain that is its image.
 #[derive(FromPyObject)]
-pub struct Given<'py>(PyReadonlyArrayDyn<'py, f64>, Vec<f64>, Vec<f64>, Vec<bool>);
+pub struct Given<'py>(PyReadonlyArrayDyn<'py, f64>, Vec<f64>, Vec<f64>, Vec<bool>, Option<Py<Chart>>);
 
 /// Calls a function for the dimension of a mesh: 1 for a line, 2 in the plane.
 macro_rules! in_dimensions {
@@ -37,13 +41,22 @@ impl Given<'_> {
     }
 
     pub fn mesh<const D: usize>(&self, py: Python<'_>) -> PyResult<Mesh<D>> {
-        let Self(nodes, lower, upper, periodic) = self;
+        let Self(nodes, lower, upper, periodic, chart) = self;
         let cells: Vec<usize> = nodes.shape().iter().take(D).map(|n| n - 1).collect();
         let lattice = Lattice::new(fixed(&cells), fixed(periodic)).map_err(|error| plain(py, error))?;
-        let mesh = Mesh::uniform(lattice, fixed(lower), fixed(upper)).map_err(|error| plain(py, error))?;
+        let mesh = match chart.as_ref().and_then(|chart| in_dimension(chart.get().chart.clone())) {
+            Some(chart) => Mesh::charted(lattice, chart),
+            None => Mesh::uniform(lattice, fixed(lower), fixed(upper)),
+        };
         let closed = nodes.as_slice()?.as_chunks::<D>().0;
-        mesh.moved(opened(&lattice, closed)).map_err(|error| plain(py, error))
+        let placed = mesh.and_then(|mesh| Ok(mesh.placed(opened(&lattice, closed))?));
+        placed.map_err(|error| plain(py, error))
     }
+}
+
+/// A chart of the plane as one of D dimensions, where that is the same.
+fn in_dimension<const D: usize>(chart: Arc<geometry::Chart>) -> Option<Arc<geometry::Chart<D>>> {
+    (Box::new(chart) as Box<dyn Any>).downcast().ok().map(|chart| *chart)
 }
 
 fn fixed<T: Copy, const D: usize>(values: &[T]) -> [T; D] {
@@ -67,13 +80,13 @@ pub fn array<'py, const D: usize>(py: Python<'py>, lattice: &Lattice<D>, values:
     shaped(py, &lattice.cells().map(|n| n + 1), lattice.closed(values).into_owned())
 }
 
-/// The nodes of a mesh.
+/// The nodes of a mesh; their places in the unit square where it lies in a domain that is no box.
 pub fn nodes<'py, const D: usize>(py: Python<'py>, mesh: &Mesh<D>) -> PyResult<Array<'py>> {
     let shape: Vec<usize> = mesh.lattice().cells().into_iter().map(|n| n + 1).chain([D]).collect();
-    shaped(py, &shape, mesh.closed().into_owned().into_flattened())
+    shaped(py, &shape, mesh.parameters().closed().into_owned().into_flattened())
 }
 
-fn shaped<'py>(py: Python<'py>, shape: &[usize], values: Vec<f64>) -> PyResult<Array<'py>> {
+pub fn shaped<'py>(py: Python<'py>, shape: &[usize], values: Vec<f64>) -> PyResult<Array<'py>> {
     let array = ArrayD::from_shape_vec(IxDyn(shape), values);
     Ok(array.map_err(|error| PyValueError::new_err(error.to_string()))?.into_pyarray(py))
 }

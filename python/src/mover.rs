@@ -34,8 +34,8 @@ pub struct Parts<const D: usize> {
     pub monitor: Box<dyn Monitor<D>>,
     pub mover: Mover<D>,
     pub check: Check<D>,
-    /// The mesh that the last step led to, and how it was going: forgotten where the next step starts from another
-    /// mesh.
+    /// The mesh that the last step led to, of a domain that is no box in the unit square, and how it was going: forgotten
+    /// where the next step starts from another mesh.
     pub last: Option<(Mesh<D>, Gait<D>)>,
 }
 
@@ -96,15 +96,15 @@ where
     pub fn step(&mut self, mesh: &Mesh<D>, u: &[f64], dt: f64) -> Result<Step<D>, Failure> {
         check_unfolded(mesh)?;
         let gait = match self.last.take() {
-            Some((last, gait)) if last == *mesh => gait,
+            Some((last, gait)) if last == *mesh.parameters() => gait,
             _ => Gait::at_rest(mesh),
         };
         let rho = self.monitor.density(mesh, u, None)?;
         let step = self.mover.step(mesh, &gait, Followed { u, rho: &rho }, dt);
         // a step that failed may be tried again with other values
         self.last = Some(match &step {
-            Ok(step) => (step.moved.mesh.clone(), step.gait.clone()),
-            Err(_) => (mesh.clone(), gait),
+            Ok(step) => (step.moved.mesh.parameters().clone(), step.gait.clone()),
+            Err(_) => (mesh.parameters().clone(), gait),
         });
         step
     }

@@ -1,4 +1,4 @@
-use crate::geometry::{Cells, Mesh, Patch, diagonal, length, padded, strides};
+use crate::geometry::{Cells, Mesh, Patch, length, padded, strides};
 use crate::numerics::difference::scaled_gradient;
 use crate::numerics::larger;
 
@@ -33,6 +33,7 @@ impl Need {
     where
         Mesh<D>: Cells<D>,
     {
+        let mesh = mesh.parameters();
         let cells: usize = mesh.lattice().cells().iter().product();
         let smallest = mesh.volumes().fold(f64::INFINITY, f64::min) * cells as f64;
         let uneven = between(UNEVEN, 1.0 - smallest / mesh.extent().iter().product::<f64>());
@@ -70,7 +71,7 @@ pub(super) fn bends<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> [f64; D] {
     let (lattice, extent) = (mesh.lattice(), mesh.extent());
     let patch = Patch { origin: [0; D], size: lattice.nodes(), wraps: lattice.periodic() };
     let per_cell: [f64; D] = std::array::from_fn(|d| lattice.cells()[d] as f64 / extent[d]);
-    let x = padded(lattice, mesh.x(), diagonal(extent));
+    let x = padded(lattice, mesh.x(), mesh.jump());
     let u = padded(lattice, u.as_chunks::<1>().0, [[0.0]; D]);
     let strides = patch.padded_strides();
     // the way from one place to another in uniform cells, and the change of u

@@ -90,6 +90,8 @@ impl RootGradient {
     where
         Mesh<D>: Cells<D>,
     {
+        // in a domain with a chart equal cells are those of the unit box
+        let (domain, mesh) = (mesh, mesh.parameters());
         let lattice = mesh.lattice();
         let Followed { slopes, needs, step } = Followed::of(mesh, unknowns);
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
@@ -103,7 +105,7 @@ impl RootGradient {
         let axes: [Vec<f64>; D] = std::array::from_fn(|_| axes.next().expect("one for each axis"));
         let bad = |rho: &Vec<f64>| rho.iter().position(|rho| !rho.is_finite()).map(|k| (k, rho[k]));
         if let Some((k, value)) = axes.iter().find_map(bad) {
-            let (node, x) = mesh.told(k);
+            let (node, x) = domain.told(k);
             return Err(Failure::NonFinite { what: "the mesh density", value, node, x });
         }
         Ok(Density::of_axes(axes).expect("one value a node each"))

@@ -4,6 +4,7 @@ use super::nodal::check_length;
 use super::points::Place;
 use super::{DualCells, Lattice, Mesh, Quality};
 use crate::error::Failure;
+use std::borrow::Cow;
 
 /// What depends on the shape of cells, written once for lines and once for the plane
 ///
@@ -44,6 +45,12 @@ pub trait Cells<const D: usize>: Sized {
     /// The cell, by its lowest corner, that holds each of some points. The search begins in the cell of the point
     /// before, so that neighbouring points cost a few tests each.
     fn holding(&self, points: impl Iterator<Item = [f64; D]>) -> Vec<[usize; D]>;
+
+    /// The places in the unit box of points in a domain with a chart, and the points themselves in a box; else the index
+    /// of the first point outside.
+    fn parameters_of<'a>(&self, points: &'a [[f64; D]]) -> Result<Cow<'a, [[f64; D]]>, usize> {
+        Ok(Cow::Borrowed(points))
+    }
 
     /// The cell of each of some points, and where in it the point lies; nothing for points outside. After a point
     /// outside others may be left without a place, too.
@@ -149,7 +156,7 @@ where
 /// The search for a node begins as many cells from the one with its index as the search for its neighbour ended, so
 /// that it costs a few tests, whatever the meshes are. On periodic axes the image next to that cell is searched for:
 /// the meshes may have drifted apart by any number of periods. Points outside a bounded box take the value at the
-/// nearest point of the cell where the search ends.
+/// nearest point of the cell where the search ends. In a domain with a chart all of this is done in the unit box.
 ///
 /// # Example
 /// ```
@@ -173,5 +180,8 @@ where
 {
     assert_eq!(from.lattice(), to.lattice(), "both meshes need the same lattice");
     assert_eq!(values.len(), from.lattice().len(), "one value a node");
-    from.interpolated(values, to)
+    match from.chart().is_some() && to.chart().is_some() {
+        true => from.parameters().interpolated(values, to.parameters()),
+        false => from.interpolated(values, to),
+    }
 }

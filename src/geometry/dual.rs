@@ -1,5 +1,6 @@
+use super::curved::Curved;
 use super::quality::{cross, minus};
-use super::{Cells, Lattice, Mesh, Patch, diagonal};
+use super::{Cells, Lattice, Mesh, Patch};
 use crate::parallel;
 
 /// Finite-volume geometry of a mesh: the dual cell of every node
@@ -12,7 +13,8 @@ use crate::parallel;
 ///
 /// N points to the node above and is as long as the face. The cells tile the box. Beyond a bounded side its own nodes
 /// are repeated, so that the cell centres there are the middles of its edges: nodes on a side have half cells, corners
-/// quarters, and the outermost faces lie on the side.
+/// quarters, and the outermost faces lie on the side. In a domain with a chart the middles are those of the unit box,
+/// faces are as curved as mesh lines, and the outermost ones follow the curve of the side.
 ///
 /// A face is stored with the node below it, in arrays padded like those of [`patch`](Self::patch). Images on periodic
 /// axes are equal to the last bit, so that what leaves one cell enters the next.
@@ -31,6 +33,8 @@ pub struct DualCells<const D: usize = 2> {
     pub(super) centres: Vec<[f64; D]>,
     pub(super) normals: Vec<[[f64; D]; D]>,
     pub(super) areas: Vec<f64>,
+    /// In a domain with a chart only.
+    pub(super) curved: Option<Curved>,
 }
 
 impl<const D: usize> DualCells<D> {
@@ -92,17 +96,24 @@ impl<const D: usize> DualCells<D> {
 
 impl DualCells<2> {
     pub(super) fn of_plane(mesh: &Mesh<2>) -> Self {
-        let (lattice, extent) = (mesh.lattice(), mesh.extent());
+        let (lattice, places) = (mesh.lattice(), mesh.parameters());
         let ([n, m], wraps) = (lattice.nodes(), lattice.periodic());
         let patch = Patch { origin: [0; 2], size: [n, m], wraps };
         let s = m + 2;
-        let x = padded(lattice, mesh.x(), diagonal(extent));
+        let x = padded(lattice, places.x(), places.jump());
 
         let mut centres = vec![[0.0; 2]; x.len()];
         parallel::for_each_row(&mut centres[..(n + 1) * s], s, |p, row| {
             for (k, c) in (p * s..).zip(&mut row[..=m]) {
                 *c = [0, 1].map(|d| 0.25 * ((x[k][d] + x[k + s + 1][d]) + (x[k + s][d] + x[k + 1][d])));
             }
+        });
+        let curved = mesh.chart().map(|chart| {
+            let places = centres.clone();
+            parallel::for_each_row(&mut centres[..(n + 1) * s], s, |_, row| {
+                row.iter_mut().for_each(|c| *c = chart.at(*c))
+            });
+            Curved::new(chart, &patch, &places, &centres)
         });
         let mut normals = vec![[[0.0; 2]; 2]; x.len()];
         parallel::for_each_row(&mut normals[..(n + 1) * s], s, |p, row| {
@@ -125,10 +136,11 @@ impl DualCells<2> {
         parallel::for_each_row(&mut areas, m, |p, areas| {
             for (k, area) in (patch.pencil(p)..).zip(areas) {
                 let diagonals = [minus(centres[k], centres[k - s - 1]), minus(centres[k - s], centres[k - 1])];
-                *area = 0.5 * cross(diagonals[0], diagonals[1]);
+                let beyond = curved.as_ref().map_or(0.0, |curved| curved.area(k, s));
+                *area = 0.5 * cross(diagonals[0], diagonals[1]) + beyond;
             }
         });
-        Self { patch, centres, normals, areas }
+        Self { patch, centres, normals, areas, curved }
     }
 
     pub(super) fn swept_in_plane(&self, later: &Self) -> Vec<[f64; 2]> {
@@ -148,6 +160,11 @@ impl DualCells<2> {
                 }
                 if p > 0 {
                     swept[1] = area(k - s, 1);
+                }
+                let (Some(old), Some(new)) = (&self.curved, &later.curved) else { continue };
+                for axis in (0..2).filter(|axis| [q, p][*axis] > 0) {
+                    let centres = [&self.centres[..], &later.centres];
+                    Curved::correct([old, new], &self.patch, [p, q], axis, centres, &mut swept[axis]);
                 }
             }
         });

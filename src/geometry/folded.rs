@@ -33,6 +33,9 @@ pub fn check_unfolded<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
         let (node, x) = mesh.told(k);
         return Err(Failure::NonFinite { what: "the mesh", value, node, x });
     }
+    if mesh.chart().is_some() {
+        check_unfolded(mesh.parameters())?;
+    }
     let (cells, x) = (mesh.lattice().cells(), mesh.closed());
     let steps = strides(cells.map(|n| n + 1));
     let mut worst: Option<(f64, usize, usize)> = None;
@@ -49,9 +52,31 @@ pub fn check_unfolded<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
         }
     }
     let Some((volume, cell, at)) = worst else { return Ok(()) };
-    let uniform: f64 = (0..D).map(|d| mesh.extent()[d] / cells[d] as f64).product();
+    let uniform = mesh.volume() / cells.iter().product::<usize>() as f64;
     let cell: [usize; D] = std::array::from_fn(|d| cell / steps[d] % (cells[d] + 1));
     Err(Failure::Folded { cell: first_two(&cell), jacobian: volume / uniform, x: first_two(&x[at]), noise: None })
+}
+
+/// Marks the nodes at the corners of folded cells; see [`check_unfolded`]. Returns whether there are any.
+pub(crate) fn mark_folded<const D: usize>(mesh: &Mesh<D>, marks: &mut [bool]) -> bool {
+    let (lattice, x) = (mesh.lattice(), mesh.closed());
+    let (cells, nodes) = (lattice.cells(), lattice.nodes());
+    let steps = strides(cells.map(|n| n + 1));
+    let mut any = false;
+    for start in pencils(cells, steps) {
+        for cell in start..start + cells[D - 1] {
+            let corners = |corner: usize| (0..D).map(|d| (corner >> d & 1) * steps[d]).sum::<usize>() + cell;
+            let sound = (0..1 << D).all(|corner| corner_volume(&x, corners(corner), corner, steps) > 0.0);
+            if !sound {
+                any = true;
+                for corner in (0..1 << D).map(corners) {
+                    let node = std::array::from_fn(|d| corner / steps[d] % (cells[d] + 1) % nodes[d]);
+                    marks[lattice.index(node)] = true;
+                }
+            }
+        }
+    }
+    any
 }
 
 /// The first cells of all rows along the last axis, in an array of nodes with these strides.

@@ -124,7 +124,7 @@ fn dual_cells(mesh: &Mesh<1>, m: i32) -> DualCells<1> {
     let areas = centres.windows(2).map(|c| c[1][0] - c[0][0]).collect();
     centres.push([0.0]);
     normals.push([[1.0]]);
-    DualCells { patch, centres, normals, areas }
+    DualCells { patch, centres, normals, areas, curved: None }
 }
 
 impl Mesh<1> {

@@ -1,6 +1,7 @@
 use super::points::{Place, lies_within};
 use super::{Mesh, quality::minus};
 use crate::parallel;
+use std::borrow::Cow;
 
 pub(super) fn interpolate_in_plane(from: &Mesh<2>, values: &[f64], to: &Mesh<2>) -> Vec<f64> {
     let cells = Search { mesh: from };
@@ -63,6 +64,42 @@ pub(super) fn places_in_plane(mesh: &Mesh<2>, points: &[[f64; 2]]) -> Vec<Option
     places
 }
 
+/// The places in the unit box of points in a domain with a chart; where there is none, the points themselves.
+///
+/// # Errors
+/// The index of the first point outside.
+pub(super) fn parameters_in_plane<'a>(mesh: &Mesh<2>, points: &'a [[f64; 2]]) -> Result<Cow<'a, [[f64; 2]]>, usize> {
+    let Some(chart) = mesh.chart() else { return Ok(Cow::Borrowed(points)) };
+    let (search, flat) = (Search { mesh }, Search { mesh: mesh.parameters() });
+    let mut places = vec![None; points.len()];
+    parallel::for_each_piece(&mut places, |first, piece| {
+        let mut near = [0; 2];
+        for (place, &point) in piece.iter_mut().zip(&points[first..]) {
+            let guess = |cell: [isize; 2]| {
+                let share = search.place(point, cell).map_or([0.5; 2], |place| place.share);
+                let [a, b, c, d] = flat.corners(cell).map(|c| c.1);
+                let [s, t] = share;
+                let at = |k: usize| (1.0 - t) * ((1.0 - s) * a[k] + s * b[k]) + t * ((1.0 - s) * d[k] + s * c[k]);
+                [at(0), at(1)]
+            };
+            near = search.find(point, near).0;
+            *place = chart.place(point, guess(near));
+            if place.is_none() {
+                near = search.nearest(point).0;
+                *place = chart.place(point, guess(near));
+            }
+            if place.is_none() {
+                break;
+            }
+        }
+    });
+    let mut found = Vec::with_capacity(points.len());
+    for (k, place) in places.into_iter().enumerate() {
+        found.push(place.ok_or(k)?);
+    }
+    Ok(Cow::Owned(found))
+}
+
 /// Cells at which the search for a point may begin: one for each of the equal boxes that the box of the mesh is divided
 /// into.
 struct Starts<'a> {
@@ -115,9 +152,24 @@ struct Search<'a> {
 type Triangle = ([usize; 3], [f64; 3]);
 
 impl Search<'_> {
+    /// What positions jump by on a turn around each axis; 0 where they do not.
+    fn period(&self) -> [f64; 2] {
+        let jump = self.mesh.jump();
+        [0, 1].map(|d| if self.mesh.lattice().periodic()[d] { jump[d][d] } else { 0.0 })
+    }
+
+    /// The image of a point that is nearest to another one.
+    fn image(&self, point: [f64; 2], near: [f64; 2]) -> [f64; 2] {
+        let period = self.period();
+        std::array::from_fn(|d| match period[d] > 0.0 {
+            true => point[d] - period[d] * ((point[d] - near[d]) / period[d]).round(),
+            false => point[d],
+        })
+    }
+
     fn corner(&self, node: [isize; 2]) -> (usize, [f64; 2]) {
         let lattice = self.mesh.lattice();
-        let (nodes, extent) = (lattice.nodes(), self.mesh.extent());
+        let (nodes, period) = (lattice.nodes(), self.period());
         // divisions take longer than all the rest, and most nodes need none
         let counted = [0, 1].map(|d| match usize::try_from(node[d]) {
             Ok(k) if k < nodes[d] => (k, 0.0),
@@ -128,7 +180,7 @@ impl Search<'_> {
         });
         let index = lattice.index(counted.map(|(k, _)| k));
         let x = self.mesh.x()[index];
-        (index, [0, 1].map(|d| x[d] + counted[d].1 * extent[d]))
+        (index, [0, 1].map(|d| x[d] + counted[d].1 * period[d]))
     }
 
     /// The cell that holds `point`, and the image of the point in it; the search begins in cell `start`. For a point
@@ -139,11 +191,7 @@ impl Search<'_> {
         let exists = |cell: [isize; 2]| (0..2).all(|d| periodic[d] || (0..cells[d]).contains(&cell[d]));
         let mut cell: [isize; 2] =
             std::array::from_fn(|d| if periodic[d] { start[d] } else { start[d].clamp(0, cells[d] - 1) });
-        let (near, extent) = (self.corner(cell).1, self.mesh.extent());
-        let point: [f64; 2] = std::array::from_fn(|d| match periodic[d] {
-            true => point[d] - extent[d] * ((point[d] - near[d]) / extent[d]).round(),
-            false => point[d],
-        });
+        let point = self.image(point, self.corner(cell).1);
         // A straight walk crosses each cell once at most, and the image is at most a period away. A longer walk is
         // caught among cells that are not convex; then all cells are tried.
         let mut left = 4 * (cells[0] + cells[1]);
@@ -171,16 +219,10 @@ impl Search<'_> {
 
     /// Of all cells the one that holds a point, or is nearest to it, and the image of the point there.
     fn nearest(&self, point: [f64; 2]) -> ([isize; 2], [f64; 2]) {
-        let (cells, extent) = (self.mesh.lattice().cells().map(|n| n as isize), self.mesh.extent());
-        let periodic = self.mesh.lattice().periodic();
+        let cells = self.mesh.lattice().cells().map(|n| n as isize);
         let mut best = (f64::INFINITY, ([0, 0], point));
         for cell in (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| [i, j])) {
-            let near = self.corner(cell).1;
-            let about = |d: usize| match periodic[d] {
-                true => point[d] - extent[d] * ((point[d] - near[d]) / extent[d]).round(),
-                false => point[d],
-            };
-            let point = [about(0), about(1)];
+            let point = self.image(point, self.corner(cell).1);
             let [a, b, c, d] = self.corners(cell).map(|c| c.1);
             let edges = [(a, b), (b, c), (c, d), (d, a)];
             let off = edges.into_iter().map(|(p, q)| outside(point, p, q)).fold(0.0, f64::max);

@@ -1,8 +1,9 @@
-use super::{Lattice, lattice::diagonal, lattice::strides, nodal::check_length};
+use super::{Chart, Lattice, lattice::diagonal, lattice::strides, nodal::check_length};
 use crate::error::{Error, Failure, Result};
 use std::borrow::Cow;
+use std::sync::Arc;
 
-/// A mesh: the position of every lattice node in a box
+/// A mesh: the position of every lattice node in a box, or in the image of the unit box by a [`Chart`]
 ///
 /// ```text
 /// x = x(ξ),   ξ ∈ [0, 1]^D,   x ∈ [lower, upper]
@@ -10,6 +11,10 @@ use std::borrow::Cow;
 ///
 /// The lattice fixes the connections; only positions move. On a bounded axis the nodes of a side lie exactly on the
 /// box. On a periodic axis x(ξ + 1) = x(ξ) + (upper − lower).
+///
+/// With a chart x = map(s(ξ)), where the places s of the nodes are a mesh of the unit box
+/// ([`parameters`](Self::parameters)). Nodes on sides then lie on the curves, and an axis that wraps around is closed:
+/// x(ξ + 1) = x(ξ).
 ///
 /// # Example
 /// ```
@@ -24,6 +29,15 @@ pub struct Mesh<const D: usize> {
     lower: [f64; D],
     upper: [f64; D],
     x: Vec<[f64; D]>,
+    charted: Option<Charted<D>>,
+}
+
+/// What a mesh in a domain that is no box has in addition.
+#[derive(Debug, Clone, PartialEq)]
+struct Charted<const D: usize> {
+    chart: Arc<Chart<D>>,
+    /// The places of the nodes in the unit box.
+    places: Box<Mesh<D>>,
 }
 
 impl<const D: usize> Mesh<D> {
@@ -60,7 +74,43 @@ impl<const D: usize> Mesh<D> {
                 })
             })
             .collect();
-        Ok(Self { lattice, lower, upper, x })
+        Ok(Self { lattice, lower, upper, x, charted: None })
+    }
+
+    /// The image of equal cells of the unit box.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the axes that wrap around are not those that are closed.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::formula::Formula;
+    /// use driftmesh::geometry::{Chart, FormulaMap, Lattice, Mesh};
+    /// // the quarter of a ring, from radius 1 to 2
+    /// let map = ["(1 + s)*cos(pi*r/2)", "(1 + s)*sin(pi*r/2)"].map(|f| Formula::parse(f, &["s", "r"]));
+    /// let [x, y] = map.map(|formula| formula.expect("a formula"));
+    /// let chart = Chart::new(FormulaMap::new([x, y])?, [false; 2])?;
+    /// let mesh = Mesh::charted(Lattice::bounded([4, 8])?, chart)?;
+    /// assert_eq!(mesh.x()[mesh.lattice().index([2, 0])], [1.5, 0.0]);
+    /// // π (2² − 1²)/4
+    /// assert!((mesh.volume() - 2.356194490192345).abs() < 1e-13);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn charted(lattice: Lattice<D>, chart: impl Into<Arc<Chart<D>>>) -> Result<Self> {
+        let chart = chart.into();
+        if lattice.periodic() != chart.closed() {
+            let rule =
+                format!("the axes of the chart that are closed are {:?}; let the same ones wrap", chart.closed());
+            return Err(Error::invalid("periodic", format!("{:?}", lattice.periodic()), rule));
+        }
+        Ok(Self::over(chart, Self::uniform(lattice, [0.0; D], [1.0; D])?))
+    }
+
+    /// The image of a mesh of the unit box.
+    fn over(chart: Arc<Chart<D>>, places: Self) -> Self {
+        let (lower, upper) = chart.ends();
+        let x = places.x.iter().map(|s| chart.at(*s)).collect();
+        Self { lattice: places.lattice, lower, upper, x, charted: Some(Charted { chart, places: Box::new(places) }) }
     }
 
     /// A mesh of any shape from the positions of its nodes in lattice order. Its box is the smallest one around them.
@@ -82,10 +132,69 @@ impl<const D: usize> Mesh<D> {
                 upper[d] = upper[d].max(x[d]);
             }
         }
-        Ok(Self { lattice, lower, upper, x })
+        Ok(Self { lattice, lower, upper, x, charted: None })
     }
 
-    /// A mesh over the same lattice and box with other positions of the nodes, in lattice order.
+    /// The mesh of the unit box of which this one is the image; a mesh in a box itself. Mesh equations, their generators
+    /// and interpolation work on it, and so know boxes only.
+    pub fn parameters(&self) -> &Self {
+        self.charted.as_ref().map_or(self, |charted| &charted.places)
+    }
+
+    /// The chart of a domain that is no box.
+    pub fn chart(&self) -> Option<&Arc<Chart<D>>> {
+        self.charted.as_ref().map(|charted| &charted.chart)
+    }
+
+    /// A mesh over the same lattice and domain with other [`parameters`](Self::parameters), in lattice order.
+    ///
+    /// # Errors
+    /// As [`moved`](Self::moved).
+    pub fn placed(&self, places: Vec<[f64; D]>) -> Result<Self, Failure> {
+        let Some(Charted { chart, places: before }) = &self.charted else { return self.moved(places) };
+        Ok(Self::over(chart.clone(), before.moved(places)?))
+    }
+
+    /// The mesh at a share of the way to another one over the same lattice and domain, along which the
+    /// [`parameters`](Self::parameters) of the nodes go straight on.
+    ///
+    /// # Errors
+    /// As [`moved`](Self::moved).
+    pub fn between(&self, to: &Self, share: f64) -> Result<Self, Failure> {
+        let pairs = self.parameters().x.iter().zip(&to.parameters().x);
+        self.placed(pairs.map(|(a, b)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d]))).collect())
+    }
+
+    /// The mesh of equal cells in the same domain: in the unit box, where there is a chart.
+    ///
+    /// # Errors
+    /// As [`uniform`](Self::uniform) and [`charted`](Self::charted).
+    pub fn even(&self, lattice: Lattice<D>) -> Result<Self> {
+        match self.chart() {
+            Some(chart) => Self::charted(lattice, chart.clone()),
+            None => Self::uniform(lattice, self.lower, self.upper),
+        }
+    }
+
+    /// The volume of the domain: of the box, or of what is within the curves.
+    pub fn volume(&self) -> f64 {
+        match self.chart() {
+            Some(chart) => chart.volume(),
+            None => self.extent().iter().product(),
+        }
+    }
+
+    /// The smallest width of cells of equal size; with a chart the root of their mean volume.
+    pub(crate) fn equal_cell(&self) -> f64 {
+        let cells = self.lattice.cells();
+        match self.chart() {
+            Some(chart) => (chart.volume() / cells.iter().product::<usize>() as f64).powf(1.0 / D as f64),
+            None => (0..D).map(|d| self.extent()[d] / cells[d] as f64).fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// A mesh over the same lattice and box with other positions of the nodes, in lattice order. It has no chart, even
+    /// if this one has.
     ///
     /// # Errors
     /// [`Failure::WrongLength`] where the number of positions is not the number of nodes; [`Failure::NonFinite`] for
@@ -97,7 +206,8 @@ impl<const D: usize> Mesh<D> {
             let (node, x) = (first_two(&self.lattice.node(k)), first_two(&x[k]));
             return Err(Failure::NonFinite { what: "the mesh", value, node, x });
         }
-        Ok(Self { x, ..*self })
+        let Self { lattice, lower, upper, .. } = *self;
+        Ok(Self { lattice, lower, upper, x, charted: None })
     }
 
     /// This mesh on a lattice of other `cells`: the same map from the computational domain, linear between the nodes of
@@ -115,6 +225,9 @@ impl<const D: usize> Mesh<D> {
     /// ```
     pub fn resampled(&self, cells: [usize; D]) -> Result<Self> {
         let lattice = Lattice::new(cells, self.lattice.periodic())?;
+        if let Some(Charted { chart, places }) = &self.charted {
+            return Ok(Self::over(chart.clone(), places.resampled(cells)?));
+        }
         let (x, here) = (self.closed(), self.lattice.cells());
         let strides = strides(here.map(|n| n + 1));
         let at = |node: [usize; D]| {
@@ -130,7 +243,8 @@ impl<const D: usize> Mesh<D> {
                 std::array::from_fn(|d| sum[d] + weight * x[k][d])
             })
         };
-        Ok(Self { lattice, x: (0..lattice.len()).map(|k| at(lattice.node(k))).collect(), ..*self })
+        let x = (0..lattice.len()).map(|k| at(lattice.node(k))).collect();
+        Ok(Self { lattice, lower: self.lower, upper: self.upper, x, charted: None })
     }
 
     /// The lattice under the mesh.
@@ -143,7 +257,7 @@ impl<const D: usize> Mesh<D> {
         &self.x
     }
 
-    /// The image of a point inside the box. Along bounded axes it is the point itself.
+    /// The image of a point inside the box. Along bounded axes, and in a domain with a chart, it is the point itself.
     ///
     /// # Example
     /// ```
@@ -153,6 +267,9 @@ impl<const D: usize> Mesh<D> {
     /// # Ok::<(), driftmesh::Error>(())
     /// ```
     pub fn image(&self, x: [f64; D]) -> [f64; D] {
+        if self.charted.is_some() {
+            return x;
+        }
         std::array::from_fn(|d| {
             let (lower, upper) = (self.lower[d], self.upper[d]);
             if !self.lattice.periodic()[d] || (lower..upper).contains(&x[d]) {
@@ -166,7 +283,7 @@ impl<const D: usize> Mesh<D> {
 
     /// The [images](Self::image) of all nodes, at which formulas of x and y are evaluated.
     pub fn images(&self) -> Cow<'_, [[f64; D]]> {
-        match self.lattice.periodic().contains(&true) {
+        match self.charted.is_none() && self.lattice.periodic().contains(&true) {
             false => Cow::Borrowed(&self.x),
             true => Cow::Owned(self.x.iter().map(|x| self.image(*x)).collect()),
         }
@@ -179,20 +296,21 @@ impl<const D: usize> Mesh<D> {
         if nodes == self.lattice.cells().map(|n| n + 1) {
             return Cow::Borrowed(&self.x);
         }
-        let extent = self.extent();
+        let jump = self.jump();
         let positions = self.lattice.closed_nodes().map(|node| {
             let x = self.x[self.lattice.index(std::array::from_fn(|d| node[d] % nodes[d]))];
-            std::array::from_fn(|d| x[d] + if node[d] == nodes[d] { extent[d] } else { 0.0 })
+            let turns = (0..D).filter(|&d| node[d] == nodes[d]);
+            turns.fold(x, |x, d| std::array::from_fn(|c| x[c] + jump[d][c]))
         });
         Cow::Owned(positions.collect())
     }
 
-    /// Lower corner of the box.
+    /// Lower corner of the box, or of the smallest one around the domain.
     pub fn lower(&self) -> [f64; D] {
         self.lower
     }
 
-    /// Upper corner of the box.
+    /// Upper corner of the box, or of the smallest one around the domain.
     pub fn upper(&self) -> [f64; D] {
         self.upper
     }
@@ -207,9 +325,12 @@ impl<const D: usize> Mesh<D> {
         (first_two(&self.lattice.node(k)), first_two(&self.x[k]))
     }
 
-    /// What positions jump by on a turn around each axis: the extent of the box along it.
-    pub(crate) fn jump(&self) -> [[f64; D]; D] {
-        diagonal(self.extent())
+    /// What positions jump by on a turn around each axis: the extent of the box along it; nothing on closed axes.
+    pub fn jump(&self) -> [[f64; D]; D] {
+        match self.charted {
+            Some(_) => [[0.0; D]; D],
+            None => diagonal(self.extent()),
+        }
     }
 
     /// The largest distance of a node from its position in another mesh over the same lattice.

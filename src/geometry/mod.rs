@@ -1,14 +1,18 @@
 //! The lattice of computational nodes, the mesh over it, fields on it, and the quality of the mesh.
 
 mod cells;
+mod chart;
+mod curved;
 mod density;
 mod determinant;
 mod dual;
 mod field;
 mod folded;
+mod grid_map;
 mod lattice;
 mod line;
 mod locate;
+mod map;
 mod mesh;
 mod nodal;
 mod patch;
@@ -22,14 +26,18 @@ mod vector;
 pub use cells::{
     Cells, Comparison, cell_areas, cell_jacobians, cell_qualities, compare, interpolate, node_areas, quality,
 };
+pub use chart::Chart;
 pub use density::Density;
 pub(crate) use determinant::{cofactors, determinant};
 pub use dual::{DualCells, padded};
 pub use field::Field;
 pub(crate) use field::largest;
 pub use folded::check_unfolded;
+pub(crate) use folded::mark_folded;
+pub use grid_map::GridMap;
 pub use lattice::Lattice;
 pub(crate) use lattice::{diagonal, strides};
+pub use map::{BetweenCurves, FormulaMap, Map};
 pub use mesh::Mesh;
 pub(crate) use mesh::first_two;
 pub(crate) use nodal::{check_length, check_positive};

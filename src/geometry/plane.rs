@@ -1,9 +1,10 @@
 //! Cells in the plane.
 
-use super::locate::{cells_in_plane, interpolate_in_plane, places_in_plane};
+use super::locate::{cells_in_plane, interpolate_in_plane, parameters_in_plane, places_in_plane};
 use super::points::Place;
 use super::quality::{Quality, jacobians_in_plane, minus, node_areas_in_plane, qualities_in_plane, quality_in_plane};
 use super::{Cells, DualCells, Lattice, Mesh};
+use std::borrow::Cow;
 
 impl Cells<2> for Mesh<2> {
     fn dual_cells(&self) -> DualCells<2> {
@@ -58,6 +59,10 @@ impl Cells<2> for Mesh<2> {
 
     fn holding(&self, points: impl Iterator<Item = [f64; 2]>) -> Vec<[usize; 2]> {
         cells_in_plane(self, points)
+    }
+
+    fn parameters_of<'a>(&self, points: &'a [[f64; 2]]) -> Result<Cow<'a, [[f64; 2]]>, usize> {
+        parameters_in_plane(self, points)
     }
 
     fn places(&self, points: &[[f64; 2]]) -> Vec<Option<Place<2>>> {

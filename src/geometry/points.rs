@@ -34,7 +34,8 @@ pub enum Degree {
 ///
 /// Functions linear in x are exact on any mesh, and polynomials of the degree in each coordinate on uniform meshes.
 /// Beside bounded sides cubics take the four nodes next to the side. Where the cubic map has no ξ close to the one of
-/// the linear map, as among cells of very different shapes, the point is interpolated linearly.
+/// the linear map, as among cells of very different shapes, the point is interpolated linearly. In a domain with a chart
+/// s takes the place of x: no point between a side and its chords is lost, and polynomials of s are exact.
 ///
 /// # Example
 /// ```
@@ -76,6 +77,8 @@ where
     /// # Errors
     /// The index of the first point outside of the mesh, which does not end along periodic axes.
     pub fn new(mesh: &Mesh<D>, points: &[[f64; D]], degree: Degree) -> Result<Self, usize> {
+        let points = &*mesh.parameters_of(points)?;
+        let mesh = mesh.parameters();
         let places = mesh.places(points);
         let mut found = Vec::with_capacity(places.len());
         for (k, place) in places.into_iter().enumerate() {
@@ -197,7 +200,7 @@ impl Axis {
 }
 
 /// Lagrange's polynomial that is 1 at k and 0 at the other whole numbers below `count`, and its derivative.
-fn lagrange(count: usize, k: usize, at: f64) -> (f64, f64) {
+pub(super) fn lagrange(count: usize, k: usize, at: f64) -> (f64, f64) {
     let (mut value, mut slope) = (1.0, 0.0);
     for other in (0..count).filter(|other| *other != k) {
         let scale = 1.0 / (k as f64 - other as f64);

@@ -134,10 +134,10 @@ fn area([a, b, c, d]: Corners) -> f64 {
     0.5 * cross(minus(c, a), minus(d, b))
 }
 
-/// Area of the box over the number of cells, which is every corner Jacobian of the uniform mesh.
+/// Area of the domain over the number of cells, which is every corner Jacobian of the uniform mesh.
 fn uniform_jacobian(mesh: &Mesh<2>) -> f64 {
-    let ([w, h], [n, m]) = (mesh.extent(), mesh.lattice().cells());
-    w * h / (n * m) as f64
+    let [n, m] = mesh.lattice().cells();
+    mesh.volume() / (n * m) as f64
 }
 
 pub(super) fn node_areas_in_plane(mesh: &Mesh<2>) -> Vec<f64> {
@@ -162,7 +162,13 @@ pub(super) fn node_areas_in_plane(mesh: &Mesh<2>) -> Vec<f64> {
 pub(super) fn quality_in_plane(mesh: &Mesh<2>, rho: &[f64], values: &[f64]) -> (Quality, f64) {
     let lattice = mesh.lattice();
     let (rho, values) = (lattice.closed(rho), lattice.closed(values));
-    pulp::Arch::new().dispatch(AllCells { mesh, rho: &rho, values: &values })
+    let (mut quality, integral) = pulp::Arch::new().dispatch(AllCells { mesh, rho: &rho, values: &values });
+    if mesh.chart().is_some() {
+        // ρ is that of the unit box, in which equal cells are those of the map
+        let places = AllCells { mesh: mesh.parameters(), rho: &rho, values: &rho };
+        quality.equidistribution = pulp::Arch::new().dispatch(places).0.equidistribution;
+    }
+    (quality, integral)
 }
 
 /// The figures of all cells as a task for [`pulp`], which compiles it once more for wider vectors and runs what the

@@ -80,12 +80,13 @@ fn counted_from_near<const D: usize>(
     values: &[f64],
     to: &Mesh<D>,
 ) -> Result<(Mesh<D>, Vec<f64>), Failure> {
-    let (lattice, extent) = (from.lattice(), from.extent());
+    let (there, to) = (from.parameters(), to.parameters());
+    let (lattice, extent) = (there.lattice(), there.extent());
     let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
     // by how many nodes the numbering is shifted
     let first: [i64; D] = std::array::from_fn(|d| {
-        let ways = from.x().iter().zip(to.x()).map(|(a, b)| b[d] - a[d]);
-        let cells = ways.sum::<f64>() / (from.x().len() as f64) / extent[d] * nodes[d] as f64;
+        let ways = there.x().iter().zip(to.x()).map(|(a, b)| b[d] - a[d]);
+        let cells = ways.sum::<f64>() / (there.x().len() as f64) / extent[d] * nodes[d] as f64;
         if periodic[d] { cells.round() as i64 } else { 0 }
     });
     if first == [0; D] {
@@ -98,10 +99,10 @@ fn counted_from_near<const D: usize>(
         let [places, turns] = [i64::rem_euclid, i64::div_euclid]
             .map(|part| std::array::from_fn::<i64, D, _>(|d| part(node[d] as i64 + first[d], nodes[d] as i64)));
         let k = lattice.index(places.map(|place| place as usize));
-        x.push(std::array::from_fn(|d| from.x()[k][d] + turns[d] as f64 * extent[d]));
+        x.push(std::array::from_fn(|d| there.x()[k][d] + turns[d] as f64 * extent[d]));
         u.push(values[k]);
     }
-    Ok((from.moved(x)?, u))
+    Ok((from.placed(x)?, u))
 }
 
 /// Values above this are carried in units of it, so that nothing overflows. It is a power of two, so that they keep
@@ -113,8 +114,7 @@ const SHARE: f64 = 0.5;
 
 /// The mesh at a share of the way from one to another.
 fn between<const D: usize>(from: &Mesh<D>, to: &Mesh<D>, share: f64) -> Result<Mesh<D>, Failure> {
-    let x = from.x().iter().zip(to.x()).map(|(a, b)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d])));
-    let mesh = from.moved(x.collect())?;
+    let mesh = from.between(to, share)?;
     check_unfolded(&mesh)?;
     Ok(mesh)
 }

@@ -139,13 +139,13 @@ pub fn stencils(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
 /// # Errors
 /// As [`stencils`], without [`Failure::Folded`].
 pub fn unchecked(mesh: &Mesh<2>, laplacian: Laplacian) -> Result<Stencils> {
-    let (lattice, extent) = (mesh.lattice(), mesh.extent());
+    let lattice = mesh.lattice();
     let patch = Patch::whole(lattice);
     if laplacian == Laplacian::Compact25 {
         return compact25::stencils(mesh, patch);
     }
     // padded like the patch, with positions of nodes on the sides or of images
-    let everything = padded(lattice, mesh.x(), [[extent[0], 0.0], [0.0, extent[1]]]);
+    let everything = padded(lattice, mesh.x(), mesh.jump());
     let width = lattice.nodes()[1] + 2;
     let skip = patch.wraps.map(|wraps| usize::from(!wraps));
     let row = |i: usize| {

@@ -144,7 +144,11 @@ pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f
         node[along] = k;
         x[lattice.index(node)]
     };
-    let (before, after) = (at(node[along].max(1) - 1), at((node[along] + 1).min(nodes[along] - 1)));
+    let (i, n) = (node[along], nodes[along]);
+    let (before, after) = match lattice.periodic()[along] {
+        true => (at((i + n - 1) % n), at((i + 1) % n)),
+        false => (at(i.max(1) - 1), at((i + 1).min(n - 1))),
+    };
     let t = [after[0] - before[0], after[1] - before[1]];
     // rotating the tangent by a right angle points outward on the upper side of axis 0 and on the lower one of axis 1,
     // unless the mesh is mirrored
@@ -170,17 +174,21 @@ fn derivative(
     n: [f64; 2],
 ) -> Result<[(usize, f64); 9], Failure> {
     let (lattice, x) = (mesh.lattice(), mesh.x());
-    let (node, nodes) = (lattice.node(index), lattice.nodes());
-    let first: [usize; 2] = std::array::from_fn(|d| (node[d].max(1) - 1).min(nodes[d] - 3));
+    let (node, nodes, wraps) = (lattice.node(index), lattice.nodes(), lattice.periodic());
+    // the three nodes along each axis
+    let around: [[usize; 3]; 2] = std::array::from_fn(|d| match wraps[d] {
+        true => [nodes[d] - 1, 0, 1].map(|k| (node[d] + k) % nodes[d]),
+        false => [0, 1, 2].map(|k| (node[d].max(1) - 1).min(nodes[d] - 3) + k),
+    });
     let mut points = [index; 9];
-    let around = (0..9).map(|p| lattice.index([first[0] + p / 3, first[1] + p % 3])).filter(|&p| p != index);
-    points[1..].iter_mut().zip(around).for_each(|(point, p)| *point = p);
+    let all = (0..9).map(|p| lattice.index([around[0][p / 3], around[1][p % 3]])).filter(|&p| p != index);
+    points[1..].iter_mut().zip(all).for_each(|(point, p)| *point = p);
     let away = points.map(|p| [x[p][0] - x[index][0], x[p][1] - x[index][1]]);
     let h = away.iter().flatten().fold(0.0_f64, |h, d| h.max(d.abs()));
     let cell: [[f64; 2]; 2] = std::array::from_fn(|d| {
         let [from, to] = [0, 2].map(|k| {
             let mut end = node;
-            end[d] = first[d] + k;
+            end[d] = around[d][k];
             x[lattice.index(end)]
         });
         [0, 1].map(|c| 0.5 * (to[c] - from[c]))

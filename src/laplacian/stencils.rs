@@ -159,7 +159,7 @@ impl Stencils {
 
     /// The same errors in units that are a function of the sum of the magnitudes of all terms.
     fn residuals_in(&self, mesh: &Mesh<2>, unit: impl Fn(f64) -> f64) -> [f64; 7] {
-        let (x, extent, wraps) = (mesh.x(), mesh.extent(), mesh.lattice().periodic());
+        let (x, jump) = (mesh.x(), mesh.jump());
         let mut worst = [0.0_f64; 7];
         for k in 0..self.patch.len() {
             let (own, row) = (self.index(k), self.points(k));
@@ -167,7 +167,8 @@ impl Stencils {
                 std::array::from_fn(|c| {
                     let d = x[index][c] - x[own][c];
                     // the difference to the nearest image
-                    if wraps[c] { d - extent[c] * (d / extent[c]).round() } else { d }
+                    let turn = if mesh.lattice().periodic()[c] { jump[c][c] } else { 0.0 };
+                    if turn > 0.0 { d - turn * (d / turn).round() } else { d }
                 })
             };
             let [i, j] = node(&self.patch, k);

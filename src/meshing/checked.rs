@@ -2,7 +2,7 @@
 
 use super::{Mmpde, Moved, Relaxation, Steps};
 use crate::error::Failure;
-use crate::geometry::{Density, Mesh, check_unfolded};
+use crate::geometry::{Density, Lattice, Mesh, check_unfolded, mark_folded};
 
 /// A folded mesh is blamed on noise where the standard error of the interface values exceeds this share of its shortest
 /// edge.
@@ -45,6 +45,60 @@ pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// The most times that ways are halved.
+const HALVINGS: usize = 16;
+
+/// The mesh whose nodes go to other places of the unit box, some of them only part of the way
+///
+/// Cells with straight edges may fold where those of the unit box do not: where few of them follow a strong curve, as
+/// around the nose of an aerofoil. The nodes of such cells go half as far, again and again, and no node goes more than
+/// twice the share of the way that its neighbours go. The mesh from which they come has no folded cells; where nothing
+/// helps it stays.
+pub(super) fn held_within<const D: usize>(mesh: &Mesh<D>, places: &Mesh<D>) -> Result<Mesh<D>, Failure> {
+    check_unfolded(places)?;
+    let (from, lattice) = (mesh.parameters(), mesh.lattice());
+    let mut shares = vec![1.0; from.x().len()];
+    let mut made = mesh.placed(places.x().to_vec())?;
+    for _ in 0..HALVINGS {
+        let mut marks = vec![false; shares.len()];
+        let any = mark_folded(&made, &mut marks) | mark_folded(made.parameters(), &mut marks);
+        if !any {
+            return Ok(made);
+        }
+        shares.iter_mut().zip(marks).filter(|(_, mark)| *mark).for_each(|(share, _)| *share *= 0.5);
+        even_out(lattice, &mut shares);
+        let ways = from.x().iter().zip(places.x()).zip(&shares);
+        let way =
+            |((a, b), share): ((&[f64; D], &[f64; D]), &f64)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d]));
+        made = mesh.placed(ways.map(way).collect())?;
+    }
+    Ok(mesh.clone())
+}
+
+/// Lowers shares to at most twice those of the neighbours along the lattice.
+fn even_out<const D: usize>(lattice: &Lattice<D>, shares: &mut [f64]) {
+    let (nodes, steps, wraps) = (lattice.nodes(), lattice.strides(), lattice.periodic());
+    loop {
+        let mut changed = false;
+        for k in 0..shares.len() {
+            let node = lattice.node(k);
+            for d in 0..D {
+                let above = match node[d] + 1 < nodes[d] {
+                    true => k + steps[d],
+                    false if wraps[d] => k - node[d] * steps[d],
+                    false => continue,
+                };
+                let [a, b] = [shares[k], shares[above]];
+                (shares[k], shares[above]) = (a.min(2.0 * b), b.min(2.0 * a));
+                changed |= [a, b] != [shares[k], shares[above]];
+            }
+        }
+        if !changed {
+            return;
+        }
+    }
 }
 
 /// Refuses a folded mesh; the failure carries the noise that may have folded it.

@@ -37,7 +37,8 @@ use serde::{Deserialize, Serialize};
 /// mesh at rest, and nodes on sides stay exactly on the box.
 pub trait MeshGenerator<const D: usize = 2>: Send {
     /// The mesh at t + `dt`, from the mesh at t and the density at its nodes. It calls [`solve`](Self::solve), and
-    /// checks what is given and what is returned.
+    /// checks what is given and what is returned. In a domain with a chart it solves for the parameters of the nodes;
+    /// nodes whose cells would fold although those of the unit box do not are held back.
     ///
     /// # Errors
     /// [`Failure::OutOfRange`] for a `dt` or τ that is not finite and positive, and for a prediction, which needs a
@@ -56,10 +57,16 @@ pub trait MeshGenerator<const D: usize = 2>: Send {
     /// ```
     fn step(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &Density, dt: f64) -> Result<Moved<D>, Failure> {
         checked::check_given(equation, mesh, rho, dt)?;
+        let places = mesh.parameters();
         if self.moves() {
-            checked::check_box(mesh)?;
+            checked::check_box(places)?;
         }
-        checked::check_made(self.solve(equation, mesh, rho, dt)?)
+        let moved = self.solve(equation, places, rho, dt)?;
+        let made = match mesh.chart() {
+            Some(_) => Moved { mesh: checked::held_within(mesh, &moved.mesh)?, ..moved },
+            None => moved,
+        };
+        checked::check_made(made)
     }
 
     /// Solves for the new mesh, without checks. Implementations write this method; callers use [`step`](Self::step).

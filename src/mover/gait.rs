@@ -21,7 +21,8 @@ use serde::{Deserialize, Serialize};
 /// ```
 ///
 /// where τ is the mover's to choose ([`Relaxation::Auto`]); a τ that is given stays, and v with it. Corrections below a
-/// hundredth of the shortest edge, the error that the mesh equation is solved to, change nothing.
+/// hundredth of the shortest edge, the error that the mesh equation is solved to, change nothing. In a domain with a
+/// chart nodes go in the unit box: velocities and corrections are those of their parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gait<const D: usize = 2> {
     #[serde(with = "nodal")]
@@ -139,7 +140,8 @@ impl<const D: usize> Gait<D> {
         dt: f64,
         chooses: bool,
     ) -> Self {
-        let pairs = mesh.x().iter().zip(predicted.mesh.x());
+        let mesh = mesh.parameters();
+        let pairs = mesh.x().iter().zip(predicted.mesh.parameters().x());
         let correction: Vec<[f64; D]> = pairs.map(|(x, from)| std::array::from_fn(|d| x[d] - from[d])).collect();
         let mut velocity = predicted.velocity.clone();
         for (v, e) in velocity.iter_mut().zip(&correction) {
@@ -322,19 +324,19 @@ impl<const D: usize> Predicted<D> {
     where
         Mesh<D>: Cells<D>,
     {
-        let mut going = gait.velocity.clone();
+        let (mut going, places) = (gait.velocity.clone(), mesh.parameters());
         // corrections are as large in short steps as in long ones: what was learnt from them says nothing of a much
         // longer one
         if let Some(last) = gait.last.as_ref().filter(|last| dt > LONGER * last.took) {
             going.iter_mut().flatten().for_each(|v| *v *= LONGER * last.took / dt);
         }
         if gain > 0.0 && mesh.lattice().periodic().contains(&true) {
-            go_along(mesh, &mut going, gait.drift(mesh, u));
+            go_along(places, &mut going, gait.drift(places, u));
         }
         for share in SHARES.into_iter().filter(|_| gain > 0.0) {
             let velocity: Vec<[f64; D]> = going.iter().map(|v| v.map(|v| share * v)).collect();
-            let moved = mesh.x().iter().zip(&velocity).map(|(x, v)| std::array::from_fn(|d| x[d] + dt * v[d]));
-            let mesh = mesh.moved(moved.collect())?;
+            let moved = places.x().iter().zip(&velocity).map(|(x, v)| std::array::from_fn(|d| x[d] + dt * v[d]));
+            let mesh = mesh.placed(moved.collect())?;
             if check_unfolded(&mesh).is_ok() {
                 return Ok(Self { mesh, velocity, steps: gait.steps });
             }

@@ -99,7 +99,7 @@ pub fn steps_to_rest<const D: usize>(
 where
     Mesh<D>: Movable<D>,
 {
-    let uniform = Mesh::uniform(*mesh.lattice(), mesh.lower(), mesh.upper()).ok()?;
+    let uniform = mesh.even(*mesh.lattice()).ok()?;
     let start = to_rest(uniform, form, &mut |on| {
         let u = interpolate(mesh, values, on);
         let rho = monitor.density(on, &u, None)?;
@@ -121,8 +121,8 @@ where
         let (u, rho) = followed(&mesh)?;
         let Ok(step) = mover.step(&mesh, &gait, Followed { u: &u[0], rho: &rho }, 1.0) else { break };
         let moved = step.moved.mesh;
-        let farthest = moved.farthest(&mesh);
-        let at_rest = farthest <= AT_REST * moved.shortest_edge();
+        let farthest = moved.parameters().farthest(mesh.parameters());
+        let at_rest = farthest <= AT_REST * moved.parameters().shortest_edge();
         let holds = |most: f64, thin: f64| u.iter().any(|u| holds(&mesh, u, most, thin));
         if holds(JUMP, THIN) {
             return Ok(Start { mesh, end: Ending::Jump, steps: gait.steps() });
@@ -140,7 +140,7 @@ where
 
 /// True where an edge shorter than `thin` uniform cells holds more than the share `most` of the range of u.
 fn holds<const D: usize>(mesh: &Mesh<D>, u: &[f64], most: f64, thin: f64) -> bool {
-    let lattice = mesh.lattice();
+    let (mesh, lattice) = (mesh.parameters(), mesh.lattice());
     let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());
     let size: [f64; D] = std::array::from_fn(|d| mesh.extent()[d] / cells[d] as f64);
     let [low, high] = ends(u.iter().copied());

@@ -20,7 +20,7 @@ pub struct RunDirectory {
 const LOCK: &str = "run.lock";
 
 /// Everything that a run may write, beside its frames.
-const OURS: [&str; 32] = [
+const OURS: [&str; 33] = [
     Checkpoints::LAST,
     "summary.json",
     "study.toml",
@@ -28,6 +28,7 @@ const OURS: [&str; 32] = [
     "run.pvd",
     "compare.pvd",
     "final.npz",
+    "final.vts",
     "report.html",
     "animation.gif",
     "mesh.png",

@@ -192,7 +192,8 @@ impl Frames {
 
     /// Adds what every frame of a mesh in two dimensions has.
     fn complete(&self, scene: &mut Scene) -> Result<()> {
-        let lattice = Lattice::new(scene.cells, scene.periodic)?;
+        let wraps = [0, 1].map(|d| scene.periodic[d] || scene.closed[d]);
+        let lattice = Lattice::new(scene.cells, wraps)?;
         // an unknown may have that name
         let name = if scene.has("rho") { "mesh density" } else { "rho" };
         let density = scene.density.take().unwrap_or_else(|| vec![1.0; scene.points.len()]);

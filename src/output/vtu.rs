@@ -55,16 +55,43 @@ impl Grid {
         for (tag, fields) in [("PointData", &scene.nodal), ("CellData", &scene.in_cells)] {
             let _ = writeln!(xml.text, "<{tag}>");
             for (name, values) in fields {
-                match values {
-                    Values::Scalars(v) => xml.array("Float64", name, 1, v.iter().map(|v| v.to_le_bytes())),
-                    Values::Vectors(v) => xml.vectors(name, v),
-                    Values::Numbers(v) => xml.array("Int32", name, 1, v.iter().map(|n| (*n as i32).to_le_bytes())),
-                }
+                xml.values(name, values);
             }
             let _ = writeln!(xml.text, "</{tag}>");
         }
         xml.text + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
     }
+}
+
+/// A scene as one structured grid, a `.vts` file whose first axis is the first index of the arrays.
+pub(crate) fn structured(scene: &Scene) -> String {
+    let [n, m] = scene.cells;
+    let mut xml = Xml::of(format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"StructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n\
+         <StructuredGrid WholeExtent=\"0 {n} 0 {m} 0 0\">\n<Piece Extent=\"0 {n} 0 {m} 0 0\">\n<Points>\n"
+    ));
+    let nodes = [n + 1, m + 1];
+    xml.vectors("Points", &first_fastest(&scene.points, nodes));
+    xml.text.push_str("</Points>\n");
+    for (tag, fields, size) in [("PointData", &scene.nodal, nodes), ("CellData", &scene.in_cells, [n, m])] {
+        let _ = writeln!(xml.text, "<{tag}>");
+        for (name, values) in fields {
+            let values = match values {
+                Values::Scalars(v) => Values::Scalars(first_fastest(v, size)),
+                Values::Vectors(v) => Values::Vectors(first_fastest(v, size)),
+                Values::Numbers(v) => Values::Numbers(first_fastest(v, size)),
+            };
+            xml.values(name, &values);
+        }
+        let _ = writeln!(xml.text, "</{tag}>");
+    }
+    xml.text + "</Piece>\n</StructuredGrid>\n</VTKFile>\n"
+}
+
+/// Values of an array whose last axis is the fastest, with the first one the fastest.
+fn first_fastest<T: Copy>(values: &[T], [n, m]: [usize; 2]) -> Vec<T> {
+    (0..m).flat_map(|j| (0..n).map(move |i| values[i * m + j])).collect()
 }
 
 /// The file that puts others in time.
@@ -85,6 +112,14 @@ struct Xml {
 impl Xml {
     fn of(text: String) -> Self {
         Self { text, encoder: ZlibEncoder::new(Vec::new(), Compression::fast()) }
+    }
+
+    fn values(&mut self, name: &str, values: &Values) {
+        match values {
+            Values::Scalars(v) => self.array("Float64", name, 1, v.iter().map(|v| v.to_le_bytes())),
+            Values::Vectors(v) => self.vectors(name, v),
+            Values::Numbers(v) => self.array("Int32", name, 1, v.iter().map(|n| (*n as i32).to_le_bytes())),
+        }
     }
 
     /// VTK's vectors have three components.

@@ -156,6 +156,7 @@ fn of_mesh<'a>(run: &'a RunFiles, frames: &[Frame], unknown: &'a str) -> Drawing
             step: 0,
             cells: frame.cells,
             periodic,
+            closed: [0, 1].map(|d| run.closes(d)),
             lower,
             extent: [upper[0] - lower[0], upper[1] - lower[1]],
             points: frame.x.clone(),

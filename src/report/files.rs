@@ -88,8 +88,11 @@ impl RunFiles {
         rest.iter().try_fold(self.study.get(*first)?, |table, key| table.get(key))
     }
 
-    /// A coordinate of a corner of the domain, `lower` or `upper`.
+    /// A coordinate of a corner of the domain, `lower` or `upper`; none where it is no box.
     pub fn corner(&self, which: &str, d: usize) -> Option<f64> {
+        if ["map", "top", "mesh"].into_iter().any(|key| self.setting(&["domain", key]).is_some()) {
+            return None;
+        }
         let value = self.setting(&["domain", which])?.get(d)?;
         value.as_float().or(value.as_integer().map(|n| n as f64))
     }
@@ -97,6 +100,11 @@ impl RunFiles {
     /// Whether an axis is periodic.
     pub fn wraps(&self, d: usize) -> bool {
         self.setting(&["domain", "periodic"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false)
+    }
+
+    /// Whether both ends of an axis are the same curve.
+    pub fn closes(&self, d: usize) -> bool {
+        self.setting(&["domain", "closed"]).and_then(|axes| axes.get(d)?.as_bool()).unwrap_or(false)
     }
 
     /// For a Stefan problem the index of the mesh line that is the front.

@@ -140,8 +140,9 @@ impl Packed {
             };
             let mut json = mesh.json.clone();
             json["name"] = name.into();
-            // only around a periodic axis something changes at its beginning
-            let cuts = [0, 1].map(|d| mesh.cuts[d].iter().filter(|&&cut| cut > 0 || run.wraps(d)).collect::<Vec<_>>());
+            // only around a periodic or closed axis something changes at its beginning
+            let around = |d: usize| run.wraps(d) || run.closes(d);
+            let cuts = [0, 1].map(|d| mesh.cuts[d].iter().filter(|&&cut| cut > 0 || around(d)).collect::<Vec<_>>());
             json["cuts"] = match run.front() {
                 Some(front) if front <= self.first.cells[1] => json!([[], [(front + self.stride / 2) / self.stride]]),
                 _ => json!(cuts),

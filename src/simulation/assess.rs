@@ -22,7 +22,7 @@ where
             squares.iter_mut().zip(&errors).for_each(|(square, error)| *square += error * error);
         }
         let (quality, integral) = state.mesh.quality_and_integral(state.rho.largest(), &squares);
-        let mean = integral / (state.mesh.extent().iter().product::<f64>() * known.len() as f64);
+        let mean = integral / (state.mesh.volume() * known.len() as f64);
         (quality, Some(ErrorNorms { linf, l2: mean.sqrt() }))
     }
 

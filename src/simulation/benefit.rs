@@ -26,7 +26,7 @@ impl Benefit {
     where
         Mesh<D>: Cells<D>,
     {
-        let equal = Mesh::uniform(*mesh.lattice(), mesh.lower(), mesh.upper())?;
+        let equal = mesh.even(*mesh.lattice())?;
         let there = interpolate(mesh, u, &equal);
         let back = interpolate(&equal, &there, mesh);
         let lost = u.iter().zip(&back).fold(0.0, |m, (u, back)| larger(m, u - back));

@@ -38,6 +38,7 @@ pub(crate) struct Course {
 pub(crate) struct Checkpoint<const D: usize = 2> {
     t: f64,
     pub step: usize,
+    /// Positions of the nodes, in a domain with a chart those in the unit box.
     #[serde(with = "nodal")]
     x: Vec<[f64; D]>,
     u: Vec<f64>,
@@ -56,7 +57,7 @@ impl<const D: usize> Checkpoint<D> {
         Self {
             t: *t,
             step: *step,
-            x: mesh.x().to_vec(),
+            x: mesh.parameters().x().to_vec(),
             u: u.values().to_vec(),
             rho: rho.clone(),
             gait: gait.clone(),
@@ -94,7 +95,7 @@ impl<const D: usize> Checkpoint<D> {
         if !course.pace.is_sound(schedule, safety) {
             return damaged("its time steps are none of the run".into());
         }
-        let mesh = mesh.moved(x.clone()).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
+        let mesh = mesh.placed(x.clone()).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
         let u = Field::of(components, u.clone()).map_err(|failure| Unfit::Damaged(failure.to_string()))?;
         let sound = check_unfolded(&mesh).and_then(|()| physics.check(*t, &mesh, &u));
         sound.map_err(|failure| Unfit::Damaged(failure.to_string()))?;

@@ -59,7 +59,7 @@ impl AtStart {
     where
         Mesh<D>: Cells<D>,
     {
-        let area: f64 = mesh.extent().iter().product();
+        let area = mesh.volume();
         let amount = |c: usize, mass: f64, now: f64| {
             let began = self.masses[c];
             // an integral that began with nothing but rounding is no measure

@@ -199,8 +199,7 @@ where
     if share == 1.0 {
         return (mesh, 1.0);
     }
-    let between = from.x().iter().zip(mesh.x()).map(|(a, b)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d])));
-    match from.moved(between.collect()) {
+    match from.between(&mesh, share) {
         Ok(held) if check_unfolded(&held).is_ok() => (held, share),
         _ => (from.clone(), 0.0),
     }
@@ -224,8 +223,7 @@ fn stepped<const D: usize>(
     }
     let Motion { t, dt, old, new } = motion;
     let half = 0.5 * dt;
-    let between = old.x().iter().zip(new.x()).map(|(a, b)| std::array::from_fn(|d| 0.5 * (a[d] + b[d])));
-    let middle = old.moved(between.collect())?;
+    let middle = old.between(new, 0.5)?;
     check_unfolded(&middle)?;
     let (first, cost) = physics.step(Motion { t, dt: half, old, new: &middle }, u)?;
     work += cost;

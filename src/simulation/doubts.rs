@@ -116,7 +116,7 @@ where
     let mut looked = vec![(simulation.physics.initial(state.t, &within), (0..within.x().len()).map(own).collect())];
     let mut places = vec![within];
     if let Some((equal, data)) = initial_on_equal_cells(simulation, state, finer) {
-        looked.push((data, mesh.holding(equal.x().iter().copied())));
+        looked.push((data, mesh.parameters().holding(equal.parameters().x().iter().copied())));
         places.push(equal);
     }
     let names = simulation.physics.unknowns();
@@ -192,13 +192,13 @@ fn initial_on_equal_cells<const D: usize>(
 ) -> Option<(Mesh<D>, Field)> {
     let of = &state.mesh;
     let lattice = Lattice::new(of.lattice().cells().map(|n| finer * n), of.lattice().periodic()).ok()?;
-    let mesh = Mesh::uniform(lattice, of.lower(), of.upper()).ok()?;
+    let mesh = of.even(lattice).ok()?;
     let u = simulation.physics.initial(state.t, &mesh);
     u.values().iter().all(|u| u.is_finite()).then_some((mesh, u))
 }
 
 fn of_box<const D: usize>(mesh: &Mesh<D>) -> f64 {
-    mesh.extent().iter().product()
+    mesh.volume()
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

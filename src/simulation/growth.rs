@@ -60,7 +60,7 @@ where
         if widest.is_empty() {
             return;
         }
-        let (lattice, equal) = (mesh.lattice(), equal_cell(mesh));
+        let (lattice, equal) = (mesh.lattice(), mesh.equal_cell());
         let edges = || {
             (0..D).flat_map(|axis| {
                 let stride = lattice.strides()[axis];
@@ -97,12 +97,6 @@ where
     }
 }
 
-/// The smallest width of cells of equal size.
-fn equal_cell<const D: usize>(mesh: &Mesh<D>) -> f64 {
-    let cells = mesh.lattice().cells();
-    (0..D).map(|d| mesh.extent()[d] / cells[d] as f64).fold(f64::INFINITY, f64::min)
-}
-
 /// A density with which cells get no wider than `widest`, as far as there are nodes for that
 ///
 /// A mesh that follows a front has its widest cells ahead of it. Where small values grow by themselves, a front ahead
@@ -117,7 +111,7 @@ pub(super) fn narrowed<const D: usize>(mesh: &Mesh<D>, rho: &Density, widest: &[
 where
     Mesh<D>: Cells<D>,
 {
-    let equal = equal_cell(mesh);
+    let equal = mesh.equal_cell();
     let shares: Vec<f64> = widest.iter().map(|widest| (equal / widest).min(1.0 / WIDER)).collect();
     let areas = node_areas(mesh);
     let whole = sum(areas.iter().copied());

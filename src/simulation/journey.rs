@@ -53,9 +53,10 @@ where
     let swept = begin.swept(&end);
     let patch = *begin.patch();
     let strides = patch.padded_strides();
-    let metrics = Metrics::new(&state.mesh);
-    let lattice = state.mesh.lattice();
-    let h: [f64; D] = std::array::from_fn(|d| state.mesh.extent()[d] / lattice.cells()[d] as f64);
+    let places = state.mesh.parameters();
+    let metrics = Metrics::new(places);
+    let lattice = places.lattice();
+    let h: [f64; D] = std::array::from_fn(|d| places.extent()[d] / lattice.cells()[d] as f64);
     let unknowns: Vec<(Vec<f64>, f64, f64)> = (0..state.u.components())
         .map(|c| (state.u.component(c).collect::<Vec<f64>>(), range(&state.u, c)))
         .filter(|(_, range)| *range > 0.0)

@@ -25,8 +25,10 @@ pub struct Scene {
     pub step: usize,
     /// Cells along each axis; 0 along the second axis for a line.
     pub cells: [usize; 2],
-    /// Axes that wrap around.
+    /// Axes that go on beyond the box after its end.
     pub periodic: [bool; 2],
+    /// Axes whose ends are the same curve.
+    pub closed: [bool; 2],
     /// Lower corner of the box around the domain.
     pub lower: [f64; 2],
     /// Width and height of that box.
@@ -67,7 +69,8 @@ impl Scene {
             t,
             step,
             cells: first_two(&lattice.cells()),
-            periodic: first_two(&lattice.periodic()),
+            periodic: if mesh.chart().is_some() { [false; 2] } else { first_two(&lattice.periodic()) },
+            closed: mesh.chart().map_or([false; 2], |chart| first_two(&chart.closed())),
             lower: first_two(&mesh.lower()),
             extent: first_two(&mesh.extent()),
             points: mesh.closed().iter().map(|x| first_two(x)).collect(),

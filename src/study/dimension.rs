@@ -4,8 +4,9 @@ use super::kind::SpentBy;
 use super::moving_mesh::{Domain, MovingStudy, Stepper, Time};
 use super::moving_run::{MovingCheckpoint, MovingRun};
 use super::runner::Stage;
+use super::shape::mesh_in;
 use crate::error::{Error, Result, Unfit};
-use crate::geometry::{Lattice, Mesh};
+use crate::geometry::{Chart, Lattice, Mesh};
 use crate::kept::Kept;
 use crate::meshing::{GeneratorKind, LineGeneratorKind, MeshGenerator, Movable};
 use crate::output::RunDirectory;
@@ -15,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Meshes of which a study can be made
 ///
@@ -87,6 +89,18 @@ pub trait Studied<const D: usize>: Movable<D> + Clone + Debug {
     where
         Mesh<D>: Studied<D>;
 
+    /// The chart of a domain that is no box.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] or [`Error::Formula`] with the key below `domain`.
+    fn chart_of(domain: &Domain<D>) -> Result<Option<Arc<Chart<D>>>>;
+
+    /// Equal cells, or their image by the map of the domain.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the grid or the domain makes no mesh.
+    fn in_domain(domain: &Domain<D>, lattice: Lattice<D>) -> Result<Self>;
+
     /// [`Running::leave`](super::Running::leave).
     ///
     /// # Errors
@@ -97,7 +111,7 @@ pub trait Studied<const D: usize>: Movable<D> + Clone + Debug {
 }
 
 macro_rules! studied {
-    ($D:literal, $Pde:ty, $Generator:ty) => {
+    ($D:literal, $Pde:ty, $Generator:ty, $chart:ident, $over:expr) => {
         impl Studied<$D> for Mesh<$D> {
             type Pde = $Pde;
             type Generator = $Generator;
@@ -134,6 +148,19 @@ macro_rules! studied {
                 run.last_scene()
             }
 
+            fn chart_of(domain: &Domain<$D>) -> Result<Option<Arc<Chart<$D>>>> {
+                domain.$chart()
+            }
+
+            fn in_domain(domain: &Domain<$D>, lattice: Lattice<$D>) -> Result<Self> {
+                match domain.$chart()? {
+                    Some(chart) => $over(domain, lattice, chart),
+                    None => {
+                        Self::uniform(lattice, *domain.lower, *domain.upper).map_err(|error| error.within("domain"))
+                    }
+                }
+            }
+
             fn leave(run: &mut MovingRun<$D>, directory: &RunDirectory) -> Result<()> {
                 run.left(directory)
             }
@@ -141,8 +168,8 @@ macro_rules! studied {
     };
 }
 
-studied!(1, LinePdeKind, LineGeneratorKind);
-studied!(2, PdeKind, GeneratorKind);
+studied!(1, LinePdeKind, LineGeneratorKind, check_line, |_, lattice, chart| Self::charted(lattice, chart));
+studied!(2, PdeKind, GeneratorKind, chart, mesh_in);
 
 /// Settings of a table of a study.
 pub trait Settings: Clone + Debug + Serialize + DeserializeOwned + JsonSchema {}
@@ -216,7 +243,7 @@ pub(super) fn check_stepper(stepper: Option<Stepper>, own: Option<Stepper>) -> R
         Some(given) if own == Some(given) => return Ok(()),
         Some(Stepper::Rk4) => (
             "rk4",
-            "steps pde.kind = \"burgers\" in two dimensions on a mesh that stays; set mesh.generator to \
+            "steps pde.kind = \"burgers\" in a box in two dimensions on a mesh that stays; set mesh.generator to \
              { kind = \"fixed\" }, or leave time.stepper out",
         ),
         Some(Stepper::TrBdf2) => ("tr-bdf2", "steps pde.kind = \"formula\"; leave time.stepper out"),
@@ -243,8 +270,13 @@ impl PdeTable<2> for PdeKind {
             let rule = "only a line has them; leave it out, or give one number an axis";
             return Err(Error::invalid("domain.coordinates", format!("{coordinates:?}").to_lowercase(), rule));
         }
-        let periodic = *domain.periodic;
+        let periodic = domain.wraps();
+        let key = if domain.is_box() { "domain.periodic" } else { "domain.closed" };
         let (wrong, rule) = match self {
+            Self::ShallowWater(_) if !domain.is_box() => {
+                let rule = "needs a periodic box; leave the shape of [domain] out, or give the equation by formulas";
+                return Err(Error::invalid("pde.kind", "\"shallow-water\"", rule));
+            }
             Self::Burgers(burgers) if burgers.initial.is_none() => (
                 periodic.contains(&true),
                 "the front of pde.kind = \"burgers\" needs bounded axes; set it to [false, false], or give pde.initial",
@@ -265,16 +297,16 @@ impl PdeTable<2> for PdeKind {
             Self::Prescribed(_) => (false, ""),
         };
         match wrong {
-            true => Err(Error::invalid("domain.periodic", format!("{periodic:?}"), rule)),
+            true => Err(Error::invalid(key, format!("{periodic:?}"), rule)),
             false => Ok(()),
         }
     }
 
-    fn physics(&self, _domain: &Domain<2>, time: &Time, stays: bool) -> Result<Box<dyn Physics<2>>> {
+    fn physics(&self, domain: &Domain<2>, time: &Time, stays: bool) -> Result<Box<dyn Physics<2>>> {
         match (self, time.stepper) {
             (Self::FormulaPde(pde), Some(Stepper::Trapezoid)) => pde.clone().stepped(physics::Stepper::Trapezoid),
             (Self::FormulaPde(pde), Some(Stepper::TrBdf2)) => pde.clone().stepped(physics::Stepper::TrBdf2),
-            (Self::Burgers(burgers), Some(Stepper::Rk4)) if stays => {
+            (Self::Burgers(burgers), Some(Stepper::Rk4)) if stays && domain.is_box() => {
                 let uniform = UniformBurgers::new(burgers.clone(), time.order.unwrap_or(2));
                 return Ok(Box::new(uniform.map_err(|error| error.within("time"))?));
             }

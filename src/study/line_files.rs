@@ -120,6 +120,7 @@ pub(super) fn scene(line: &Line, shown: (usize, f64), t: f64, mesh: &[f64], rang
         step: shown.0,
         cells: [line.cells, 0],
         periodic: [false; 2],
+        closed: [false; 2],
         lower: [a, 0.0],
         extent: [b - a, 0.0],
         points: mesh.iter().map(|x| [*x, 0.0]).collect(),

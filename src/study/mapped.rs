@@ -1,8 +1,8 @@
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Mistake};
-use crate::geometry::{Lattice, Mesh, check_simple, check_unfolded};
+use crate::geometry::{Chart, FormulaMap, Lattice, Mesh, check_simple, check_unfolded};
 use crate::random::{Philox, uniform};
-use crate::setting::pair;
+use crate::setting::{Axes, pair};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -23,6 +23,10 @@ pub struct MappedDomain {
     /// A mapping of the unit square (s, r), in place of `x`, `bottom` and `top`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<Mapping>,
+    /// Which axes of the mapping are closed, so that their ends are the same curve, as in a ring: the axis of the
+    /// parameter along which the map closes, in either direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closed: Option<Axes<bool, 2>>,
     /// How nodes of the unit square are displaced before it is graded and mapped: at random, or by a shear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distort: Option<Distort>,
@@ -159,20 +163,24 @@ impl MappedDomain {
     /// [`Error::Invalid`] or [`Error::Formula`] with the key below `domain` or `grid` that makes no mesh.
     pub fn mesh(&self, cells: [usize; 2], grading: Option<Grading>) -> Result<Mesh<2>> {
         let shape = self.shape().map_err(|error| error.within("domain"))?;
-        let lattice = Lattice::bounded(cells).map_err(|error| error.within("grid"))?;
+        let closed = self.closed.as_ref().map_or([false; 2], |closed| **closed);
+        let lattice = Lattice::new(cells, closed).map_err(|error| error.within("grid"))?;
         if let Some(grading) = grading {
             grading.check().map_err(|error| error.within("grading").within("grid"))?;
         }
         self.check_distortion().map_err(|error| error.within("distort").within("domain"))?;
-        let mut x = Vec::with_capacity(lattice.len());
-        for k in 0..lattice.len() {
-            let mut place = self.distorted(&lattice, k);
-            if let Some(grading) = grading {
-                place = grading.apply(place);
+        let graded = |place| grading.map_or(place, |grading| grading.apply(place));
+        let places: Vec<[f64; 2]> = (0..lattice.len()).map(|k| graded(self.distorted(&lattice, k))).collect();
+        let mesh = match shape {
+            Shape::Image(map) if closed.contains(&true) => {
+                let chart = FormulaMap::new(map).and_then(|map| Chart::oriented(map, closed, true));
+                Mesh::charted(lattice, chart.map_err(|error| error.within("domain"))?)?.placed(places)?
             }
-            x.push(shape.point(place).map_err(|error| error.within("domain"))?);
-        }
-        let mesh = Mesh::mapped(lattice, x)?;
+            shape => {
+                let points = places.into_iter().map(|place| shape.point(place)).collect::<Result<_>>();
+                Mesh::mapped(lattice, points.map_err(|error| error.within("domain"))?)?
+            }
+        };
         match check_unfolded(&mesh).and_then(|()| check_simple(&mesh)) {
             Ok(()) => Ok(mesh),
             Err(failure) => Err(match grading {
@@ -240,6 +248,9 @@ impl MappedDomain {
     }
 
     fn shape(&self) -> Result<Shape> {
+        if self.map.is_none() && self.closed.as_ref().is_some_and(|closed| closed.contains(&true)) {
+            return Err(Error::invalid("closed", "given", "goes with domain.map; leave it out"));
+        }
         if let Some(map) = &self.map {
             let between = [("x", self.x.is_some()), ("bottom", self.bottom.is_some()), ("top", self.top.is_some())];
             if let Some((key, _)) = between.into_iter().find(|(_, given)| *given) {

@@ -24,10 +24,12 @@ mod poisson_run;
 mod remedy;
 mod rest;
 mod runner;
+mod shape;
 mod source;
 mod stefan;
 mod uniform;
 
+pub use crate::output::{GivenMesh, read_mesh};
 pub use any::Study;
 pub use common::{Header, Output, StudyKind};
 pub use dimension::{GeneratorTable, PdeTable, Settings, Studied};

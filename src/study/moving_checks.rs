@@ -8,7 +8,7 @@ use super::moving_run::MovingRun;
 use crate::density::{ArclengthTable, GivenTable, MonitorKind};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::geometry::{Lattice, Mesh};
+use crate::geometry::{Chart, Lattice, Mesh};
 use crate::physics::{StartAndSide, formula};
 use crate::setting::Auto;
 
@@ -101,7 +101,7 @@ where
 
     /// Formulas that are not periodic on periodic axes, and those that contradict each other on a side.
     pub(super) fn contradictions(&self) -> Result<Vec<String>> {
-        let mut warnings = Vec::new();
+        let (mut warnings, chart) = (Vec::new(), Mesh::chart_of(&self.domain)?);
         for (key, text) in self.pde.formulas() {
             let f = formula::<D>(&key, text).map_err(|error| error.within("pde"))?;
             warnings.extend((0..D).filter(|&d| self.domain.periodic[d]).filter_map(|d| self.jump(&key, &f, d)));
@@ -110,7 +110,7 @@ where
             self.pde.starts_and_sides()
         {
             let both = [formula::<D>(&at_start, initial)?, formula::<D>(&on_sides, boundary)?];
-            warnings.extend(self.gap(&at_start, &on_sides, &both, side));
+            warnings.extend(self.gap(chart.as_deref(), [&at_start, &on_sides], &both, side));
         }
         Ok(warnings)
     }
@@ -157,7 +157,7 @@ where
         Err(Error::invalid("time.tolerance", tolerance, rule))
     }
 
-    /// Places on the domain, `SAMPLES` and one along each axis but those along which they stand at one place.
+    /// Places in the box, or in the unit square that the domain is the image of, `SAMPLES` and one along each axis but those along which they stand at one place.
     fn places(&self, at: [Option<f64>; D]) -> impl Iterator<Item = [f64; D]> {
         let (lower, upper) = (*self.domain.lower, *self.domain.upper);
         let count = at.iter().filter(|at| at.is_none()).count() as u32;
@@ -197,20 +197,21 @@ where
     /// Says so where the values on the bounded sides, or on one of them, are not the initial ones at the start.
     fn gap(
         &self,
-        at_start: &str,
-        on_sides: &str,
+        chart: Option<&Chart<D>>,
+        [at_start, on_sides]: [&str; 2],
         [initial, boundary]: &[Formula; 2],
         side: Option<(usize, usize)>,
     ) -> Option<String> {
         let t = self.time.start;
         // of the data everywhere: what is far below that is rounding
-        let all = self.places([None; D]).map(|x| at(initial, x, t).abs());
+        let map = |s: [f64; D]| chart.map_or(s, |chart| chart.at(s));
+        let all = self.places([None; D]).map(|s| at(initial, map(s), t).abs());
         let mut size = all.filter(|u| u.is_finite()).fold(0.0_f64, f64::max);
         let mut worst = (0.0_f64, [0.0; D]);
-        for d in (0..D).filter(|&d| !self.domain.periodic[d]) {
+        for d in (0..D).filter(|&d| !self.domain.wraps()[d]) {
             let ends = [self.domain.lower[d], self.domain.upper[d]].into_iter().enumerate();
             for (_, end) in ends.filter(|(n, _)| side.is_none_or(|side| side == (d, *n))) {
-                for x in self.places(std::array::from_fn(|e| (e == d).then_some(end))) {
+                for x in self.places(std::array::from_fn(|e| (e == d).then_some(end))).map(map) {
                     let [u, side] = [initial, boundary].map(|f| at(f, x, t));
                     size = size.max(u.abs()).max(side.abs());
                     if (u - side).abs() > worst.0 {
@@ -231,7 +232,7 @@ where
     }
 
     fn check_size(&self) -> Result<()> {
-        let lattice = Lattice::new(*self.grid.cells, *self.domain.periodic).map_err(|error| error.within("grid"))?;
+        let lattice = Lattice::new(*self.grid.cells, self.domain.wraps()).map_err(|error| error.within("grid"))?;
         let nodes = lattice.nodes().into_iter().map(|n| n as u128).product();
         super::memory::check_memory(nodes, BYTES_PER_NODE, &*self.grid.cells)
     }

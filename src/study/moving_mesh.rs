@@ -2,6 +2,7 @@
 
 use super::common::{Header, Output};
 use super::dimension::{GeneratorTable, PdeTable, Studied};
+use super::mapped::{Ends, Mapping};
 use crate::density::MonitorKind;
 use crate::error::Result;
 use crate::geometry::{Lattice, Mesh};
@@ -69,7 +70,7 @@ pub struct Compare<G = GeneratorKind> {
     pub generator: G,
 }
 
-/// `[domain]`: the box in which the equation is solved.
+/// `[domain]`: the box in which the equation is solved, or the image of the unit square.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Domain")]
@@ -83,6 +84,25 @@ pub struct Domain<const D: usize = 2> {
     /// Which axes are periodic, so that their ends are the same place.
     #[serde(default = "bounded::<D>")]
     pub periodic: Axes<bool, D>,
+    /// A mapping of the unit square (s, r). The first axis is that of the parameter that turns into the other one
+    /// against the clock; where an axis is closed, it is that of the parameter along which the map closes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<Mapping>,
+    /// Which axes are closed, so that their ends are the same curve, as in a ring.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed: Option<Axes<bool, D>>,
+    /// x at the left and at the right side of a domain between the curves `bottom` and `top`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<Ends>,
+    /// Lower curve of the domain, a formula of x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bottom: Option<String>,
+    /// Upper curve of the domain, a formula of x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub top: Option<String>,
+    /// File with a structured mesh, of which the domain has the shape.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<String>,
     /// The coordinate along a line: with `cylindrical` and `spherical` it is the distance r from an axis or a point, 0
     /// or more, and volumes have the weight r or r². In one dimension only; `cartesian` where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -91,7 +111,18 @@ pub struct Domain<const D: usize = 2> {
 
 impl<const D: usize> Default for Domain<D> {
     fn default() -> Self {
-        Self { lower: origin(), upper: ones(), periodic: bounded(), coordinates: None }
+        Self {
+            lower: origin(),
+            upper: ones(),
+            periodic: bounded(),
+            map: None,
+            closed: None,
+            x: None,
+            bottom: None,
+            top: None,
+            mesh: None,
+            coordinates: None,
+        }
     }
 }
 
@@ -276,13 +307,13 @@ where
         })
     }
 
-    /// Equal cells.
+    /// Equal cells, or their image by the map of the domain.
     ///
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) where the grid or the domain makes no mesh.
     pub fn uniform_mesh(&self) -> Result<Mesh<D>> {
-        let lattice = Lattice::new(*self.grid.cells, *self.domain.periodic).map_err(|error| error.within("grid"))?;
-        Mesh::uniform(lattice, *self.domain.lower, *self.domain.upper).map_err(|error| error.within("domain"))
+        let lattice = Lattice::new(*self.grid.cells, self.domain.wraps()).map_err(|error| error.within("grid"))?;
+        Mesh::in_domain(&self.domain, lattice)
     }
 
     /// The simulation that this study describes.

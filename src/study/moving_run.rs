@@ -137,7 +137,7 @@ where
         let mesh = self.study.uniform_mesh().map_err(|error| Unfit::Damaged(error.to_string()))?;
         let Simulation { physics, schedule, safety, mover, .. } = &mut self.simulation;
         let state = found.state(&mesh, physics.as_ref(), schedule, *safety)?;
-        mover.generator.resume(&mesh, &found.kept)?;
+        mover.generator.resume(mesh.parameters(), &found.kept)?;
         self.meshes = Meshes::resume(&self.study, &mesh, &found.kept)?;
         let Checkpoint { record, course, kept, .. } = found;
         self.history = directory.map(|to| History::resume(&to.join(HISTORY), &kept)).transpose()?;
@@ -254,7 +254,7 @@ where
         let moved = |(t, x): (f64, Vec<f64>)| {
             let (x, rest) = x.as_chunks::<D>();
             check_nodal("mesh at a report", x, mesh.lattice().len() + rest.len())?;
-            Ok((t, mesh.moved(x.to_vec()).map_err(|failure| Unfit::Damaged(failure.to_string()))?))
+            Ok((t, mesh.placed(x.to_vec()).map_err(|failure| Unfit::Damaged(failure.to_string()))?))
         };
         Ok(Self { found: found.into_iter().map(moved).collect::<Result<_, Unfit>>()?, ..Self::of(study) })
     }
@@ -273,7 +273,10 @@ impl<const D: usize> Observer for Meshes<D> {
     }
 
     fn keep(&mut self, kept: &mut Kept) -> Result<()> {
-        kept.put("meshes", &self.found.iter().map(|(t, mesh)| (t, mesh.x().as_flattened())).collect::<Vec<_>>());
+        kept.put(
+            "meshes",
+            &self.found.iter().map(|(t, mesh)| (t, mesh.parameters().x().as_flattened())).collect::<Vec<_>>(),
+        );
         Ok(())
     }
 }

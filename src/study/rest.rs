@@ -32,7 +32,7 @@ where
     Mesh<D>: Studied<D>,
 {
     let mesh = &state.mesh;
-    let cell = (0..D).map(|d| mesh.extent()[d] / mesh.lattice().cells()[d] as f64).fold(f64::INFINITY, f64::min);
+    let cell = mesh.equal_cell();
     let went = record.travelled / cell;
     // a mesh that is meant to stay
     if went > MOVES || study.mesh.generator.stays() {

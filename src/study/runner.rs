@@ -3,7 +3,7 @@
 use super::kind::{Kind, Running, SpentBy};
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::Kept;
-use crate::output::{Behind, Checkpoints, Frames, RunDirectory, Spent, Summary, draw, final_arrays};
+use crate::output::{Behind, Checkpoints, Frames, RunDirectory, Spent, Summary, draw, final_arrays, structured};
 use crate::parallel::join;
 use crate::report;
 use crate::simulation::{Event, Observer, Scene, Snapshot};
@@ -291,6 +291,7 @@ fn draw_all<K: Kind>(
     let picture = || match &drawn {
         Some((scene, title)) => {
             directory.write("final.npz", &final_arrays(scene))?;
+            directory.write("final.vts", structured(scene).as_bytes())?;
             draw(title, scene).write(directory.path(), "mesh")
         }
         None => Ok(()),

@@ -36,7 +36,10 @@ impl MovingMesh {
         let Some(error) = report.error.filter(|error| error.linf > 0.0 && report.t > self.time.start) else {
             return Ok(None);
         };
-        if burgers.initial.is_some() || matches!(self.mesh.generator, crate::meshing::GeneratorKind::Fixed(_)) {
+        if burgers.initial.is_some()
+            || !self.domain.is_box()
+            || matches!(self.mesh.generator, crate::meshing::GeneratorKind::Fixed(_))
+        {
             return Ok(None);
         }
         let [width, height] = [0, 1].map(|d| self.domain.upper[d] - self.domain.lower[d]);

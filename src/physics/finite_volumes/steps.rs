@@ -251,9 +251,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
     {
         let gamma = FIRST_STAGE;
         let (dt, lattice) = (new.t - old.t, old.mesh.lattice());
-        let between = old.mesh.x().iter().zip(new.mesh.x());
-        let between = between.map(|(a, b)| std::array::from_fn(|d| a[d] + gamma * (b[d] - a[d])));
-        let mesh = old.mesh.moved(between.collect())?;
+        let mesh = old.mesh.between(new.mesh, gamma)?;
         let middle = Level::new(law, old.t + gamma * dt, &mesh, None, old.weights);
         let (there, mut work) = self.trapezoid(law, [old, &middle], u.clone(), carried.first())?;
         let there = padded(lattice, &there, [[0.0; B]; D]);

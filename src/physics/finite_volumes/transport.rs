@@ -117,10 +117,7 @@ where
         let mesh = match share {
             0.0 => old.clone(),
             1.0 => new.clone(),
-            _ => {
-                let between = old.x().iter().zip(new.x());
-                old.moved(between.map(|(a, b)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d]))).collect())?
-            }
+            _ => old.between(new, share)?,
         };
         let (cells, t) = (self.law.cells(&mesh), t + share * dt);
         let x = padded(mesh.lattice(), mesh.x(), mesh.jump());
