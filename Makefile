@@ -44,6 +44,7 @@ bench: $(VENV)/ready
 	$(CARGO) bench -p driftmesh --bench formula_pde
 	$(CARGO) bench -p driftmesh --bench checkpoint
 	$(CARGO) bench -p driftmesh --bench density
+	$(CARGO) bench -p driftmesh --bench front
 	$(CARGO) bench -p driftmesh --bench whole_step
 	$(VENV)/bin/python benches/mesh_solve.py
 	$(VENV)/bin/python benches/stencils.py

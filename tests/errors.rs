@@ -461,6 +461,8 @@ fn fronts() {
     let error = front.step(&problem, &mut state, 1.0).unwrap_err();
     assert_says(error, &["past the stability limit"], Some("stepping of the front"), true);
     assert_eq!(state, before);
+    let error = front.step(&Flat(|_| 1.0, -1.0), &mut state, 1e-3).unwrap_err();
+    assert_says(error, &["the bottom is at -1"], Some("the end of the run"), true);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Phases that vanish and appear, and melts below their melting temperature, against exact solutions.
 
 use driftmesh::stefan::{Change, LOWER, UPPER};
-use driftmesh::study::{FrontCourse, Kind, Source, StefanStudy, Study};
+use driftmesh::study::{Begin, FrontCourse, Kind, Source, StefanStudy, Study};
 
 fn source(text: &str, set: &[&str]) -> Source {
     let mut source = Source::new("front", text.to_string());
@@ -158,6 +158,21 @@ fn an_undercooled_melt_freezes() {
     assert!((h / exact - 1.0).abs() <= 5e-3, "{h}, not {exact}");
 }
 
+/// On rows that are too few the front is in doubt, with a number, and a warning at the end.
+#[test]
+fn a_front_on_too_few_rows_is_in_doubt() {
+    for (rows, doubtful) in [(8, true), (60, false)] {
+        let set = format!("grid.cells=[4, 8, {rows}]");
+        let study = StefanStudy::from_source(&source(&undercooled(), &[&set])).unwrap();
+        let out = tempfile::tempdir().unwrap();
+        let summary = study.run(&out.path().join("run"), Begin::Anew, &mut []).unwrap().summary;
+        let doubt = summary.figures.reports[0].front.doubt.unwrap();
+        println!("{rows}: {doubt:e} {:?}", summary.warnings);
+        let warned = summary.warnings.iter().any(|said| said.contains("rows there are too few"));
+        assert!(warned == doubtful && (doubt > 0.01) == doubtful, "{rows}: {doubt:e}");
+    }
+}
+
 /// Upside down the melt is the lower phase; without the key that is refused with its name, and the key without such a
 /// melt, too.
 #[test]
@@ -176,4 +191,43 @@ fn an_undercooled_melt_is_named() {
     let error = Study::from_source(&source(MELT_OUT, &["front.undercooled=true"])).unwrap_err();
     assert!(error.to_string().contains("front.undercooled"), "{error}");
     assert_eq!((LOWER, UPPER), (0, 1));
+}
+
+/// Frank's disc and a flat front, growing into a melt whose undercooling is half of Λ/C, from the exact solution.
+#[test]
+fn undercooled_growth_is_exact_in_the_plane() {
+    const GROWTH: &str = r#"
+[study]
+name = "growth"
+kind = "stefan"
+[domain]
+x = [-0.5, 0.5]
+bottom = "0"
+top = "2"
+[grid]
+cells = [10, 8, 40]
+[front]
+undercooled = true
+[walls]
+sides = "exact"
+[exact]
+kind = "disc-growth"
+far = -0.5
+centre = [0.0, -0.5]
+start_radius = 1.0
+[time]
+duration = 0.2
+"#;
+    let planar = ["exact={ kind = \"planar-growth\", far = -0.5, start_front = 0.5, tilt = 10.0 }"];
+    for set in [&[][..], &planar] {
+        let course = course(GROWTH, set);
+        let start = StefanStudy::from_source(&source(GROWTH, set)).unwrap().begin().unwrap().course.state.front[5];
+        let [error, way] = [course.reports[0].front.error_linf.unwrap(), course.state.front[5] - start];
+        println!("{set:?}: {error:e} of {way}");
+        assert!(way > 0.1 && error <= 5e-3 * way, "{set:?}: {error:e} of {way}");
+    }
+    let error = Study::from_source(&source(GROWTH, &["front.undercooled=false"])).unwrap_err();
+    assert!(error.to_string().contains("front.undercooled"), "{error}");
+    let error = Study::from_source(&source(GROWTH, &["exact.far=-1.0"])).unwrap_err();
+    assert!(error.to_string().contains("latent heat over capacity"), "{error}");
 }

@@ -88,7 +88,10 @@ fn the_slides_problem_meets_its_figures() {
     assert!(fourth(h) < 1e-4, "{:e}", fourth(h));
     let last = finished.course.reports[2];
     assert!(last.energy_imbalance.unwrap() <= 0.01);
-    assert!(last.energy_imbalance_by_differences.unwrap() > 0.02);
+    let energy = finished.course.state.energy;
+    let change = energy.now - energy.start;
+    assert!((change - energy.inflow).abs() <= 0.01 * change.abs());
+    assert!((change - energy.inflow_by_differences).abs() > 0.02 * change.abs());
     // the heavier filter leaves a kink at the walls for good
     let heavy = compute("stefan-slides", &["front.filter=[1, 2, 1]".into()]);
     assert!((heavy.course.state.front[0] - 1.2247).abs() <= 5e-4);
@@ -199,29 +202,17 @@ fn a_run_that_fails_keeps_its_last_good_state() {
     let slides = |set: &[&str]| {
         compute("stefan-slides", &set.iter().chain(&["time.report=[]"]).map(|s| s.to_string()).collect::<Vec<_>>())
     };
+    // ice at its melting point melts until it is gone, first where it is thinnest
+    for set in [
+        &["phase.lower.boundary=\"1.25\"", "grid.cells=[10, 6, 6]", "time.end=6.0", "time.step=0.002"][..],
+        &["phase.lower.boundary=\"1.25 + 40*t\"", "time.end=4.0", "front.stepping=\"implicit\""],
+    ] {
+        let melts = ["phase.upper.boundary=\"0\"", "phase.upper.initial=\"0\""];
+        let finished = slides(&[set, &melts].concat());
+        println!("{set:?}: {:?} {:?}", finished.failure, finished.course.phases);
+        assert!(finished.failure.is_none() && finished.course.phases.len() == 1, "{:?}", finished.failure);
+    }
     for (finished, name) in [
-        (
-            slides(&[
-                "phase.lower.boundary=\"1.25\"",
-                "phase.upper.boundary=\"0\"",
-                "phase.upper.initial=\"0\"",
-                "grid.cells=[10, 6, 6]",
-                "time.end=6.0",
-                "time.step=0.002",
-            ]),
-            "upper phase vanishes",
-        ),
-        // ice at its melting point melts until it is gone
-        (
-            slides(&[
-                "phase.lower.boundary=\"1.25 + 40*t\"",
-                "phase.upper.boundary=\"0\"",
-                "phase.upper.initial=\"0\"",
-                "time.end=4.0",
-                "front.stepping=\"implicit\"",
-            ]),
-            "left the box",
-        ),
         (slides(&["time.step=0.04"]), "stability limit"),
         // the warm wall turns cold
         (
@@ -230,10 +221,8 @@ fn a_run_that_fails_keeps_its_last_good_state() {
                 "phase.upper.boundary=\"-1.25 + 60*t\"",
                 "time.step=0.002",
             ]),
-            "wrong side",
+            "beyond the melting temperature",
         ),
-        // and back again, with a pole at t = 0.5
-        (slides(&["phase.upper.boundary=\"-1.25/(1 - 2*t)\"", "time.end=0.8", "front.stepping=\"implicit\""]), ""),
     ] {
         let error = finished.failure.as_ref().unwrap_or_else(|| panic!("{name}"));
         println!("{error}");

@@ -166,6 +166,10 @@ class WrongSide(MeshError):
     """The warm phase lies on the wrong side of the front: the problem is ill-posed."""
 
 
+class WallPassesMelting(MeshError):
+    """The wall of a phase passes the melting temperature, where the other phase would appear with a second front."""
+
+
 class NotABox(MeshError, ValueError):
     """A mesh generator met a mesh whose sides are not those of the box around it: it would pull them straight."""
 

@@ -152,20 +152,20 @@ pub fn areas<'py>(py: Python<'py>, mesh: Given<'py>) -> PyResult<Array<'py>> {
 
 /// A nodal field on another mesh.
 #[pyfunction]
-#[pyo3(signature = (values, old, new, conservative, threads))]
+#[pyo3(signature = (values, old, new, how, threads))]
 pub fn transfer<'py>(
     py: Python<'py>,
     values: PyReadonlyArrayDyn<'py, f64>,
     old: Given<'py>,
     new: Given<'py>,
-    conservative: bool,
+    how: (u8, Option<[f64; 2]>),
     threads: Threads,
 ) -> PyResult<Array<'py>> {
     fn carried<'py, const D: usize>(
         py: Python<'py>,
         values: &PyReadonlyArrayDyn<'py, f64>,
         [old, new]: [&Given<'py>; 2],
-        conservative: bool,
+        (order, bounds): (u8, Option<[f64; 2]>),
         threads: Threads,
     ) -> PyResult<Array<'py>>
     where
@@ -175,8 +175,10 @@ pub fn transfer<'py>(
         let lattice = *old.lattice();
         let values = nodal(&lattice, values)?;
         let carried = compute(py, threads, move || {
-            if conservative {
-                return geometry::remap(&old, &values, &new);
+            // 1 stands for interpolation
+            if order > 1 {
+                let how = if order == 3 { geometry::Remap::Parabolic(bounds) } else { geometry::Remap::Limited };
+                return Ok(geometry::remap_all(&old, &[&values], &new, how)?.swap_remove(0));
             }
             geometry::check_unfolded(&old)?;
             geometry::check_unfolded(&new)?;
@@ -184,7 +186,7 @@ pub fn transfer<'py>(
         })?;
         array(py, &lattice, &carried.map_err(|failure| plain(py, failure))?)
     }
-    in_dimensions!(old, carried(py, &values, [&old, &new], conservative, threads))
+    in_dimensions!(old, carried(py, &values, [&old, &new], how, threads))
 }
 
 /// Nodal fields, one a row, at points, one a row; nothing but its index where a point lies outside.

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -241,3 +242,36 @@ def test_a_missing_extra_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(ImportError, match=r"pip install 'driftmesh\[meshio\]'"):
         bent().to_meshio()
+
+
+def test_a_bump_survives_a_hundred_meshes(capsys):
+    """By parabolas its peak loses at most a hundredth; the integral and 0 <= u <= 1 are kept, of many fields at once."""
+    start = Mesh.uniform(cells=(40, 40))
+    bump = np.exp(-((start.x - 0.5) ** 2 + (start.y - 0.5) ** 2) / 0.02)
+    u, mesh = np.stack([bump, 0.5 * bump, 1 - bump], axis=-1), start
+    for k in range(101):
+        amount = 0.03 * np.sin(k) if k < 100 else 0.0
+        wave = amount * np.sin(2 * np.pi * start.x) * np.sin(np.pi * start.y)
+        new = start.moved(start.x + wave, start.y)
+        u, mesh = transfer(u, mesh, new, order=3, bounds=(0, 1), told=k == 100), new
+    told = capsys.readouterr().out.splitlines()
+    assert len(told) == 3 and all("the peak lost" in line and "the integral is off by" in line for line in told)
+    assert u.min() >= 0 and u.max() <= 1
+    assert 0.99 <= u[..., 0].max()
+    off = ((u - np.stack([bump, 0.5 * bump, 1 - bump], axis=-1)) * start.areas[..., None]).sum(axis=(0, 1))
+    assert np.abs(off).max() < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"order": 4}, "`order` is 4"),
+        ({"method": "interpolate", "order": 3}, "leave them out"),
+        ({"bounds": (0, 1)}, "order=3"),
+        ({"order": 3, "bounds": (1, 0)}, "`bounds` is"),
+    ],
+)
+def test_how_a_field_is_carried_is_checked(arguments, said):
+    mesh = bent()
+    with pytest.raises(ValueError, match=re.escape(said)):
+        transfer(np.ones(SHAPE), mesh, mesh, **arguments)

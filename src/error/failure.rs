@@ -253,10 +253,7 @@ pub enum Failure {
         remedies: Vec<Remedy>,
     },
     /// The sides of a mesh touch or cross each other, although no cell is folded.
-    #[error(
-        "the mesh touches itself: its sides meet at {}, in cells {} and {}",
-        place(x), tuple(cells[0]), tuple(cells[1])
-    )]
+    #[error("the mesh touches itself at {}, in cells {} and {}", place(x), tuple(cells[0]), tuple(cells[1]))]
     SelfTouching {
         /// The cells at both sides.
         cells: [[usize; 2]; 2],
@@ -274,10 +271,7 @@ pub enum Failure {
         condition: f64,
     },
     /// The front reached a wall.
-    #[error(
-        "the front left the box: at x = {} it is at y = {}, and the {wall} at y = {}",
-        short(x[0]), short(x[1]), short(*y)
-    )]
+    #[error("the front left the box: it is at {}, and the {wall} at y = {}", place(x), short(*y))]
     FrontOutside {
         /// Where the front is.
         x: [f64; 2],
@@ -325,6 +319,18 @@ pub enum Failure {
         x: [f64; 2],
         /// D₀ ∂u₀/∂y + D₁ ∂u₁/∂y.
         slope: f64,
+    },
+    /// The wall of a phase passes the melting temperature, where the other phase would appear with a second front.
+    #[error("the {wall} is at {value:.4e} at x = {}, beyond the melting temperature {melting}", short(*x))]
+    WallPassesMelting {
+        /// The wall, `bottom` or `top`.
+        wall: &'static str,
+        /// Where.
+        x: f64,
+        /// Its temperature.
+        value: f64,
+        /// T_m.
+        melting: f64,
     },
     /// A mesh generator met a mesh whose sides are not those of the box around it: it would pull them straight.
     #[error(

@@ -89,7 +89,8 @@ impl Failure {
             | Self::VanishingPhase { .. }
             | Self::NotAGraph { .. }
             | Self::FrontUnstable { .. }
-            | Self::WrongSide { .. } => self.of_fronts(),
+            | Self::WrongSide { .. }
+            | Self::WallPassesMelting { .. } => self.of_fronts(),
             _ => self.of_meshes(),
         }
     }
@@ -221,6 +222,9 @@ impl Failure {
             ],
             Self::FrontOutside { .. } | Self::VanishingPhase { .. } => {
                 vec![Remedy::any([earlier, Say("move the walls away")])]
+            }
+            Self::WallPassesMelting { .. } => {
+                vec![Remedy::any([earlier, Say("keep the wall on its side of the melting temperature")])]
             }
             Self::NotAGraph { .. } => vec![
                 Remedy::any([earlier, Refine(Setting::Cells)]),

@@ -44,6 +44,6 @@ pub(crate) use nodal::{check_length, check_positive};
 pub use patch::Patch;
 pub use points::{Degree, Interpolator, Place};
 pub use quality::Quality;
-pub use remap::remap;
+pub use remap::{Remap, remap, remap_all};
 pub use simple::check_simple;
 pub(crate) use vector::{dot, length};

@@ -1,5 +1,8 @@
 use super::{Cells, DualCells, Mesh, check_unfolded, padded};
 use crate::error::Failure;
+use crate::parallel::map;
+
+mod parabolic;
 
 /// Carries a nodal field from one mesh to another over the same lattice and domain and keeps its integral
 ///
@@ -45,31 +48,84 @@ pub fn remap<const D: usize>(from: &Mesh<D>, values: &[f64], to: &Mesh<D>) -> Re
 where
     Mesh<D>: Cells<D>,
 {
+    let mut carried = remap_all(from, &[values], to, Remap::Limited)?;
+    Ok(carried.swap_remove(0))
+}
+
+/// How a field is carried by [`remap_all`].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Remap {
+    /// As [`remap`] does: second order where u is smooth, first at extrema, within the range of the neighbours.
+    #[default]
+    Limited,
+    /// Parabolas along each axis, third order there also at extrema, which hardly lose height; within the range of all
+    /// values or within these bounds.
+    Parabolic(Option<[f64; 2]>),
+}
+
+/// Carries many fields as [`remap`] does, by limited slopes or by parabolas.
+///
+/// # Errors
+/// As [`remap`].
+///
+/// # Panics
+/// As [`remap`].
+pub fn remap_all<const D: usize>(
+    from: &Mesh<D>,
+    fields: &[&[f64]],
+    to: &Mesh<D>,
+    how: Remap,
+) -> Result<Vec<Vec<f64>>, Failure>
+where
+    Mesh<D>: Cells<D>,
+{
     assert_eq!(from.lattice(), to.lattice(), "both meshes need the same lattice");
-    assert_eq!(values.len(), from.lattice().len(), "one value a node");
+    assert!(fields.iter().all(|u| u.len() == from.lattice().len()), "one value a node");
     check_unfolded(from)?;
     check_unfolded(to)?;
-    let (begin, values) = counted_from_near(from, values, to)?;
-    let (from, values) = (&begin, values.as_slice());
+    let (begin, mut fields) = counted_from_near(from, fields, to)?;
+    let from = &begin;
+    // the difference of the two largest numbers may overflow
+    let ranges: Vec<[f64; 2]> = fields.iter().map(|u| range(u, [0.0; 2])).collect();
+    let unit = |[low, high]: [f64; 2]| if high.max(-low) > LARGE { LARGE.recip() } else { 1.0 };
+    for (u, range) in fields.iter_mut().zip(&ranges) {
+        u.iter_mut().for_each(|u| *u *= unit(*range));
+    }
+    let bounds: Vec<[f64; 2]> = fields.iter().map(|u| within(u, how)).collect();
     let (mut cells, last) = (DualCells::new(from), DualCells::new(to));
     let steps = (largest_share(&cells, &last) / SHARE).ceil().max(1.0);
-    // the difference of the two largest numbers may overflow
-    let [low, high] = values.iter().fold([0.0_f64; 2], |[low, high], &u| [low.min(u), high.max(u)]);
-    let unit = if high.max(-low) > LARGE { LARGE.recip() } else { 1.0 };
-    let mut u: Vec<f64> = values.iter().map(|u| u * unit).collect();
+    let mut mesh = from.clone();
     for step in 1..=steps as usize {
-        let next =
-            if step as f64 == steps { last.clone() } else { DualCells::new(&between(from, to, step as f64 / steps)?) };
-        u = stepped(from, &u, &cells, &next);
-        cells = next;
+        let next_mesh = if step as f64 == steps { to.clone() } else { between(from, to, step as f64 / steps)? };
+        let next = DualCells::new(&next_mesh);
+        let widths = (how != Remap::Limited).then(|| parabolic::Widths::of(&mesh, &cells));
+        fields = map(&fields.into_iter().zip(&bounds).collect::<Vec<_>>(), |(u, bounds)| match &widths {
+            None => stepped(from, u, &cells, &next),
+            Some(widths) => parabolic::stepped(from.lattice(), u, [&cells, &next], widths, **bounds),
+        });
+        (mesh, cells) = (next_mesh, next);
     }
-    match u.iter().position(|u| !u.is_finite()) {
-        None if unit == 1.0 => Ok(u),
-        None => Ok(u.into_iter().map(|u| (u / unit).clamp(low, high)).collect()),
-        Some(k) => {
+    let finished = |(u, range): (Vec<f64>, [f64; 2])| match (u.iter().position(|u| !u.is_finite()), unit(range)) {
+        (None, 1.0) => Ok(u),
+        (None, unit) => Ok(u.into_iter().map(|u| (u / unit).clamp(range[0], range[1])).collect()),
+        (Some(k), _) => {
             let (what, value, (node, x)) = ("the carried field", u[k], to.told(k));
             Err(Failure::NonFinite { what, value, node, x })
         }
+    };
+    fields.into_iter().zip(ranges).map(finished).collect()
+}
+
+/// The smallest and the largest of some values and of `known`.
+fn range(u: &[f64], known: [f64; 2]) -> [f64; 2] {
+    u.iter().fold(known, |[low, high], &u| [low.min(u), high.max(u)])
+}
+
+/// The bounds that a field is kept in: those given, but for what it has itself beyond them.
+fn within(u: &[f64], how: Remap) -> [f64; 2] {
+    match how {
+        Remap::Parabolic(Some(bounds)) => range(u, bounds),
+        _ => range(u, [f64::INFINITY, f64::NEG_INFINITY]),
     }
 }
 
@@ -77,9 +133,9 @@ where
 /// ones of `to`.
 fn counted_from_near<const D: usize>(
     from: &Mesh<D>,
-    values: &[f64],
+    fields: &[&[f64]],
     to: &Mesh<D>,
-) -> Result<(Mesh<D>, Vec<f64>), Failure> {
+) -> Result<(Mesh<D>, Vec<Vec<f64>>), Failure> {
     let (there, to) = (from.parameters(), to.parameters());
     let (lattice, extent) = (there.lattice(), there.extent());
     let (nodes, periodic) = (lattice.nodes(), lattice.periodic());
@@ -90,19 +146,20 @@ fn counted_from_near<const D: usize>(
         if periodic[d] { cells.round() as i64 } else { 0 }
     });
     if first == [0; D] {
-        return Ok((from.clone(), values.to_vec()));
+        return Ok((from.clone(), fields.iter().map(|u| u.to_vec()).collect()));
     }
-    let (mut x, mut u) = (Vec::with_capacity(values.len()), Vec::with_capacity(values.len()));
-    for k in 0..values.len() {
+    let (mut x, mut order) = (Vec::with_capacity(lattice.len()), Vec::with_capacity(lattice.len()));
+    for k in 0..lattice.len() {
         let node = lattice.node(k);
         // the node on each axis, and the turns that lead there
         let [places, turns] = [i64::rem_euclid, i64::div_euclid]
             .map(|part| std::array::from_fn::<i64, D, _>(|d| part(node[d] as i64 + first[d], nodes[d] as i64)));
         let k = lattice.index(places.map(|place| place as usize));
         x.push(std::array::from_fn(|d| there.x()[k][d] + turns[d] as f64 * extent[d]));
-        u.push(values[k]);
+        order.push(k);
     }
-    Ok((from.placed(x)?, u))
+    let fields = fields.iter().map(|u| order.iter().map(|&k| u[k]).collect()).collect();
+    Ok((from.placed(x)?, fields))
 }
 
 /// Values above this are carried in units of it, so that nothing overflows. It is a power of two, so that they keep
@@ -291,5 +348,31 @@ mod tests {
         let from = bent(8, false, 0.0);
         let to = bent(8, false, 0.5);
         assert!(matches!(remap(&from, &vec![1.0; 81], &to), Err(Failure::Folded { .. })));
+    }
+
+    /// Fields that are carried by parabolas: a bump that goes a hundred times to another mesh and back keeps its peak
+    /// but for a hundredth, its integral to round-off, and its range.
+    #[test]
+    fn a_bump_survives_the_journey() {
+        let bump = |mesh: &Mesh<2>| -> Vec<f64> {
+            mesh.x().iter().map(|[x, y]| (-((x - 0.5).powi(2) + (y - 0.5).powi(2)) / 0.02).exp()).collect()
+        };
+        let start = bent(40, false, 0.0);
+        let mut meshes: Vec<Mesh<2>> = (0..100).map(|k| bent(40, false, 0.03 * (k as f64).sin())).collect();
+        meshes.push(start.clone());
+        let journey = |how: Remap| {
+            let (mut mesh, mut u) = (start.clone(), bump(&start));
+            for next in &meshes {
+                u = remap_all(&mesh, &[&u], next, how).unwrap().swap_remove(0);
+                mesh = next.clone();
+            }
+            let before = bump(&start);
+            assert!((sum(&start, &before) - sum(&mesh, &u)).abs() < 1e-14);
+            assert!(u.iter().all(|u| (0.0..=1.0).contains(u)));
+            1.0 - u.iter().copied().fold(0.0, f64::max)
+        };
+        let [limited, parabolic] = [Remap::Limited, Remap::Parabolic(Some([0.0, 1.0]))].map(journey);
+        println!("{limited:e} {parabolic:e}");
+        assert!(parabolic <= 0.01 && parabolic < 0.2 * limited, "lost {parabolic:e}, limited {limited:e}");
     }
 }

@@ -20,7 +20,7 @@ pub struct RunDirectory {
 const LOCK: &str = "run.lock";
 
 /// Everything that a run may write, beside its frames.
-const OURS: [&str; 33] = [
+const OURS: [&str; 35] = [
     Checkpoints::LAST,
     "summary.json",
     "study.toml",
@@ -46,6 +46,8 @@ const OURS: [&str; 33] = [
     "quality.svg",
     "contraction.png",
     "contraction.svg",
+    "temperature.png",
+    "temperature.svg",
     "energy.png",
     "energy.svg",
     "front-error.png",

@@ -58,8 +58,8 @@ impl FramesAt {
 
 /// `frames/*.vtu` and the `run.pvd` that puts them in time, for ParaView, PyVista and meshio
 ///
-/// A frame holds what its scene does. To a mesh in two dimensions it adds ρ and the velocity of the mesh at the nodes,
-/// and the number of the subdomain in the cells; ρ is 1 where no density moves the mesh.
+/// A frame holds what its scene does. To a mesh in two dimensions that a density moves it adds ρ at the nodes and the
+/// number of the subdomain in the cells, and to every mesh that moves its velocity at the nodes.
 #[derive(Debug)]
 pub struct Frames {
     directory: PathBuf,
@@ -194,14 +194,18 @@ impl Frames {
     fn complete(&self, scene: &mut Scene) -> Result<()> {
         let wraps = [0, 1].map(|d| scene.periodic[d] || scene.closed[d]);
         let lattice = Lattice::new(scene.cells, wraps)?;
-        // an unknown may have that name
-        let name = if scene.has("rho") { "mesh density" } else { "rho" };
-        let density = scene.density.take().unwrap_or_else(|| vec![1.0; scene.points.len()]);
-        let velocity = lattice.closed(&self.velocity(scene.t, lattice.len())).into_owned();
-        let subdomains = Decomposition::new(&lattice, self.subdomains)?.of_cells();
-        scene.add_to_cells("subdomain", Values::Numbers(subdomains));
-        scene.nodal.push((name.into(), Values::Scalars(density)));
-        scene.nodal.push(("mesh velocity".into(), Values::Vectors(velocity)));
+        let moves = scene.moves();
+        if let Some(density) = scene.density.take() {
+            // an unknown may have that name
+            let name = if scene.has("rho") { "mesh density" } else { "rho" };
+            let subdomains = Decomposition::new(&lattice, self.subdomains)?.of_cells();
+            scene.add_to_cells("subdomain", Values::Numbers(subdomains));
+            scene.nodal.push((name.into(), Values::Scalars(density)));
+        }
+        if moves {
+            let velocity = lattice.closed(&self.velocity(scene.t, lattice.len())).into_owned();
+            scene.nodal.push(("mesh velocity".into(), Values::Vectors(velocity)));
+        }
         Ok(())
     }
 

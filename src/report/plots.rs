@@ -14,7 +14,7 @@ struct Group {
     columns: &'static [(&'static str, &'static str)],
 }
 
-const GROUPS: [Group; 10] = [
+const GROUPS: [Group; 11] = [
     Group {
         name: "error",
         title: "Error over time",
@@ -38,6 +38,19 @@ const GROUPS: [Group; 10] = [
         scale: Scale::Linear,
         line: false,
         columns: &[("front_mean", "mean"), ("front_min", "lowest point"), ("front_max", "highest point")],
+    },
+    Group {
+        name: "temperature",
+        title: "Temperatures of the walls",
+        label: "temperature (units of u)",
+        scale: Scale::Linear,
+        line: false,
+        columns: &[
+            ("bottom_temperature", "mean of the bottom"),
+            ("top_temperature", "mean of the top"),
+            ("temperature_min", "lowest"),
+            ("temperature_max", "highest"),
+        ],
     },
     Group {
         name: "quality",
@@ -82,7 +95,7 @@ const GROUPS: [Group; 10] = [
     Group {
         name: "energy",
         title: "Imbalance of heat over time",
-        label: "share of the heat that passed (dimensionless)",
+        label: "share of the heat that was moved (dimensionless)",
         scale: Scale::Logarithmic,
         line: false,
         columns: &[

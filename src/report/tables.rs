@@ -28,7 +28,7 @@ const MANY: usize = 8;
 const SHOWN: usize = 250;
 
 /// Names of the entries of a summary, by the end of their paths, with their meanings where these are not plain.
-const NAMES: [(&str, &str, &str); 58] = [
+const NAMES: [(&str, &str, &str); 60] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -80,7 +80,9 @@ const NAMES: [(&str, &str, &str); 58] = [
     ("front.mean", "mean height of the front", ""),
     ("front.range", "its lowest and highest point", ""),
     ("front.error_linf", "largest error of the front", "against the exact solution"),
-    ("energy_imbalance", "imbalance of heat", "as a share of what passed, with fluxes by weighted residual"),
+    ("front.doubt", "doubt of the front", "share of its way by which gradients over one more row would change it"),
+    ("front.bare", "bare walls", "share of the columns at which a phase is missing"),
+    ("energy_imbalance", "imbalance of heat", "as a share of what was moved, with fluxes by weighted residual"),
     ("energy_imbalance_by_differences", "… with fluxes by differences", ""),
     ("step_limit", "longest stable step", "of the explicit front, as estimated"),
     ("error_linf", "largest error", "against the discrete solution on one domain"),

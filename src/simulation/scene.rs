@@ -92,6 +92,11 @@ impl Scene {
         self.in_cells.push((name, values));
     }
 
+    /// Whether its mesh moves: by a density, or with a front.
+    pub fn moves(&self) -> bool {
+        self.density.is_some() || !self.curve.is_empty()
+    }
+
     /// Whether some values at the nodes have this name.
     pub fn has(&self, name: &str) -> bool {
         self.nodal.iter().any(|(taken, _)| taken == name)

@@ -3,7 +3,7 @@
 use super::columns::{LOWER, UPPER};
 use super::conduct::{Fields, present, velocity};
 use super::energy::{Energy, Phase, total};
-use super::solver::{Front, FrontState, Problem};
+use super::solver::{Front, FrontState, Problem, Sides};
 
 /// The state at an instant of a step, with its share of the step in an integral over time.
 pub(super) struct Instant<'a> {
@@ -56,48 +56,75 @@ impl Front {
         let [before, after] = [&state.fields(), end].map(|fields| self.contents(fields));
         let mut energy = state.energy;
         energy.now = total(&self.columns, &end.h, after.map(|content| content[0]), self.latent_heat());
+        let sensible = [LOWER, UPPER].map(|phase| after[phase][0] - before[phase][0]);
+        let change = energy.now - state.energy.now;
+        let latent = change - sensible[LOWER] - sensible[UPPER];
         let flux = [LOWER, UPPER].map(|wall| self.has_flux(problem, wall, state.t));
-        match end.alone {
-            // what flows through a wall with a given temperature is what is missing
-            Some(phase) if flux != [true; 2] => {
-                let change = after[phase][0] - before[phase][0];
-                energy.inflow += change;
-                energy.inflow_by_differences += change;
-                return energy;
+        // what flows through a wall with a given temperature, or in part through one, is what is missing
+        let unknown = end.alone.is_some() && flux != [true; 2] || end.bare.iter().any(Option::is_some);
+        let mut through = [[0.0; 2]; 2];
+        if unknown {
+            through[LOWER] = [change; 2];
+        } else {
+            if end.alone.is_none() {
+                for phase in (0..2).filter(|&phase| !flux[phase]) {
+                    through[phase][0] = after[phase][1] - before[phase][1];
+                }
             }
-            Some(_) => (),
-            None => {
-                let unseen = [LOWER, UPPER].map(|phase| after[phase][1] - before[phase][1]);
-                energy.inflow += (0..2).filter(|&phase| !flux[phase]).map(|phase| unseen[phase]).sum::<f64>();
+            for instant in instants {
+                let inflow = self.inflow(problem, instant);
+                (0..4).for_each(|k| through[k / 2][k % 2] += instant.dt * inflow[k / 2][k % 2]);
             }
         }
-        for instant in instants {
-            let [inflow, by_differences] = self.inflow(problem, instant);
-            energy.inflow += instant.dt * inflow;
-            energy.inflow_by_differences += instant.dt * by_differences;
-        }
+        energy.inflow += through[LOWER][0] + through[UPPER][0];
+        energy.inflow_by_differences += through[LOWER][1] + through[UPPER][1];
+        let walls = through.map(|[inflow, _]| inflow);
+        energy.moved += 0.5 * walls.iter().chain(&sensible).chain(&[latent]).map(|part| part.abs()).sum::<f64>();
         energy
     }
 
-    /// Flux in through walls and sides at an instant, but for d/dt ∫C (u − T_m) Φ of phases without a given flux; and
-    /// the whole flux by differences.
-    fn inflow(&self, problem: &dyn Problem, instant: &Instant<'_>) -> [f64; 2] {
+    /// Flux in through wall and sides of each phase at an instant, but for d/dt ∫C (u − T_m) Φ of phases without a
+    /// given flux; and the whole flux by differences.
+    fn inflow(&self, problem: &dyn Problem, instant: &Instant<'_>) -> [[f64; 2]; 2] {
         let (y, above) = (self.heights(&instant.fields.h), self.above_melting(&instant.fields.u));
         let from = self.heights(instant.from);
-        let mut sums = [0.0; 2];
+        let mut sums = [[0.0; 2]; 2];
         for phase in present(instant.fields.alone) {
             let at = self.phase(phase, &y, &above);
             let given = self.given_flux(problem, phase, (phase, &instant.fields.u), instant.t);
-            sums[0] += given.unwrap_or_else(|| at.flow(&velocity(&from[phase], &y[phase], instant.over)));
-            sums[1] += given.unwrap_or_else(|| at.wall_flux());
+            sums[phase][0] = given.unwrap_or_else(|| at.flow(&velocity(&from[phase], &y[phase], instant.over)));
+            sums[phase][1] = given.unwrap_or_else(|| at.wall_flux());
             if instant.fields.alone.is_some() {
                 let other = self.given_flux(problem, 1 - phase, (phase, &instant.fields.u), instant.t).unwrap_or(0.0);
-                sums = sums.map(|sum| sum + other);
+                sums[1 - phase] = [other; 2];
             }
-            if !self.mirrored() {
-                let [all, unseen] = at.side_fluxes();
-                sums[0] += if given.is_some() { all } else { unseen };
-                sums[1] += all;
+            let through_sides = match self.sides {
+                Sides::Neumann => None,
+                Sides::Exact => Some(at.side_fluxes()),
+                Sides::Flux => Some(self.side_inflow(problem, &at, &instant.fields.u[phase], instant.t)),
+            };
+            if let Some([all, unseen]) = through_sides {
+                sums[phase][0] += if given.is_some() { all } else { unseen };
+                sums[phase][1] += all;
+            }
+        }
+        sums
+    }
+
+    /// What flows in through the sides of a phase: ∫q and ∫q (1 − Φ).
+    fn side_inflow(&self, problem: &dyn Problem, phase: &Phase<'_>, u: &[f64], t: f64) -> [f64; 2] {
+        let (x, nodes) = (self.columns.x(), self.columns.rows(phase.phase) + 1);
+        let mut sums = [0.0; 2];
+        for (side, i) in [0, x.len() - 1].into_iter().enumerate() {
+            let flux = |k: usize| {
+                let at = self.side_flux(problem, (phase.phase, side), [phase.y, u], (k, t));
+                let [flux, _] = at.unwrap_or_default();
+                [flux, flux * (1.0 - phase.test(k))]
+            };
+            for k in i * nodes..(i + 1) * nodes - 1 {
+                let half = 0.5 * (phase.y[k + 1] - phase.y[k]);
+                let [a, b] = [flux(k), flux(k + 1)];
+                (0..2).for_each(|c| sums[c] += half * (a[c] + b[c]));
             }
         }
         sums

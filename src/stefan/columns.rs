@@ -8,7 +8,9 @@ pub const UPPER: usize = 1;
 
 /// A phase counts as vanished where it is thinner than this share of the distance between the walls: its rows could
 /// then no longer be told apart.
-const VANISHED: f64 = 2e-3;
+const VANISHED: f64 = 1e-3;
+/// Where the wall of a phase is bare, the front lies at this share of the distance between the walls before it.
+pub(super) const FILM: f64 = 1.5e-3;
 /// Largest slope |dh/dx| of a front that is a graph over x; steeper ones are about to turn over.
 const STEEP: f64 = 10.0;
 
@@ -20,6 +22,8 @@ const STEEP: f64 = 10.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     x: Vec<f64>,
+    /// Distance of neighbouring columns in the stencils: another one than that of x where all columns are alike.
+    width: f64,
     walls: [Vec<f64>; 2],
     rows: [usize; 2],
     /// For each row of a phase, its share of the way from the lower to the upper end of the phase.
@@ -57,7 +61,21 @@ impl Columns {
             (0..=rows).map(share).collect()
         });
         let walls = walls.map(|wall| x.iter().map(|&x| wall(x)).collect());
-        Ok(Self { x, walls, rows: [cells[1], cells[2]], shares })
+        let width = (x[n] - x[0]) / n as f64;
+        Ok(Self { x, width, walls, rows: [cells[1], cells[2]], shares })
+    }
+
+    /// Says that nothing depends on x. Stencils then take columns to be no narrower than rows are high, since of
+    /// flat columns the exchange along x would leave nothing of that along y but round-off.
+    pub fn alike(&mut self) {
+        let gap = self.gap(0);
+        self.width = self.spacing().max(gap / (self.rows[LOWER] + self.rows[UPPER]) as f64);
+    }
+
+    /// How many times a row is higher than a column of the stencils is wide.
+    pub fn flatness(&self) -> f64 {
+        let rows = (self.rows[LOWER] + self.rows[UPPER]) as f64;
+        (0..self.x.len()).map(|i| self.gap(i)).fold(0.0, f64::max) / (rows * self.width)
     }
 
     /// x of each column.
@@ -84,6 +102,16 @@ impl Columns {
     /// Height of the wall of a phase, the bottom for the lower one.
     pub fn wall(&self, phase: usize) -> &[f64] {
         &self.walls[phase]
+    }
+
+    /// Distance between the walls at a column.
+    pub(super) fn gap(&self, i: usize) -> f64 {
+        self.walls[UPPER][i] - self.walls[LOWER][i]
+    }
+
+    /// Height of the front at a column where the wall of a phase is bare.
+    pub(super) fn film(&self, phase: usize, i: usize) -> f64 {
+        self.walls[phase][i] + if phase == LOWER { FILM } else { -FILM } * self.gap(i)
     }
 
     /// Distance of a front at height y from the nearer wall at a column, a hundredth of that between the walls at
@@ -114,16 +142,16 @@ impl Columns {
 
     /// The mesh of m nodes a column at heights y; with `mirrored`, one more column beyond each side.
     pub(super) fn mesh(&self, m: usize, y: &[f64], mirrored: bool) -> Result<Mesh<2>> {
-        let n = self.x.len();
-        let h = self.spacing();
+        let (n, h) = (self.x.len(), self.width);
+        let at = |i: usize| if h == self.spacing() { self.x[i] } else { i as f64 * h };
         let mut nodes = Vec::with_capacity((n + 2) * m);
         let mut column = |x: f64, i: usize| nodes.extend(y[i * m..(i + 1) * m].iter().map(|&y| [x, y]));
         if mirrored {
-            column(self.x[0] - h, 1);
+            column(at(0) - h, 1);
         }
-        (0..n).for_each(|i| column(self.x[i], i));
+        (0..n).for_each(|i| column(at(i), i));
         if mirrored {
-            column(self.x[n - 1] + h, n - 2);
+            column(at(n - 1) + h, n - 2);
         }
         let across = n - 1 + if mirrored { 2 } else { 0 };
         Mesh::mapped(Lattice::bounded([across, m - 1])?, nodes)
@@ -154,11 +182,11 @@ impl Columns {
     }
 
     /// Refuses a front that leaves the space between the walls, leaves too little of a phase, or is too steep to be a
-    /// graph.
+    /// graph. At columns where the wall of a phase is `bare` there may be little of it.
     ///
     /// # Errors
     /// [`Failure::NonFinite`], [`Failure::FrontOutside`], [`Failure::VanishingPhase`] or [`Failure::NotAGraph`].
-    pub fn check(&self, front: &[f64]) -> Result<(), Failure> {
+    pub fn check(&self, front: &[f64], bare: &[Option<usize>]) -> Result<(), Failure> {
         for (i, (&x, &y)) in self.x.iter().zip(front).enumerate() {
             if !y.is_finite() {
                 return Err(Failure::NonFinite { what: "the front", value: y, node: [i, self.rows[LOWER]], x: [x, y] });
@@ -172,7 +200,7 @@ impl Columns {
             }
             let of = top - bottom;
             for (phase, thickness) in [("lower", y - bottom), ("upper", top - y)] {
-                if thickness < VANISHED * of {
+                if thickness < VANISHED * of && bare.get(i).is_none_or(Option::is_none) {
                     return Err(Failure::VanishingPhase { phase, x, thickness, of });
                 }
             }

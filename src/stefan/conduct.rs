@@ -3,8 +3,8 @@
 use super::columns::{LOWER, UPPER};
 use super::front::tilt;
 use super::heat::{HeatStep, carry};
-use super::solver::{Front, Problem, Transfer};
-use crate::error::{Failure, Result};
+use super::solver::{Front, Problem, Sides, Transfer};
+use crate::error::{Error, Failure, Result};
 use crate::numerics::larger;
 
 /// How often the slope at a wall whose flux depends on temperature is sought before a step is given up. Two to four
@@ -12,6 +12,8 @@ use crate::numerics::larger;
 const MOST_SLOPES: usize = 40;
 /// What such slopes may change over a row once they are found, as a share of the largest temperature.
 const SETTLED: f64 = 1e-12;
+/// By what share of a phase a place on the front is taken to lie within it.
+const INSIDE: f64 = 1e-7;
 
 /// Heights of the front and temperatures of both phases, or a linear combination of several of these.
 #[derive(Debug, Clone)]
@@ -20,6 +22,29 @@ pub(super) struct Fields {
     pub u: [Vec<f64>; 2],
     /// The phase that fills the box, if one does: the front then lies on the wall of the other one.
     pub alone: Option<usize>,
+    /// At each column the phase, if there is one, whose wall the other one reaches.
+    pub bare: Vec<Option<usize>>,
+}
+
+/// A phase, and what it reaches.
+#[derive(Clone, Copy)]
+pub(super) struct Reach<'a> {
+    pub phase: usize,
+    pub alone: Option<usize>,
+    pub bare: &'a [Option<usize>],
+}
+
+impl Reach<'_> {
+    /// The wall, by the phase that it belongs to, at the lower or the upper end of a column; none where the front is.
+    fn wall(&self, end: usize, i: usize) -> Option<usize> {
+        let wall = if end == 0 { LOWER } else { UPPER };
+        (self.phase == wall || self.alone.is_some() || self.bare[i] == Some(wall)).then_some(wall)
+    }
+
+    /// Whether the phase is missing at a column.
+    pub fn missing(&self, i: usize) -> bool {
+        self.bare[i] == Some(self.phase)
+    }
 }
 
 /// The phases that there are.
@@ -35,17 +60,23 @@ impl Fields {
             (0..values[0].len()).map(at).collect()
         };
         let u = [LOWER, UPPER].map(|phase| add(parts.map(|(_, fields)| &fields.u[phase][..])));
-        Self { h: add(parts.map(|(_, fields)| &fields.h[..])), u, alone: parts[0].1.alone }
+        let Self { alone, bare, .. } = parts[0].1;
+        Self { h: add(parts.map(|(_, fields)| &fields.h[..])), u, alone: *alone, bare: bare.clone() }
+    }
+
+    /// A phase of these.
+    pub fn reach(&self, phase: usize) -> Reach<'_> {
+        Reach { phase, alone: self.alone, bare: &self.bare }
     }
 }
 
 impl Front {
-    /// Temperatures at time `t` after a step of `dt` from `from`, when the front is at `h`.
+    /// Temperatures at time `t` after a step of `dt` from `from`, when the front is at `h`, from a guess.
     pub(super) fn conduct(
         &mut self,
         problem: &dyn Problem,
         from: &Fields,
-        h: &[f64],
+        (h, guess): (&[f64], &[Vec<f64>; 2]),
         [t, dt]: [f64; 2],
     ) -> Result<[Vec<f64>; 2]> {
         let (old, new) = (self.heights(&from.h), self.heights(h));
@@ -61,34 +92,39 @@ impl Front {
                 }
             }
             let ale = (self.transfer == Transfer::Ale).then_some(&velocity[..]);
-            out[phase] = self.conduct_in(problem, (phase, from.alone), [new, &out[phase]], ale, [t, dt])?;
+            out[phase] =
+                self.conduct_in(problem, from.reach(phase), [new, &out[phase], &guess[phase]], ale, [t, dt])?;
         }
         Ok(out)
     }
 
-    /// Temperatures of a phase at time `t` after a step of `dt`, from those at the start and the heights at the end.
+    /// Temperatures of a phase at time `t` after a step of `dt`, from heights at the end, temperatures at the start and
+    /// a guess.
     pub(super) fn conduct_in(
         &mut self,
         problem: &dyn Problem,
-        (phase, alone): (usize, Option<usize>),
-        [y, u]: [&[f64]; 2],
+        reach: Reach<'_>,
+        [y, u, guess]: [&[f64]; 3],
         velocity: Option<&[f64]>,
         [t, dt]: [f64; 2],
     ) -> Result<Vec<f64>> {
-        let mut now = self.given(problem, (phase, alone), y, u, t)?;
-        let mut slopes = self.end_slopes(problem, (phase, alone), &now, t)?;
+        let phase = reach.phase;
+        let mut now = self.given(problem, reach, y, guess, t)?;
+        let mut edges = self.edges(problem, reach, [y, &now], t)?;
         let mut miss = f64::INFINITY;
         for _ in 0..MOST_SLOPES {
             let mut solver = std::mem::take(&mut self.solvers[phase]);
-            let solved = self.heat(phase, dt, [y, u, &now], velocity, &slopes).solve(&mut solver, self.laplacian);
+            let solved = self.heat(reach, dt, [y, u, &now], velocity, &edges).solve(&mut solver, self.laplacian);
             self.solvers[phase] = solver;
-            now = solved?;
-            let next = self.end_slopes(problem, (phase, alone), &now, t)?;
-            miss = self.slopes_miss(phase, [&slopes, &next], y, &now);
+            let (found, work) = solved?;
+            self.spent += work;
+            now = found;
+            let next = self.edges(problem, reach, [y, &now], t)?;
+            miss = self.edges_miss(phase, [&edges, &next], y, &now);
             if miss <= SETTLED {
                 return Ok(now);
             }
-            slopes = next;
+            edges = next;
         }
         Err(Failure::NewtonStalled { residual: miss, tolerance: SETTLED, iterations: MOST_SLOPES }.into())
     }
@@ -104,9 +140,10 @@ impl Front {
         let y = self.heights(&at.h);
         let mut gain = at.u.each_ref().map(|u| vec![0.0; u.len()]);
         for phase in present(at.alone) {
-            let slopes = self.end_slopes(problem, (phase, at.alone), &at.u[phase], t)?;
+            let edges = self.edges(problem, at.reach(phase), [&y[phase], &at.u[phase]], t)?;
             let fields = [&y[phase][..], &at.u[phase], &at.u[phase]];
-            gain[phase] = self.heat(phase, dt, fields, Some(&velocity[phase]), &slopes).gain(self.laplacian)?;
+            gain[phase] =
+                self.heat(at.reach(phase), dt, fields, Some(&velocity[phase]), &edges).gain(self.laplacian)?;
         }
         Ok(gain)
     }
@@ -114,55 +151,51 @@ impl Front {
     /// The step of the heat equation in a phase, for heights, temperatures at the start and given ones.
     pub(super) fn heat<'a>(
         &'a self,
-        phase: usize,
+        reach: Reach<'a>,
         dt: f64,
         [y, u, sides]: [&'a [f64]; 3],
         velocity: Option<&'a [f64]>,
-        slopes: &'a [Slopes; 2],
+        edges: &'a Edges,
     ) -> HeatStep<'a> {
-        let (columns, mirrored) = (&self.columns, self.mirrored());
-        let ends = slopes.each_ref().map(|slopes| slopes.as_deref());
+        let columns = &self.columns;
         HeatStep {
             columns,
-            phase,
-            diffusivity: self.material.diffusivity(phase),
+            reach,
+            diffusivity: self.material.diffusivity(reach.phase),
             dt,
             y,
             velocity,
             u,
             sides,
-            ends,
-            mirrored,
+            edges,
+            held: self.held(),
         }
     }
 
     /// `u` with the temperatures that are given at time `t`: on the front, on walls without a flux and on sides.
-    fn given(
-        &self,
-        problem: &dyn Problem,
-        (phase, alone): (usize, Option<usize>),
-        y: &[f64],
-        u: &[f64],
-        t: f64,
-    ) -> Result<Vec<f64>> {
+    fn given(&self, problem: &dyn Problem, reach: Reach<'_>, y: &[f64], u: &[f64], t: f64) -> Result<Vec<f64>> {
+        let phase = reach.phase;
         let (nodes, last) = (self.columns.rows(phase) + 1, self.columns.x().len() - 1);
-        let ends = [0, 1].map(|end| wall_at(phase, alone, end));
-        let flux = ends.map(|wall| wall.is_some_and(|wall| self.has_flux(problem, wall, t)));
+        let flux = [LOWER, UPPER].map(|wall| self.has_flux(problem, wall, t));
         let mut given = u.to_vec();
         for (k, given) in given.iter_mut().enumerate() {
             let (i, j) = (k / nodes, k % nodes);
-            let side = !self.mirrored() && (i == 0 || i == last);
+            let side = self.held() && (i == 0 || i == last);
             let end = if j == 0 { Some(0) } else { (j + 1 == nodes).then_some(1) };
-            let of = match end {
-                Some(end) if ends[end].is_none() => {
-                    *given = self.material.melting;
-                    continue;
-                }
-                Some(end) if side || !flux[end] => ends[end].unwrap_or(phase),
-                _ if side => phase,
+            let wall = end.map(|end| reach.wall(end, i));
+            let of = match wall {
+                _ if reach.missing(i) => None,
+                Some(Some(wall)) if side || !flux[wall] => Some(wall),
+                Some(None) => None,
+                _ if side => Some(phase),
                 _ => continue,
             };
-            *given = problem.boundary(of, [self.columns.x()[i], y[k]], t);
+            let Some(of) = of else {
+                *given = self.material.melting;
+                continue;
+            };
+            let place = [self.columns.x()[i], y[k]];
+            *given = if side { problem.side(of, place, t) } else { problem.boundary(of, place, t) };
             if !given.is_finite() {
                 return Err(self.columns.not_finite("the boundary temperature", *given, phase, k, y[k]).into());
             }
@@ -176,19 +209,64 @@ impl Front {
         problem.flux(phase, place, self.material.melting, t).is_some()
     }
 
-    /// Slopes at the lowest and the highest row of a phase, where these lie on walls with a given flux.
-    fn end_slopes(
+    /// Slopes at the edges of a phase with these heights and temperatures, where fluxes are given.
+    fn edges(&self, problem: &dyn Problem, reach: Reach<'_>, [y, u]: [&[f64]; 2], t: f64) -> Result<Edges> {
+        let flux = [LOWER, UPPER].map(|wall| self.has_flux(problem, wall, t));
+        let slopes = |end: usize| {
+            let at = |i: usize| reach.wall(end, i).filter(|wall| flux[*wall] && !reach.missing(i));
+            let walls: Vec<Option<usize>> = (0..self.columns.x().len()).map(at).collect();
+            let Some(wall) = walls.iter().copied().flatten().next() else { return Ok(None) };
+            let all = self.wall_slopes(problem, [reach.phase, wall], u, t)?;
+            Ok::<_, Error>(Some(walls.iter().zip(all).map(|(wall, slope)| wall.map(|_| slope)).collect()))
+        };
+        let sides = [0, 1].map(|side| match self.sides {
+            Sides::Flux => self.side_slopes(problem, (reach.phase, side), [y, u], t),
+            Sides::Neumann | Sides::Exact => Ok(None),
+        });
+        let [left, right] = sides;
+        Ok(Edges { ends: [slopes(0)?, slopes(1)?], sides: [left?, right?] })
+    }
+
+    /// What flows into a phase through the left or the right side at its k-th node. Formulas that tell the phases apart
+    /// take a node on the front to be within the phase.
+    pub(super) fn side_flux(
         &self,
         problem: &dyn Problem,
-        (phase, alone): (usize, Option<usize>),
-        u: &[f64],
+        (phase, side): (usize, usize),
+        [y, u]: [&[f64]; 2],
+        (k, t): (usize, f64),
+    ) -> Option<[f64; 2]> {
+        let (nodes, [front, wall]) = (self.columns.rows(phase) + 1, self.columns.ends(phase));
+        let first = k / nodes * nodes;
+        let next = if front == 0 { 1 } else { front - 1 };
+        let [to_wall, to_next] = [y[first + wall] - y[k], u[first + next] - u[k]];
+        let inside = if k - first == front { INSIDE } else { 0.0 };
+        let place = [self.columns.x()[k / nodes], y[k] + inside * to_wall];
+        problem.side_flux(side, place, u[k] + inside * to_next, t)
+    }
+
+    /// a and b of the outward slope ∂u/∂n = a + b u at each row of the left or the right side; none where nothing
+    /// flows.
+    fn side_slopes(
+        &self,
+        problem: &dyn Problem,
+        (phase, side): (usize, usize),
+        [y, u]: [&[f64]; 2],
         t: f64,
-    ) -> Result<[Slopes; 2]> {
-        let slopes = |end: usize| match wall_at(phase, alone, end) {
-            Some(wall) if self.has_flux(problem, wall, t) => self.wall_slopes(problem, [phase, wall], u, t).map(Some),
-            _ => Ok(None),
+    ) -> Result<Option<Vec<[f64; 2]>>> {
+        let nodes = self.columns.rows(phase) + 1;
+        let i = if side == 0 { 0 } else { self.columns.x().len() - 1 };
+        let slope = |j: usize| {
+            let k = i * nodes + j;
+            let Some([flux, by_u]) = self.side_flux(problem, (phase, side), [y, u], (k, t)) else { return Ok(None) };
+            if !flux.is_finite() {
+                return Err(self.columns.not_finite("the flux through a side", flux, phase, k, y[k]));
+            }
+            let conductivity = self.material.conductivity[phase];
+            Ok(Some([(flux - by_u * u[k]) / conductivity, by_u / conductivity]))
         };
-        Ok([slopes(0)?, slopes(1)?])
+        let slopes: Vec<Option<[f64; 2]>> = (0..nodes).map(slope).collect::<Result<_, Failure>>()?;
+        Ok(slopes.into_iter().collect())
     }
 
     /// a and b of the slope ∂u/∂y = a + b u at each column of a wall with a given flux q
@@ -225,29 +303,39 @@ impl Front {
         Ok((0..x.len()).map(slope).collect::<Result<_, _>>()?)
     }
 
-    /// The largest change between slopes at walls over the row next to them, as a share of the temperatures.
-    fn slopes_miss(&self, phase: usize, [before, after]: [&[Slopes; 2]; 2], y: &[f64], u: &[f64]) -> f64 {
-        let nodes = self.columns.rows(phase) + 1;
+    /// The largest change between slopes at edges over the row or column next to them, as a share of the temperatures.
+    fn edges_miss(&self, phase: usize, [before, after]: [&Edges; 2], y: &[f64], u: &[f64]) -> f64 {
+        let (nodes, last) = (self.columns.rows(phase) + 1, self.columns.x().len() - 1);
         let mut miss = 0.0;
         for (end, [at, next]) in [[0, 1], [nodes - 1, nodes - 2]].into_iter().enumerate() {
-            let (Some(before), Some(after)) = (&before[end], &after[end]) else { continue };
-            for (i, ([a, b], [c, d])) in before.iter().zip(after).enumerate() {
+            let (Some(before), Some(after)) = (&before.ends[end], &after.ends[end]) else { continue };
+            for (i, pair) in before.iter().zip(after).enumerate() {
+                let (Some([a, b]), Some([c, d])) = pair else { continue };
                 let k = i * nodes;
                 miss = larger(miss, (c - a + (d - b) * u[k + at]) * (y[k + at] - y[k + next]));
+            }
+        }
+        for (side, i) in [0, last].into_iter().enumerate() {
+            let (Some(before), Some(after)) = (&before.sides[side], &after.sides[side]) else { continue };
+            for (j, ([a, b], [c, d])) in before.iter().zip(after).enumerate() {
+                miss = larger(miss, (c - a + (d - b) * u[i * nodes + j]) * self.columns.spacing());
             }
         }
         miss / u.iter().copied().fold(f64::MIN_POSITIVE, larger)
     }
 }
 
-/// a and b of the slope ∂u/∂y = a + b u at each column, where no temperature is given.
-pub(super) type Slopes = Option<Vec<[f64; 2]>>;
-
-/// The wall, by the phase that it belongs to, at the lower or the upper end of a phase; none where the front is.
-fn wall_at(phase: usize, alone: Option<usize>, end: usize) -> Option<usize> {
-    let wall = if end == 0 { LOWER } else { UPPER };
-    (phase == wall || alone.is_some()).then_some(wall)
+/// Slopes at the edges of a phase where no temperature is given.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Edges {
+    /// At the lowest and the highest row.
+    pub ends: [Slopes; 2],
+    /// a and b of the outward slope ∂u/∂n = a + b u at each row of the left and the right side; none where it is 0.
+    pub sides: [Option<Vec<[f64; 2]>>; 2],
 }
+
+/// a and b of the slope ∂u/∂y = a + b u at each column, where no temperature is given.
+pub(super) type Slopes = Option<Vec<Option<[f64; 2]>>>;
 
 /// Velocities of nodes that have moved from `old` to `new` heights.
 pub(super) fn velocity(old: &[f64], new: &[f64], dt: f64) -> Vec<f64> {

@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 /// line source:  u₁ = Q/(4πk₁) (E₁(r²/4D₁t) − E₁(λ²/D₁))                u₀ = T₀ (1 − E₁(r²/4D₀t) / E₁(λ²/D₀))
 /// ```
 ///
+/// and growth into a melt below its melting temperature, in which u₁ = 0 and u₀ is as above, flat or around a centre;
 /// with temperatures above that of melting, and the front at s = 2λ√t or r = 2λ√t. s is the distance from a wall that
 /// rises to the right by an angle, r the distance from the source; λ follows from the condition on the front.
 ///
@@ -58,12 +59,7 @@ impl Similarity {
         warm("wall", wall, material.melting)?;
         cold(far, material.melting)?;
         let [wall, far] = given.map(|u| u - material.melting);
-        if tilt.is_nan() || tilt.abs() > 60.0 {
-            return Err(Error::invalid("tilt", tilt, "must be between -60 and 60 degrees"));
-        }
-        if !offset.is_finite() {
-            return Err(Error::invalid("offset", offset, "must be a finite number"));
-        }
+        let [sin, cos] = tilted(tilt, offset)?;
         let [warm, ice] = [LOWER, UPPER].map(|phase| material.diffusivity(phase).sqrt());
         let [warm_k, ice_k] = material.conductivity;
         let lambda = root(|l| {
@@ -73,7 +69,6 @@ impl Similarity {
             l - (melting + freezing) / (material.latent_heat * PI.sqrt())
         });
         let lambda = within_reach(lambda, ["wall", "far"], given)?;
-        let (sin, cos) = tilt.to_radians().sin_cos();
         Ok(Self { shape: Shape::Planar { wall, tilt: [sin, cos], offset }, far, material, lambda })
     }
 
@@ -100,12 +95,54 @@ impl Similarity {
         Ok(Self { shape: Shape::LineSource { strength, centre }, far, material, lambda })
     }
 
+    /// A flat front that grows into a melt of temperature `far`: λ √π e^(λ²/D) erfc(λ/√D) = C (T_m − T₀) √D / Λ.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless the melt is colder than melting, by less than Λ/C, and the tilt below 60 degrees.
+    pub fn planar_growth(far: f64, material: Material, tilt: f64, offset: f64) -> Result<Self> {
+        let cold = undercooling(far, &material)?;
+        let d = material.diffusivity(UPPER);
+        let lambda = root(|l| {
+            let heat = -cold * material.conductivity[UPPER] / d.sqrt() / scaled_erfc(l / d.sqrt());
+            l - heat / (material.latent_heat * PI.sqrt())
+        });
+        let lambda = within_reach(lambda, ["far", "far"], [far, far])?;
+        let [sin, cos] = tilted(tilt, offset)?;
+        Ok(Self { shape: Shape::Planar { wall: 0.0, tilt: [sin, cos], offset }, far: cold, material, lambda })
+    }
+
+    /// A disc that grows into a melt of temperature `far`: λ² e^(λ²/D) E₁(λ²/D) = k (T_m − T₀) / Λ.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless the melt is colder than melting, by less than Λ/C.
+    ///
+    /// # Source
+    /// Frank, *Radially symmetric phase growth controlled by diffusion* (1950).
+    pub fn disc_growth(far: f64, material: Material, centre: [f64; 2]) -> Result<Self> {
+        let cold = undercooling(far, &material)?;
+        if !centre.iter().all(|c| c.is_finite()) {
+            return Err(Error::invalid("centre", format!("{centre:?}"), "must be two finite numbers"));
+        }
+        let d = material.diffusivity(UPPER);
+        let lambda = root(|l| {
+            let z = l * l;
+            z + cold * material.conductivity[UPPER] / material.latent_heat / scaled_e1(z / d)
+        });
+        let lambda = within_reach(lambda, ["far", "far"], [far, far])?;
+        Ok(Self { shape: Shape::LineSource { strength: 0.0, centre }, far: cold, material, lambda })
+    }
+
     /// The point where the solution is singular, if there is one: a line source.
     pub fn source(&self) -> Option<[f64; 2]> {
         match self.shape {
-            Shape::Planar { .. } => None,
-            Shape::LineSource { centre, .. } => Some(centre),
+            Shape::LineSource { centre, strength } if strength > 0.0 => Some(centre),
+            _ => None,
         }
+    }
+
+    /// Whether nothing depends on x.
+    pub fn is_flat(&self) -> bool {
+        matches!(self.shape, Shape::Planar { tilt: [sin, _], .. } if sin == 0.0)
     }
 
     /// λ.
@@ -157,6 +194,30 @@ impl Similarity {
             }
         };
         self.material.melting + above
+    }
+}
+
+/// Sine and cosine of the tilt of a wall.
+fn tilted(tilt: f64, offset: f64) -> Result<[f64; 2]> {
+    if tilt.is_nan() || tilt.abs() > 60.0 {
+        return Err(Error::invalid("tilt", tilt, "must be between -60 and 60 degrees"));
+    }
+    if !offset.is_finite() {
+        return Err(Error::invalid("offset", offset, "must be a finite number"));
+    }
+    let (sin, cos) = tilt.to_radians().sin_cos();
+    Ok([sin, cos])
+}
+
+/// The temperature of a melt above that of melting: below 0, by less than what lets no front be slow enough.
+fn undercooling(far: f64, material: &Material) -> Result<f64> {
+    let [cold, most] = [far - material.melting, material.latent_heat / material.capacity[UPPER]];
+    match cold < 0.0 && -cold < most {
+        true => Ok(cold),
+        false => {
+            let rule = format!("must be below {} by less than {most}, latent heat over capacity", material.melting);
+            Err(Error::invalid("far", far, rule))
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! Motion of the front.
 
 use super::columns::{Columns, LOWER, UPPER};
-use super::heat::end_slope;
 use super::material::Material;
 use crate::error::{Error, Failure, Result};
 use schemars::JsonSchema;
@@ -82,20 +81,21 @@ impl Filter {
     }
 }
 
-/// Slopes of the temperature at the front, column by column, below and above it.
-pub(super) fn slopes(columns: &Columns, y: &[Vec<f64>; 2], u: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+/// Slopes of the temperature at the front, column by column, below and above it, from heights and values at N rows.
+pub(super) fn slopes<const N: usize>(
+    columns: &Columns,
+    y: &[Vec<f64>; 2],
+    u: &[Vec<f64>; 2],
+    slope: impl Fn([f64; N], [f64; N]) -> f64,
+) -> [Vec<f64>; 2] {
     [LOWER, UPPER].map(|phase| {
         let nodes = columns.rows(phase) + 1;
         let [front, _] = columns.ends(phase);
         let take = |values: &[f64], i: usize| {
             let column = &values[i * nodes..(i + 1) * nodes];
-            if front == 0 {
-                [column[0], column[1], column[2]]
-            } else {
-                [column[front], column[front - 1], column[front - 2]]
-            }
+            std::array::from_fn(|j| column[if front == 0 { j } else { front - j }])
         };
-        (0..columns.x().len()).map(|i| end_slope(take(&y[phase], i), take(&u[phase], i))).collect()
+        (0..columns.x().len()).map(|i| slope(take(&y[phase], i), take(&u[phase], i))).collect()
     })
 }
 

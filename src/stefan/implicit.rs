@@ -2,7 +2,7 @@
 
 use super::balance::Instant;
 use super::columns::{LOWER, UPPER};
-use super::conduct::{Fields, present, velocity};
+use super::conduct::{Edges, Fields, present, velocity};
 use super::energy::Energy;
 use super::response::Response;
 use super::solver::{Front, FrontState, Problem};
@@ -10,8 +10,7 @@ use crate::error::{Failure, Result};
 use crate::numerics::larger;
 use crate::work::Work;
 
-/// Newton's method has converged once the residual of the front is below this share of the height of the box, or of
-/// that times the largest temperature if it is above 1.
+/// Newton's method has converged once the residual of the front is below this share of the height of the box.
 const CONVERGED: f64 = 1e-11;
 /// Round-off of a height, as a share of its distance from the origin: some fifty units in the last place.
 const ROUNDING: f64 = 1e-14;
@@ -83,14 +82,14 @@ impl Front {
         [t, dt]: [f64; 2],
     ) -> Result<Fields> {
         let h = match start.alone {
-            None => self.moved(problem, [&start.h; 2], slopes, [t + dt, dt])?,
+            None => self.moved(problem, start, &start.h, slopes, [t + dt, dt])?,
             Some(_) => start.h.clone(),
         };
         let (old, new) = (self.heights(&start.h), self.heights(&h));
         let motion = [LOWER, UPPER].map(|phase| velocity(&old[phase], &new[phase], dt));
         let gain = self.gain(problem, start, &motion, [t, dt])?;
         let u = [LOWER, UPPER].map(|phase| start.u[phase].iter().zip(&gain[phase]).map(|(u, gain)| u + gain).collect());
-        Ok(Fields { h, u, alone: start.alone })
+        Ok(Fields { h, u, ..start.clone() })
     }
 
     /// The size of an estimated error: of the front against its distance from the nearer wall, of the temperatures,
@@ -99,7 +98,7 @@ impl Front {
         let mut error = 0.0_f64;
         let last = end.h.len() - 1;
         for (i, (miss, h)) in miss.h.iter().zip(&end.h).enumerate() {
-            if self.mirrored() || i != 0 && i != last {
+            if !self.held() || i != 0 && i != last {
                 error = larger(error, miss / self.columns.room(i, *h));
             }
         }
@@ -111,9 +110,13 @@ impl Front {
             let mut solver = std::mem::take(&mut self.solvers[phase]);
             let motion = velocity(&old[phase], &new[phase], tau);
             let fields = [&new[phase][..], &miss.u[phase], &zero];
-            let damped = self.heat(phase, tau, fields, Some(&motion), &[None, None]).solve(&mut solver, self.laplacian);
+            let edges = Edges::default();
+            let step = self.heat(end.reach(phase), tau, fields, Some(&motion), &edges);
+            let damped = step.solve(&mut solver, self.laplacian);
             self.solvers[phase] = solver;
-            error = larger(error, damped?.into_iter().fold(0.0, larger) / range.max(f64::MIN_POSITIVE));
+            let (damped, work) = damped?;
+            self.spent += work;
+            error = larger(error, damped.into_iter().fold(0.0, larger) / range.max(f64::MIN_POSITIVE));
         }
         Ok(error)
     }
@@ -128,46 +131,56 @@ impl Front {
         work: &mut Work,
     ) -> Result<Fields> {
         if from.alone.is_some() {
-            let u = self.conduct(problem, from, guess, [t, dt])?;
+            let u = self.conduct(problem, from, (guess, &from.u), [t, dt])?;
             work.linear_solves += 1;
-            return Ok(Fields { h: guess.to_vec(), u, alone: from.alone });
+            return Ok(Fields { h: guess.to_vec(), u, ..from.clone() });
         }
         let response = match self.response.take() {
             Some((known, response)) if known == dt => response,
             _ => Response::new(&self.columns, &self.material, dt),
         };
-        let [tolerance, rounding] = self.tolerances(from);
+        let [tolerance, rounding] = self.tolerances(from, dt);
         let mut h = guess.to_vec();
         self.hold_ends(problem, &mut h, t);
-        let mut miss = f64::INFINITY;
+        let (mut miss, mut last) = (f64::INFINITY, None);
         for _ in 0..MOST_STEPS {
-            self.columns.check(&h)?;
-            let u = self.conduct(problem, from, &h, [t, dt])?;
+            self.columns.check(&h, &from.bare)?;
+            let u = self.conduct(problem, from, (&h, last.as_ref().unwrap_or(&from.u)), [t, dt])?;
             work.linear_solves += 2;
             work.newton_iterations += 1;
-            let slopes = self.slopes(&h, &u);
-            let target = self.moved(problem, [&from.h, &h], &slopes, [t, dt])?;
+            let slopes = self.slopes(&h, &u, &from.bare);
+            let target = self.moved(problem, from, &h, &slopes, [t, dt])?;
             let residual: Vec<f64> = h.iter().zip(&target).map(|(h, target)| h - target).collect();
             let before = std::mem::replace(&mut miss, residual.iter().copied().fold(0.0, larger));
             // near its round-off the residual falls as long as it can
             if miss <= tolerance || miss <= tolerance + rounding && miss > 0.5 * before {
                 self.response = Some((dt, response));
-                return Ok(Fields { h, u, alone: from.alone });
+                return Ok(Fields { h, u, ..from.clone() });
             }
-            let correction = response.correct(self, &h, &slopes, dt, &residual);
+            let correction = response.correct(self, (&h, &from.bare), &slopes, dt, &residual);
             h.iter_mut().zip(correction).for_each(|(h, c)| *h += c);
+            last = Some(u);
         }
         Err(Failure::NewtonStalled { residual: miss, tolerance, iterations: MOST_STEPS }.into())
     }
 
-    /// The residual of the front at which Newton's method has converged, and the round-off of heights.
-    fn tolerances(&self, from: &Fields) -> [f64; 2] {
-        let [bottom, top] = [LOWER, UPPER].map(|phase| self.columns.wall(phase));
-        let height = top.iter().zip(bottom).fold(0.0_f64, |m, (top, bottom)| m.max(top - bottom));
-        // the jump has the round-off of the temperatures
-        let size = from.u.iter().flatten().map(|u| u - self.material.melting).fold(1.0, larger);
-        // and heights have that of their distance from the origin
-        let farthest = bottom.iter().chain(top).copied().fold(0.0, larger);
-        [CONVERGED * height * size, ROUNDING * farthest]
+    /// The residual of the front at which Newton's method has converged, and its round-off.
+    fn tolerances(&self, from: &Fields, dt: f64) -> [f64; 2] {
+        let columns = &self.columns;
+        let height = (0..from.h.len()).map(|i| columns.gap(i)).fold(0.0, f64::max);
+        // heights have the round-off of their distance from the origin
+        let farthest = [LOWER, UPPER].into_iter().flat_map(|phase| columns.wall(phase)).copied().fold(0.0, larger);
+        // and the jump has that of the temperatures, over the distance of a row
+        let y = self.heights(&from.h);
+        let jump = |phase: usize| {
+            let (size, nodes) = (from.u[phase].iter().copied().fold(0.0, larger), columns.rows(phase) + 1);
+            let [front, _] = columns.ends(phase);
+            let next = front.max(1) - 1 + usize::from(front == 0);
+            let row = |i: usize| (y[phase][i * nodes + front] - y[phase][i * nodes + next]).abs();
+            let thinnest = (0..from.h.len()).filter(|&i| from.bare[i].is_none()).map(row).fold(height, f64::min);
+            self.material.conductivity[phase] * size / thinnest
+        };
+        let speed = (jump(LOWER) + jump(UPPER)) / self.material.latent_heat;
+        [CONVERGED * height, ROUNDING * (farthest + 10.0 * dt * speed)]
     }
 }

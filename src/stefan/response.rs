@@ -52,9 +52,16 @@ impl Response {
         Self { roots, n }
     }
 
-    /// The correction of the front `h` that removes its residual r = h − hⁿ − Δt/Λ (1 + h_x²) F[J]. `slopes` are
-    /// ∂u_i/∂y at the front.
-    pub fn correct(&self, front: &Front, h: &[f64], slopes: &[Vec<f64>; 2], dt: f64, residual: &[f64]) -> Vec<f64> {
+    /// The correction of the front `h` that removes its residual r = h − hⁿ − Δt/Λ (1 + h_x²) F[J], where no wall is
+    /// `bare`. `slopes` are ∂u_i/∂y at the front.
+    pub fn correct(
+        &self,
+        front: &Front,
+        (h, bare): (&[f64], &[Option<usize>]),
+        slopes: &[Vec<f64>; 2],
+        dt: f64,
+        residual: &[f64],
+    ) -> Vec<f64> {
         let (n, mirrored) = (self.n, front.mirrored());
         let strength = [LOWER, UPPER]
             .map(|phase| slopes[phase].iter().map(|s| -front.material.conductivity[phase] * s).collect::<Vec<f64>>());
@@ -69,11 +76,10 @@ impl Response {
                 matrix[(i, j)] += factor * stretch[i] * answer;
             }
         }
-        if !mirrored {
-            // the ends are given
-            for (i, j) in [0, n - 1].into_iter().flat_map(|i| (0..n).map(move |j| (i, j))) {
-                matrix[(i, j)] = if i == j { 1.0 } else { 0.0 };
-            }
+        // some heights are given
+        let given = |i: usize| front.held() && (i == 0 || i == n - 1) || bare[i].is_some();
+        for (i, j) in (0..n).filter(|&i| given(i)).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            matrix[(i, j)] = if i == j { 1.0 } else { 0.0 };
         }
         let mut correction = faer::Mat::<f64>::from_fn(n, 1, |i, _| -residual[i]);
         matrix.partial_piv_lu().solve_in_place(&mut correction);

@@ -4,12 +4,11 @@ use super::conduct::Fields;
 use super::energy::Energy;
 use super::events::PhaseEvent;
 use super::front::{self, Filter, Method};
+use super::heat::Solver;
 use super::material::Material;
 use super::response::Response;
 use crate::error::{Error, Failure, Result};
 use crate::laplacian::Laplacian;
-use crate::numerics::larger;
-use crate::numerics::linear::Robust;
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,8 +45,10 @@ pub enum Sides {
     #[default]
     #[serde(alias = "no-flux")]
     Neumann,
-    /// Temperatures and the height of the front are given by the exact solution.
+    /// Temperatures and the height of the front are given: by the exact solution or by the problem.
     Exact,
+    /// The problem gives what flows in.
+    Flux,
 }
 
 /// The data of a problem.
@@ -66,6 +67,22 @@ pub trait Problem: Sync {
 
     /// The exact temperature where it is known.
     fn exact(&self, x: [f64; 2], t: f64) -> Option<f64>;
+
+    /// Temperature on a side with given values.
+    fn side(&self, phase: usize, x: [f64; 2], t: f64) -> f64 {
+        self.boundary(phase, x, t)
+    }
+
+    /// Height of the front between the walls on a side with given values; none where it is nowhere.
+    fn side_front(&self, x: f64, _walls: [f64; 2], t: f64) -> Option<f64> {
+        self.exact_front(x, t)
+    }
+
+    /// Flux of heat k ∂u/∂n into the box through the left (0) or the right side (1), and its derivative by u; none
+    /// where nothing flows.
+    fn side_flux(&self, _side: usize, _x: [f64; 2], _u: f64, _t: f64) -> Option<[f64; 2]> {
+        None
+    }
 
     /// Flux of heat k ∂u/∂n into the phase through its wall, and its derivative by the temperature u of the wall; none
     /// where [`boundary`](Self::boundary) gives the temperature. A wall has one of both everywhere and always.
@@ -96,7 +113,9 @@ pub struct Front {
     /// The discrete Laplacian, of nine points.
     pub laplacian: Laplacian,
     /// Linear solvers of both phases.
-    pub(super) solvers: [Robust<1>; 2],
+    pub(super) solvers: [Solver; 2],
+    /// Iterations of the linear solvers in the last step.
+    pub(super) spent: Work,
     /// Time step and response of the last step.
     pub(super) response: Option<(f64, Response)>,
 }
@@ -114,19 +133,31 @@ pub struct FrontState {
     pub u: [Vec<f64>; 2],
     /// The phase that fills the box, if one does: the front then lies on the wall of the other one.
     pub alone: Option<usize>,
+    /// At each column the phase, if there is one, that is missing while it is there at other columns: its wall is bare,
+    /// and the other phase reaches it.
+    pub bare: Vec<Option<usize>>,
     /// Balance of energy.
     pub energy: Energy,
+    /// The way of the front in the mean over the columns, and by how much it would be another one if gradients at the
+    /// front were taken over four rows in place of three.
+    pub way: [f64; 2],
 }
 
 impl FrontState {
+    pub(super) fn of(fields: Fields, (t, step): (f64, usize), energy: Energy, way: [f64; 2]) -> Self {
+        let Fields { h: front, u, alone, bare } = fields;
+        Self { t, step, front, u, alone, bare, energy, way }
+    }
+
     pub(super) fn fields(&self) -> Fields {
-        Fields { h: self.front.clone(), u: self.u.clone(), alone: self.alone }
+        Fields { h: self.front.clone(), u: self.u.clone(), alone: self.alone, bare: self.bare.clone() }
+    }
+
+    /// The share of its way by which the front is in doubt, since rows near it are few; none before it has moved.
+    pub fn doubt(&self) -> Option<f64> {
+        (self.way[0] > 0.0).then(|| self.way[1] / self.way[0])
     }
 }
-
-/// Where a phase at its melting temperature begins to be warmed from a wall, its gradient at the front is below the
-/// round-off and the overshoot of a step: at most this share of the gradient across the phase, of any sign.
-const OVERSHOOT: f64 = 1e-6;
 
 /// What a step comes to.
 #[derive(Debug, Clone)]
@@ -160,6 +191,7 @@ impl Front {
             sides: Sides::default(),
             laplacian: Laplacian::default(),
             solvers: Default::default(),
+            spent: Work::default(),
             response: None,
         }
     }
@@ -173,6 +205,11 @@ impl Front {
         self.sides == Sides::Neumann
     }
 
+    /// Whether temperatures and the front are given on the sides.
+    pub(super) fn held(&self) -> bool {
+        self.sides == Sides::Exact
+    }
+
     /// The state at the start.
     ///
     /// # Errors
@@ -181,7 +218,7 @@ impl Front {
         let front: Vec<f64> = self.columns.x().iter().map(|&x| problem.initial_front(x)).collect();
         let alone = self.fills(&front);
         if alone.is_none() {
-            self.columns.check(&front)?;
+            self.columns.check(&front, &[])?;
         }
         let u = [LOWER, UPPER].map(|phase| {
             let y = self.columns.heights(phase, &front);
@@ -199,51 +236,13 @@ impl Front {
                 return Err(self.columns.not_finite(INITIAL[phase], u[phase][k], phase, k, y).into());
             }
         }
-        let content = self.content(&Fields { h: front.clone(), u: u.clone(), alone });
+        let bare = vec![None; front.len()];
+        let fields = Fields { h: front, u, alone, bare };
+        let content = self.content(&fields);
         let energy = Energy { start: content, now: content, ..Energy::default() };
-        let state = FrontState { t, step: 0, front, u, alone, energy };
+        let state = FrontState::of(fields, (t, 0), energy, [0.0; 2]);
         self.check_warm_below(&state)?;
         Ok(state)
-    }
-
-    fn check_warm_below(&self, state: &FrontState) -> Result<(), Failure> {
-        if self.undercooled.is_some() || state.alone.is_some() {
-            return Ok(());
-        }
-        let slopes = self.slopes(&state.front, &state.u);
-        let conductivity = self.material.conductivity;
-        // of the largest difference of temperature over the height of a phase
-        let flux = |phase: usize| {
-            let most = state.u[phase].iter().fold(0.0_f64, |most, u| most.max((u - self.material.melting).abs()));
-            let y = self.columns.heights(phase, &state.front);
-            conductivity[phase] * most / (y[self.columns.rows(phase)] - y[0]).abs()
-        };
-        let negligible = OVERSHOOT * flux(LOWER).max(flux(UPPER));
-        front::check_warm_below(&self.columns, &state.front, &slopes, conductivity, negligible)
-    }
-
-    pub(super) fn heights(&self, h: &[f64]) -> [Vec<f64>; 2] {
-        [LOWER, UPPER].map(|phase| self.columns.heights(phase, h))
-    }
-
-    /// Slopes of the temperatures u of both phases at a front.
-    pub(super) fn slopes(&self, h: &[f64], u: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
-        front::slopes(&self.columns, &self.heights(h), u)
-    }
-
-    /// The longest step for which the explicit front is stable, as estimated from the temperatures at the front.
-    pub fn limit(&self, state: &FrontState) -> f64 {
-        match state.alone {
-            Some(_) => f64::INFINITY,
-            None => front::limit(&self.columns, &self.slopes(&state.front, &state.u), &self.material, self.filter),
-        }
-    }
-
-    /// The time in which the front, at its speed now, would move as far as it is from the nearer wall.
-    pub fn passage(&self, problem: &dyn Problem, state: &FrontState) -> f64 {
-        let speed = if state.alone.is_none() { self.speed(problem, state) } else { None };
-        let time = |(i, speed): (usize, &f64)| self.columns.room(i, state.front[i]) / speed.abs();
-        speed.unwrap_or_default().iter().enumerate().map(time).fold(f64::INFINITY, f64::min)
     }
 
     /// A step to time `t`; the state changes only if it succeeds.
@@ -257,7 +256,7 @@ impl Front {
         Ok(attempt.work)
     }
 
-    /// What a step to time `t` would come to. A phase may vanish in it, and one may appear.
+    /// What a step to time `t` would come to. A phase may vanish in it, and one may appear, everywhere or in part.
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -270,6 +269,8 @@ impl Front {
             }
             return Ok(Attempt { event: Some(event), ..self.plain(problem, &from, t)? });
         }
+        let covered = self.covered(problem, state, t);
+        let state = covered.as_ref().unwrap_or(state);
         match self.plain(problem, state, t) {
             Err(Error::Failed {
                 failure: failure @ (Failure::FrontOutside { .. } | Failure::VanishingPhase { .. }),
@@ -282,17 +283,24 @@ impl Front {
     /// A step in which no phase vanishes or appears.
     pub(super) fn plain(&mut self, problem: &dyn Problem, state: &FrontState, t: f64) -> Result<Attempt> {
         self.check_warm_below(state)?;
+        self.spent = Work::default();
         let slopes = match state.alone {
             Some(_) => Default::default(),
-            None => self.slopes(&state.front, &state.u),
+            None => self.slopes(&state.front, &state.u, &state.bare),
         };
-        let (end, energy, work, error) = match self.stepping {
+        let (end, energy, mut work, error) = match self.stepping {
             Stepping::Explicit if state.alone.is_none() => self.explicit(problem, state, &slopes, t)?,
             _ => self.tr_bdf2(problem, state, &slopes, t)?,
         };
-        let state = FrontState { t, step: state.step + 1, front: end.h, u: end.u, alone: end.alone, energy };
-        self.check_warm_below(&state)?;
-        Ok(Attempt { state, work, error, event: None })
+        work += Work { linear_solves: 0, ..self.spent };
+        let mut end = FrontState::of(end, (t, state.step + 1), energy, state.way);
+        if end.alone.is_none() {
+            let pace = self.pace(&end);
+            end.way = [0, 1].map(|k| end.way[k] + (t - state.t) * pace[k]);
+        }
+        self.check_walls(&end)?;
+        self.check_warm_below(&end)?;
+        Ok(Attempt { state: end, work, error, event: None })
     }
 
     fn explicit(
@@ -307,63 +315,55 @@ impl Front {
         if dt > limit {
             return Err(Failure::FrontUnstable { dt, limit }.into());
         }
-        let h = self.moved(problem, [&state.front; 2], slopes, [t, dt])?;
-        self.columns.check(&h)?;
         let from = state.fields();
-        let u = self.conduct(problem, &from, &h, [t, dt])?;
-        let end = Fields { h, u, alone: state.alone };
+        let h = self.moved(problem, &from, &from.h, slopes, [t, dt])?;
+        self.columns.check(&h, &from.bare)?;
+        let u = self.conduct(problem, &from, (&h, &from.u), [t, dt])?;
+        let end = Fields { h, u, ..from };
         let instant = Instant { t, dt, fields: &end, from: &state.front, over: dt };
         let energy = self.balance(problem, state, &end, &[instant]);
         Ok((end, energy, Work { linear_solves: 2, ..Work::default() }, None))
     }
 
-    /// The front after a step of `dt` to `t` from the first of two fronts, moved by the jump of the heat flux that
-    /// belongs to the second.
+    /// The front after a step of `dt` to `t`, moved by the jump of the heat flux that belongs to the front `at`. It
+    /// stays where a wall is bare.
     pub(super) fn moved(
         &self,
         problem: &dyn Problem,
-        [from, at]: [&[f64]; 2],
+        from: &Fields,
+        at: &[f64],
         slopes: &[Vec<f64>; 2],
         [t, dt]: [f64; 2],
     ) -> Result<Vec<f64>> {
         let mirrored = self.mirrored();
-        let jump = self.filter.apply(&front::jump(slopes, self.material.conductivity), mirrored);
+        let mut jump = front::jump(slopes, self.material.conductivity);
+        // the filter sees no other jump beyond the end of a phase
+        for i in (0..jump.len()).filter(|&i| from.bare[i].is_some()) {
+            let beside = [i.wrapping_sub(1), i + 1].into_iter().find(|&k| from.bare.get(k) == Some(&None));
+            jump[i] = beside.map_or(0.0, |k| jump[k]);
+        }
+        let jump = self.filter.apply(&jump, mirrored);
         let tilt = front::tilt(&self.columns, at, mirrored);
         let factor = dt / self.latent_heat();
         let mut h = match self.method {
-            Method::Graph => front::graph(from, &tilt, &jump, factor),
-            Method::Segments => front::segments(&self.columns, from, &tilt, &jump, factor, mirrored)?,
+            Method::Graph => front::graph(&from.h, &tilt, &jump, factor),
+            Method::Segments => front::segments(&self.columns, &from.h, &tilt, &jump, factor, mirrored)?,
         };
         self.hold_ends(problem, &mut h, t);
+        for (i, h) in h.iter_mut().enumerate().filter(|(i, _)| from.bare[*i].is_some()) {
+            *h = from.h[i];
+        }
         Ok(h)
     }
 
     /// Moves the ends of a front to where the exact one is at time `t`, if that is given on the sides.
     pub(super) fn hold_ends(&self, problem: &dyn Problem, h: &mut [f64], t: f64) {
-        if !self.mirrored() {
+        if self.held() {
             let last = h.len() - 1;
             for i in [0, last] {
-                h[i] = problem.exact_front(self.columns.x()[i], t).unwrap_or(h[i]);
+                let walls = [LOWER, UPPER].map(|phase| self.columns.wall(phase)[i]);
+                h[i] = problem.side_front(self.columns.x()[i], walls, t).unwrap_or(h[i]);
             }
         }
-    }
-
-    /// Largest errors of the front and of the temperature, where the problem knows the exact solution.
-    pub fn errors(&self, problem: &dyn Problem, state: &FrontState) -> Option<[f64; 2]> {
-        if state.alone.is_some() {
-            return None;
-        }
-        let x = self.columns.x();
-        let mut worst = [0.0, 0.0];
-        for (&x, &h) in x.iter().zip(&state.front) {
-            worst[0] = larger(worst[0], h - problem.exact_front(x, state.t)?);
-        }
-        for phase in [LOWER, UPPER] {
-            let nodes = self.columns.rows(phase) + 1;
-            for (k, (y, u)) in self.columns.heights(phase, &state.front).iter().zip(&state.u[phase]).enumerate() {
-                worst[1] = larger(worst[1], u - problem.exact([x[k / nodes], *y], state.t)?);
-            }
-        }
-        Some(worst)
     }
 }

@@ -3,6 +3,7 @@
 use super::common::{Header, Output, StudyKind};
 use super::front_given::Given;
 use super::front_run::{FrontCourse, FrontRun};
+use super::front_start;
 use super::kind::Kind;
 use super::mapped::{Ends, check_between, parse};
 use super::stefan::{ExactKind, FrontTime, StefanStudy};
@@ -43,7 +44,12 @@ impl Kind for StefanStudy {
         if let Given::Exact(..) = given {
             return Ok(self.crosses_walls(front, given, state).into_iter().collect());
         }
-        let mut warnings = Vec::new();
+        let schedule = self.schedule(given)?;
+        let run = [schedule.start(), schedule.end()];
+        let mut warnings: Vec<String> = front_start::too_narrow(front)
+            .into_iter()
+            .chain(front_start::never_appears(front, given, state, run))
+            .collect();
         for (phase, name) in [(LOWER, "lower"), (UPPER, "upper")] {
             let columns = front.columns.x().iter().zip(&state.front).zip(front.columns.wall(phase));
             let (mut on_front, mut on_wall) = ((0.0_f64, 0.0), (0.0_f64, 0.0));
@@ -92,13 +98,13 @@ impl Kind for StefanStudy {
         front.transfer = self.front.transfer;
         front.filter = self.front.filter;
         front.stepping = self.front.stepping;
-        front.sides = self.walls.sides;
         front.laplacian = self.laplacian.laplacian()?;
         if front.laplacian == Laplacian::Compact25 {
             let rule = "its 25 points reach across the front; take another kind";
             return Err(Error::invalid("laplacian.kind", "\"compact25\"", rule));
         }
         let given = self.given(front.material)?;
+        front.sides = given.sides(self.walls.is("exact"));
         let schedule = self.schedule(&given).map_err(|error| error.within("time"))?;
         if let Given::Exact(solution, _) = &given
             && let Some([cx, cy]) = solution.source()
@@ -109,7 +115,12 @@ impl Kind for StefanStudy {
             return Err(Error::invalid("exact.centre", format!("[{cx}, {cy}]"), rule));
         }
         front.undercooled = self.undercooled(&front, &given)?;
+        if !walls.iter().any(|wall| wall.depends_on(0)) && given.is_alike() {
+            front.columns.alike();
+        }
+        self.check_formulas(&front, &given, [schedule.start(), schedule.end()])?;
         let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
+        self.check_temperatures(&front, &state)?;
         let frames = self.output.frames_of(&schedule)?;
         self.output.check()?;
         Ok(FrontRun::of(&self.study.name, front, given, (state, schedule), frames))
@@ -119,8 +130,15 @@ impl Kind for StefanStudy {
 impl StefanStudy {
     /// The phase that is an undercooled melt, where `front.undercooled` says that there is one.
     fn undercooled(&self, front: &Front, given: &Given) -> Result<Option<usize>> {
+        let grows = |kind| matches!(kind, ExactKind::PlanarGrowth | ExactKind::DiscGrowth);
         if !self.front.undercooled {
-            return Ok(None);
+            return match self.exact.as_ref().filter(|exact| grows(exact.kind)) {
+                None => Ok(None),
+                Some(_) => {
+                    let rule = "the exact solution grows into a melt below its melting temperature; set it to true";
+                    Err(Error::invalid("front.undercooled", false, rule))
+                }
+            };
         }
         let cold = |phase: usize| {
             let places = front.columns.x().iter().zip(front.columns.wall(phase)).flat_map(|(&x, &wall)| {
@@ -172,13 +190,18 @@ impl StefanStudy {
             (Failure::NonFinite { what, .. }, None) if *what == INITIAL[LOWER] => "phase.lower.initial",
             (Failure::NonFinite { what, .. }, None) if *what == INITIAL[UPPER] => "phase.upper.initial",
             (_, None) => "domain.front",
-            (_, Some(ExactKind::Planar)) => "exact.start_front",
-            (_, Some(ExactKind::LineSource)) => "exact.start_radius",
+            (_, Some(ExactKind::Planar | ExactKind::PlanarGrowth)) => "exact.start_front",
+            (_, Some(ExactKind::LineSource | ExactKind::DiscGrowth)) => "exact.start_radius",
         };
         let table = toml::Table::try_from(self).unwrap_or_default();
         let present = key.split('.').try_fold(toml::Value::Table(table), |value, part| value.get(part).cloned());
         let value = present.map_or("not given".into(), |value| value.to_string());
-        let help = self.remedy(&error).unwrap_or_default();
+        let help = match failure {
+            Failure::FrontOutside { .. } | Failure::VanishingPhase { .. } => {
+                "begin between the walls, or with the front on one of them everywhere".into()
+            }
+            _ => self.remedy(&error).unwrap_or_default(),
+        };
         Error::invalid(key, value, format!("{failure}; {help}"))
     }
 
@@ -186,7 +209,7 @@ impl StefanStudy {
     fn crosses_walls(&self, front: &Front, given: &Given, state: &FrontState) -> Option<String> {
         const STEP: f64 = 1e-6;
         const NOTICEABLE: f64 = 1e-3;
-        if self.walls.sides != Sides::Neumann {
+        if front.sides != Sides::Neumann {
             return None;
         }
         let x = front.columns.x();

@@ -42,9 +42,9 @@ pub struct FrontReport {
     /// Error of the temperature, where an exact solution is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<FrontError>,
-    /// |ΔE − ∫F dt| / |ΔE| with fluxes by weighted residual; none before anything changed.
+    /// |ΔE − ∫F dt| over the heat that was moved, with fluxes by weighted residual; none before any was.
     pub energy_imbalance: Option<f64>,
-    /// |ΔE − ∫F dt| / |ΔE| with fluxes by differences over three rows.
+    /// |ΔE − ∫F dt| over the heat that was moved, with fluxes by differences over three rows.
     pub energy_imbalance_by_differences: Option<f64>,
     /// The longest stable explicit step, as estimated; none where the front is at rest.
     pub step_limit: Option<f64>,
@@ -57,9 +57,20 @@ pub struct FrontFigures {
     pub mean: f64,
     /// Lowest and highest point of the front.
     pub range: [f64; 2],
+    /// The share of its way by which the front would be elsewhere if gradients at the front were taken over four rows
+    /// in place of three; none before it has moved.
+    pub doubt: Option<f64>,
+    /// The share of the columns at which one phase reaches the wall of the other one.
+    #[serde(skip_serializing_if = "none_of_it")]
+    pub bare: f64,
     /// Largest error of its height, where an exact solution is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_linf: Option<f64>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde asks
+fn none_of_it(share: &f64) -> bool {
+    *share == 0.0
 }
 
 /// Error of the temperature.
@@ -84,6 +95,8 @@ impl FrontReport {
                     h.iter().copied().fold(f64::INFINITY, f64::min),
                     h.iter().copied().fold(f64::NEG_INFINITY, f64::max),
                 ],
+                doubt: state.doubt(),
+                bare: state.bare.iter().flatten().count() as f64 / h.len() as f64,
                 error_linf: errors.map(|[front, _]| front),
             },
             error: errors.map(|[_, linf]| FrontError { linf }),
@@ -102,6 +115,11 @@ pub(super) struct Row {
     front_mean: f64,
     front_min: f64,
     front_max: f64,
+    /// Lowest and highest temperature, and the means of those of the walls.
+    temperature_min: f64,
+    temperature_max: f64,
+    bottom_temperature: f64,
+    top_temperature: f64,
     front_error_linf: Option<f64>,
     error_linf: Option<f64>,
     energy_imbalance: Option<f64>,
@@ -116,8 +134,19 @@ pub(super) struct Row {
 
 impl Row {
     /// Of a state with this report, on a mesh of this quality.
-    pub fn of(report: &FrontReport, dt: f64, quality: Quality, newton_iterations: usize, seconds: f64) -> Self {
+    pub fn of(
+        report: &FrontReport,
+        temperatures: [f64; 4],
+        dt: f64,
+        quality: Quality,
+        (newton_iterations, seconds): (usize, f64),
+    ) -> Self {
+        let [temperature_min, temperature_max, bottom_temperature, top_temperature] = temperatures;
         Self {
+            temperature_min,
+            temperature_max,
+            bottom_temperature,
+            top_temperature,
             t: report.t,
             dt,
             front_mean: report.front.mean,

@@ -4,8 +4,8 @@ use super::mapped::{mistaken, parse};
 use super::stefan::{Centre, ExactFront, ExactKind, PhaseTable, StefanStudy};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::physics::Condition;
-use crate::stefan::{Material, Problem, Similarity};
+use crate::physics::{Condition, Conditions};
+use crate::stefan::{Material, Problem, Sides, Similarity};
 
 /// What holds on the wall of a phase.
 #[derive(Debug, Clone)]
@@ -40,7 +40,14 @@ impl Wall {
 #[derive(Debug, Clone)]
 #[allow(clippy::large_enum_variant)] // one value a run
 pub(super) enum Given {
-    Formulas { front: Formula, initial: [Formula; 2], walls: [Wall; 2] },
+    Formulas {
+        front: Formula,
+        initial: [Formula; 2],
+        walls: [Wall; 2],
+        /// The left and the right side, where not both let nothing through, and an x between them.
+        sides: Option<([Wall; 2], f64)>,
+        melting: f64,
+    },
     Exact(Similarity, f64),
 }
 
@@ -83,6 +90,40 @@ impl Problem for Given {
         }
     }
 
+    fn side(&self, phase: usize, [x, y]: [f64; 2], t: f64) -> f64 {
+        match self.side_at(x) {
+            Some(Wall::Value(formula)) => formula.eval(&[x, y, t]),
+            Some(Wall::Flux { .. }) => f64::NAN,
+            None => self.boundary(phase, [x, y], t),
+        }
+    }
+
+    /// Where the temperatures of the side pass that of melting, by bisection.
+    fn side_front(&self, x: f64, [bottom, top]: [f64; 2], t: f64) -> Option<f64> {
+        let Self::Formulas { melting, .. } = self else { return self.exact_front(x, t) };
+        let above = |y: f64| self.side(0, [x, y], t) - melting;
+        let (mut low, mut high) = (bottom, top);
+        if !(above(low) > 0.0 && above(high) <= 0.0 || above(low) >= 0.0 && above(high) < 0.0) {
+            return None;
+        }
+        while high - low > 1e-15 * (top - bottom) {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if above(middle) > 0.0 { low = middle } else { high = middle }
+        }
+        Some(0.5 * (low + high))
+    }
+
+    fn side_flux(&self, side: usize, [x, y]: [f64; 2], u: f64, t: f64) -> Option<[f64; 2]> {
+        let Self::Formulas { sides: Some((sides, _)), .. } = self else { return None };
+        match &sides[side] {
+            Wall::Value(_) => None,
+            Wall::Flux { value, by_u } => Some([value, by_u].map(|formula| formula.eval(&[u, x, y, t]))),
+        }
+    }
+
     fn flux(&self, phase: usize, [x, y]: [f64; 2], u: f64, t: f64) -> Option<[f64; 2]> {
         match self {
             Self::Formulas { walls, .. } => match &walls[phase] {
@@ -90,6 +131,24 @@ impl Problem for Given {
                 Wall::Flux { value, by_u } => Some([value, by_u].map(|formula| formula.eval(&[u, x, y, t]))),
             },
             Self::Exact(..) => None,
+        }
+    }
+}
+
+impl Given {
+    /// The condition of the side at x.
+    fn side_at(&self, x: f64) -> Option<&Wall> {
+        let Self::Formulas { sides: Some((sides, middle)), .. } = self else { return None };
+        Some(&sides[usize::from(x > *middle)])
+    }
+
+    /// What kind of condition the sides have.
+    pub(super) fn sides(&self, exact: bool) -> Sides {
+        match self {
+            Self::Exact(..) if exact => Sides::Exact,
+            Self::Formulas { sides: Some(([Wall::Value(_), _], _)), .. } => Sides::Exact,
+            Self::Formulas { sides: Some(_), .. } => Sides::Flux,
+            _ => Sides::Neumann,
         }
     }
 }
@@ -152,6 +211,12 @@ impl StefanStudy {
     pub(super) fn given(&self, material: Material) -> Result<Given> {
         let phases = self.phases();
         if let Some(exact) = &self.exact {
+            if !["exact", "neumann"].iter().any(|word| self.walls.is(word))
+                && self.walls.sides != Conditions::All(Condition::NoFlux)
+            {
+                let rule = "with [exact] it is \"exact\" or \"neumann\"";
+                return Err(Error::invalid("walls.sides", "given", rule));
+            }
             let written = |condition: &Option<Condition>| condition.as_ref().map(|_| "given".to_string());
             let quoted = |text: &Option<String>| text.as_ref().map(|text| format!("{text:?}"));
             let formulas = phases.iter().flat_map(|(name, phase)| {
@@ -166,7 +231,7 @@ impl StefanStudy {
             let (solution, start) = exact.solution(material).map_err(|error| error.within("exact"))?;
             return Ok(Given::Exact(solution, start));
         }
-        if self.walls.sides == crate::stefan::Sides::Exact {
+        if self.walls.is("exact") {
             let rule = "needs an exact solution; add [exact], or set it to \"neumann\"";
             return Err(Error::invalid("walls.sides", "\"exact\"", rule));
         }
@@ -186,40 +251,78 @@ impl StefanStudy {
             front: read("domain.front".into(), &self.domain.front, &["x"])?,
             initial: [initial(lower)?, initial(upper)?],
             walls: [wall(lower)?, wall(upper)?],
+            sides: self.sides()?.map(|sides| (sides, 0.5 * (self.domain.x.0[0] + self.domain.x.0[1]))),
+            melting: material.melting,
         })
+    }
+
+    /// The left and the right side, unless both let nothing through.
+    fn sides(&self) -> Result<Option<[Wall; 2]>> {
+        if let Conditions::Each(each) = &self.walls.sides
+            && let Some(side) = each.keys().find(|side| !["left", "right"].contains(&side.as_str()))
+        {
+            let rule = "there is no such side; `bottom` and `top` are `boundary` of a phase";
+            return Err(Error::invalid(format!("walls.sides.{side}"), "given", rule));
+        }
+        let read = |side: usize| match self.walls.side(side) {
+            Some((key, Condition::Value(text))) if text == "neumann" => Wall::read(&key, &Condition::NoFlux),
+            Some((key, condition)) => Wall::read(&key, condition),
+            None => {
+                let rule = format!("not given for `{}`", ["left", "right"][side]);
+                Err(Error::invalid("walls.sides", rule, "needs `left` and `right`, or one condition for both"))
+            }
+        };
+        let sides = [read(0)?, read(1)?];
+        let insulated = |side: usize| match self.walls.side(side) {
+            Some((_, Condition::NoFlux)) => true,
+            Some((_, Condition::Value(text))) => text == "neumann",
+            _ => false,
+        };
+        match &sides {
+            _ if insulated(0) && insulated(1) => Ok(None),
+            [Wall::Value(_), Wall::Value(_)] | [Wall::Flux { .. }, Wall::Flux { .. }] => Ok(Some(sides)),
+            _ => {
+                let rule = "both sides need temperatures, or both fluxes, of which \"no-flux\" is one";
+                Err(Error::invalid("walls.sides", "a temperature and a flux", rule))
+            }
+        }
     }
 }
 
 impl ExactFront {
     /// The solution and the time at which it starts.
     fn solution(&self, material: Material) -> Result<(Similarity, f64)> {
-        let planar = self.kind == ExactKind::Planar;
-        let given = [
-            ("wall", self.wall.is_some(), true),
-            ("start_front", self.start_front.is_some(), true),
-            ("tilt", self.tilt.is_some(), true),
-            ("offset", self.offset.is_some(), true),
-            ("strength", self.strength.is_some(), false),
-            ("start_radius", self.start_radius.is_some(), false),
-            ("centre", self.centre.is_some(), false),
+        use ExactKind::{DiscGrowth, LineSource, Planar, PlanarGrowth};
+        let given: [(&str, bool, &[ExactKind]); 7] = [
+            ("wall", self.wall.is_some(), &[Planar]),
+            ("start_front", self.start_front.is_some(), &[Planar, PlanarGrowth]),
+            ("tilt", self.tilt.is_some(), &[Planar, PlanarGrowth]),
+            ("offset", self.offset.is_some(), &[Planar, PlanarGrowth]),
+            ("strength", self.strength.is_some(), &[LineSource]),
+            ("start_radius", self.start_radius.is_some(), &[LineSource, DiscGrowth]),
+            ("centre", self.centre.is_some(), &[LineSource, DiscGrowth]),
         ];
-        if let Some((key, ..)) = given.into_iter().find(|&(_, given, of_planar)| given && of_planar != planar) {
-            let kind = if planar { "planar" } else { "line-source" };
-            return Err(Error::invalid(key, "given", format!("kind = \"{kind}\" does not have it; leave it out")));
+        if let Some((key, ..)) = given.into_iter().find(|(_, given, kinds)| *given && !kinds.contains(&self.kind)) {
+            let rule = format!("kind = \"{}\" does not have it; leave it out", self.kind.name());
+            return Err(Error::invalid(key, "given", rule));
         }
         let need = |key, value: Option<f64>| value.ok_or_else(|| Error::invalid(key, "not given", "add it"));
-        let (key, distance, solution) = match self.kind {
-            ExactKind::Planar => {
-                let (wall, start) = (need("wall", self.wall)?, need("start_front", self.start_front)?);
-                let (tilt, offset) = (self.tilt.unwrap_or(0.0), self.offset.unwrap_or(0.0));
-                ("start_front", start, Similarity::planar([wall, self.far], material, tilt, offset)?)
-            }
-            ExactKind::LineSource => {
-                let (strength, start) = (need("strength", self.strength)?, need("start_radius", self.start_radius)?);
-                let Centre(centre) = self.centre.ok_or_else(|| Error::invalid("centre", "not given", "add it"))?;
-                ("start_radius", start, Similarity::line_source(strength, self.far, material, centre)?)
-            }
+        let (tilt, offset) = (self.tilt.unwrap_or(0.0), self.offset.unwrap_or(0.0));
+        let centre = || match self.centre {
+            Some(Centre(centre)) => Ok(centre),
+            None => Err(Error::invalid("centre", "not given", "add it")),
         };
+        let solution = match self.kind {
+            Planar => Similarity::planar([need("wall", self.wall)?, self.far], material, tilt, offset)?,
+            LineSource => Similarity::line_source(need("strength", self.strength)?, self.far, material, centre()?)?,
+            PlanarGrowth => Similarity::planar_growth(self.far, material, tilt, offset)?,
+            DiscGrowth => Similarity::disc_growth(self.far, material, centre()?)?,
+        };
+        let (key, distance) = match self.kind {
+            Planar | PlanarGrowth => ("start_front", self.start_front),
+            LineSource | DiscGrowth => ("start_radius", self.start_radius),
+        };
+        let distance = need(key, distance)?;
         if !(distance > 0.0 && distance.is_finite()) {
             return Err(Error::invalid(key, distance, "must be above 0"));
         }

@@ -8,6 +8,7 @@ mod front_checks;
 mod front_figures;
 mod front_given;
 mod front_run;
+mod front_start;
 mod kind;
 mod line_checks;
 mod line_figures;

@@ -3,7 +3,7 @@
 use super::LaplacianTable;
 use super::common::{Header, Output};
 use super::mapped::Ends;
-use crate::physics::Condition;
+use crate::physics::{Condition, Conditions};
 use crate::setting::{Auto, fixed, pair};
 use crate::stefan::{Filter, Method, Stepping, Transfer};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -189,43 +189,71 @@ fn read_filter<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Filter, D::
 }
 
 /// `[walls]`: what holds on the left and the right side of the box.
-#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Walls {
-    /// What holds on the left and right sides: no flux ("neumann"), or the exact solution ("exact", only with
-    /// `[exact]`).
-    pub sides: crate::stefan::Sides,
+    /// What holds on the left and the right side, for both or by `left` and `right`: no flux ("neumann" or "no-flux");
+    /// temperatures, a formula of x, y and t, with the front where they pass the melting temperature; `{ flux = "…" }`,
+    /// what flows in, a formula of u, x, y and t; or the exact solution ("exact", only with `[exact]`).
+    pub sides: Conditions,
+}
+
+impl Default for Walls {
+    fn default() -> Self {
+        Self { sides: "neumann".into() }
+    }
+}
+
+impl Walls {
+    /// The condition of a side with its key, written as one of those of a formula.
+    pub(super) fn side(&self, side: usize) -> Option<(String, &Condition)> {
+        match &self.sides {
+            Conditions::All(condition) => Some(("walls.sides".into(), condition)),
+            Conditions::Each(each) => {
+                let name = ["left", "right"][side];
+                Some((format!("walls.sides.{name}"), each.get(name)?))
+            }
+        }
+    }
+
+    /// Whether this word holds for both sides.
+    pub(super) fn is(&self, word: &str) -> bool {
+        matches!(&self.sides, Conditions::All(Condition::Value(text)) if text == word)
+    }
 }
 
 /// `[exact]`: an exact solution of the equations on both sides of a moving front.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExactFront {
-    /// Which exact solution: "planar", a flat front that moves away from a warm wall, or "line-source", melting around
-    /// a line that gives off heat.
+    /// Which exact solution: "planar", a flat front that moves away from a warm wall; "line-source", melting around a
+    /// line that gives off heat; "planar-growth" or "disc-growth", a flat front or a disc that grows into a melt below
+    /// its melting temperature.
     pub kind: ExactKind,
-    /// Temperature of the upper phase far away from the front, at most 0.
+    /// Temperature of the upper phase far away from the front, at most that of melting.
     pub far: f64,
     /// Temperature of the warm wall, above 0. Only with `planar`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wall: Option<f64>,
-    /// Distance of the front from the wall at the start. Only with `planar`.
+    /// Distance of the front from the wall at the start. Only with `planar` and `planar-growth`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_front: Option<f64>,
     /// Angle by which the front rises to the right, from -60 to 60 degrees; 0 where nothing is said. Only with
-    /// `planar`.
+    /// `planar` and `planar-growth`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tilt: Option<f64>,
-    /// Distance of the wall from the origin; 0 where nothing is said. Only with `planar`.
+    /// Distance of the wall from the origin; 0 where nothing is said. Only with `planar` and `planar-growth`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
     /// Heat given off by the line source, per length and time, above 0. Only with `line-source`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<f64>,
-    /// Distance of the front from the line source at the start. Only with `line-source`.
+    /// Distance of the front from the line source or the centre of the disc at the start. Only with `line-source` and
+    /// `disc-growth`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_radius: Option<f64>,
-    /// Place of the line source, x and y, outside the box. Only with `line-source`.
+    /// Place of the line source, outside the box, or of the centre of the disc, x and y. Only with `line-source` and
+    /// `disc-growth`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre: Option<Centre>,
 }
@@ -242,6 +270,22 @@ pub enum ExactKind {
     Planar,
     /// Melting around a line that gives off heat.
     LineSource,
+    /// A flat front that grows into a melt below its melting temperature.
+    PlanarGrowth,
+    /// Frank's disc, which grows into a melt below its melting temperature.
+    DiscGrowth,
+}
+
+impl ExactKind {
+    /// As a study writes it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Planar => "planar",
+            Self::LineSource => "line-source",
+            Self::PlanarGrowth => "planar-growth",
+            Self::DiscGrowth => "disc-growth",
+        }
+    }
 }
 
 /// `[time]`: start, end, steps and report times of the run.
