@@ -94,8 +94,8 @@ pub fn slides(options: Options) -> Result<Rerun> {
 
 fn notes(table: &mut Table) {
     table.note(
-        "energy: |ΔE − ∫F dt| over the heat that was moved, with fluxes through the walls by weighted residual, then by \
-         three rows",
+        "energy: |ΔE − ∫F dt| over the heat that was moved, with fluxes through the walls by weighted residual, then \
+         by three rows",
     );
     table.note("the published initial temperature contradicts the no-flux sides: the front bends up there at first");
     table.note(
