@@ -245,7 +245,7 @@ def test_a_missing_extra_says_what_to_install(monkeypatch):
 
 
 def test_a_bump_survives_a_hundred_meshes(capsys):
-    """By parabolas its peak loses at most a hundredth; the integral and 0 <= u <= 1 are kept, of many fields at once."""
+    """By parabolas its peak loses at most a hundredth; the integral and 0 <= u <= 1 are kept, of many fields."""
     start = Mesh.uniform(cells=(40, 40))
     bump = np.exp(-((start.x - 0.5) ** 2 + (start.y - 0.5) ** 2) / 0.02)
     u, mesh = np.stack([bump, 0.5 * bump, 1 - bump], axis=-1), start

@@ -61,7 +61,7 @@ pub struct FrontFigures {
     /// in place of three; none before it has moved.
     pub doubt: Option<f64>,
     /// The share of the columns at which one phase reaches the wall of the other one.
-    #[serde(skip_serializing_if = "none_of_it")]
+    #[serde(default, skip_serializing_if = "none_of_it")]
     pub bare: f64,
     /// Largest error of its height, where an exact solution is known.
     #[serde(skip_serializing_if = "Option::is_none")]

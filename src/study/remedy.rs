@@ -88,6 +88,8 @@ impl Keys {
             Setting::Smoothing | Setting::Strength | Setting::Followed => follows,
             Setting::Gradient => follows && self.is("mesh.form", "gradient"),
             Setting::Periodic => self.is("pde.kind", "shallow-water"),
+            // exact solutions say by their kind whether a melt is undercooled
+            Setting::Undercooled => self.at("exact").is_none(),
             Setting::Flux => self.is("pde.kind", "burgers") && self.is("pde.convection", "flux"),
             Setting::Linearized => classical,
             Setting::Coarse => classical && !self.is("schwarz.sweep", "alternating"),

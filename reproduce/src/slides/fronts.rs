@@ -94,13 +94,10 @@ pub fn slides(options: Options) -> Result<Rerun> {
 
 fn notes(table: &mut Table) {
     table.note(
-        "energy: |ΔE − ∫F dt| over the heat that was moved, with fluxes through the walls by weighted residual, then by \
-         three rows",
+        "energy: |ΔE − ∫F dt| over the heat that was moved, with fluxes through the walls by weighted residual, then \
+         by three rows",
     );
-    table.note(
-        "the published initial temperature contradicts the no-flux sides: the front bends up there at first, and the \
-         balance is off most while little heat has moved",
-    );
+    table.note("the published initial temperature contradicts the no-flux sides: the front bends up there at first");
     table.note(
         "the slides give neither D₀, D₁ and L_H, here 1, nor the step δ, here .01, nor the grid, here so many \
          columns and so many rows in each phase, nor a time but 7 and 17 steps: t = .85 is ours",
