@@ -136,8 +136,8 @@ impl Chart<2> {
     /// first turns into the second against the clock
     ///
     /// A closed axis is that of the parameter along which the map closes, and may run either way. Where no axis is
-    /// closed, the first is that of the parameter that turns into the other against the clock. With `exchange` false the
-    /// order is as it is.
+    /// closed, the first is that of the parameter that turns into the other against the clock. With `exchange` false
+    /// the order is as it is.
     ///
     /// # Errors
     /// As [`new`](Self::new), and where both axes are to be closed.

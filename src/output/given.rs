@@ -173,8 +173,8 @@ fn not_plot3d(count: usize) -> String {
     )
 }
 
-/// One block of PLOT3D: a head of whole numbers, then all x, all y and perhaps all z, the first axis fastest. `left` says
-/// how many numbers follow a head of so many.
+/// One block of PLOT3D: a head of whole numbers, then all x, all y and perhaps all z, the first axis fastest. `left`
+/// says how many numbers follow a head of so many.
 fn block(
     whole: &dyn Fn(usize) -> Option<usize>,
     left: &dyn Fn(usize) -> Option<usize>,
