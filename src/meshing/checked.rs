@@ -107,9 +107,9 @@ fn evened<const D: usize>(places: &Mesh<D>, marks: &[bool]) -> Vec<[f64; D]> {
     let near = |k: usize| marks[k] || (0..D).filter_map(|d| beside(k, d)).flatten().any(|(n, _)| marks[n]);
     let even = |k: usize| {
         let (mut sum, mut count) = ([0.0; D], 0.0);
-        for d in 0..D {
+        for (d, jump) in jump.iter().enumerate() {
             for (n, turns) in beside(k, d).into_iter().flatten() {
-                (0..D).for_each(|c| sum[c] += x[n][c] + turns * jump[d][c]);
+                (0..D).for_each(|c| sum[c] += x[n][c] + turns * jump[c]);
                 count += 1.0;
             }
         }
