@@ -287,15 +287,28 @@ fn closed_rings_are_solved() {
     let _: Option<Mesh<2>> = None;
 }
 
-/// The example studies keep their figures.
+/// The example studies keep their figures: smallest scaled Jacobian, error of interpolation, and of Burgers' front its
+/// largest error.
 #[test]
 fn example_studies_keep_their_figures() {
     let file = |name: &str| format!("{}/studies/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    for name in ["bump-around-ring", "bump-channel", "aerofoil"] {
+    for (name, jacobian, interpolation, linf) in [
+        ("bump-around-ring", 0.2801, 6.662e-3, None),
+        ("bump-channel", 0.0704, 1.615e-3, Some(6.147e-3)),
+        ("aerofoil", 9.366e-3, 1.679e-2, None),
+    ] {
         let study = MovingMesh::from_source(&Source::read(file(name).as_ref()).unwrap()).unwrap();
         let (run, failure) = study.compute().unwrap();
         assert!(failure.is_none(), "{name}: {failure:?}");
+        assert!(run.record.warnings.is_empty(), "{name}: {:?}", run.record.warnings);
         let report = run.record.reports.last().unwrap();
-        println!("{name}: {report:?} {:?}", run.record.warnings);
+        let found = [
+            (report.quality.min_scaled_jacobian, Some(jacobian)),
+            (report.benefit.unwrap().mesh, Some(interpolation)),
+            (report.error.map_or(0.0, |error| error.linf), linf),
+        ];
+        for (found, expected) in found.into_iter().filter_map(|(found, expected)| Some((found, expected?))) {
+            assert!((found / expected - 1.0).abs() < 0.02, "{name}: {found:e}, expected {expected:e}");
+        }
     }
 }
