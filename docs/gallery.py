@@ -17,7 +17,7 @@ STUDIES = {
     "rings-auto": "Rings",
     "stefan-slides": "A front between ice and water",
     "boundary-layer": "A layer in one dimension",
-    "front-around-ring": "A bump carried around a ring",
+    "bump-around-ring": "A bump carried around a ring",
     "bump-channel": "A shock over a bump",
     "aerofoil": "A ring around an aerofoil",
 }

@@ -67,3 +67,111 @@ def velocity(mesh: Mesh, old: Mesh, dt: float) -> Floats:
         size = mesh.upper[axis] - mesh.lower[axis]
         ways[axis] -= size * np.round(ways[axis] / size)
     return ways / time
+
+
+class Points:
+    """What a mesh tells of its nodes in time, and of fields between them."""
+
+    __slots__ = ()
+
+    @property
+    def jacobian(self: Mesh) -> Floats:
+        """J = x_ξ y_η − x_η y_ξ at the nodes, ξ and η in the unit square, shape (nx + 1, ny + 1); x_ξ on a line.
+
+        By the differences of :func:`gradient`, of second order, in the square of the unit of length: large where cells
+        are wide, and on a uniform mesh the area of the box.
+
+        >>> from driftmesh import Mesh
+        >>> float(Mesh.uniform(cells=(8, 8), upper=(2, 3)).jacobian[4, 4])
+        6.0
+        """
+        from .differences import tangents
+
+        determinants: Floats = np.linalg.det(tangents(self))
+        return determinants
+
+    def velocity(self: Mesh, old: Mesh, dt: float) -> Floats:
+        """(x_t, y_t): how fast each node moved from an earlier mesh to this one, shape (2, nx + 1, ny + 1).
+
+        ::
+
+            x_t = (x − x_old)/dt
+
+        On a line the shape is (1, nx + 1). Along a periodic axis a node goes the shorter way around, so that nodes
+        which left the box at one end and were put back at the other have not jumped.
+
+        Args:
+            old: The mesh before, over the same lattice and box.
+            dt: The time between both, above 0.
+
+        Raises:
+            ValueError: Another lattice or box, or ``dt`` not above 0.
+
+        >>> from driftmesh import Mesh
+        >>> old = Mesh.uniform(cells=(4, 4))
+        >>> x_t, y_t = old.moved(old.x**2, old.y).velocity(old, dt=0.5)
+        >>> float(x_t[2, 0])  # from 0.5 to 0.25
+        -0.5
+        """
+        return velocity(self, old, dt)
+
+    def interpolate(
+        self: Mesh,
+        u: ArrayLike,
+        x: ArrayLike,
+        y: ArrayLike | None = None,
+        *,
+        order: int = 1,
+    ) -> Floats:
+        """Values of nodal fields at any points.
+
+        ::
+
+            u(x) = Σ_k N_k(ξ) u_k  where  x = Σ_k N_k(ξ) x_k
+
+        with the products N_k of Lagrange's polynomials along ξ and η. Functions that are linear in x and y are exact on
+        any mesh.
+
+        Args:
+            u: One field of shape (nx + 1, ny + 1), on a line (nx + 1,), or several with further axes before these.
+            x: Where values are wanted, of any shape. Along a periodic axis any image of a point will do.
+            y: The same, of a shape that can be broadcast with that of ``x``; left out on a line.
+            order: 1 takes N_k to be linear along each axis of a cell: of second order, and within the range of the
+                values at the corners. 3 takes cubics through four nodes: of fourth order where the mesh is smooth, and
+                it may leave the range of the values.
+
+        Returns:
+            The values, with the further axes of ``u`` before those of the points.
+
+        Raises:
+            ValueError: Shapes that do not fit, values that are not finite, or a point outside of the mesh, of which the
+                first one is named.
+            driftmesh.errors.MeshFolded: A cell is folded.
+
+        >>> from driftmesh import Mesh
+        >>> mesh = Mesh.uniform(cells=(4, 4))
+        >>> mesh.interpolate(mesh.x * mesh.y, [0.3, 1.0], 0.5)
+        array([0.15, 0.5 ])
+        """
+        return interpolate(self, u, self._coordinates(x, y), order)
+
+    def sample(self: Mesh, u: ArrayLike, shape: int | Sequence[int], *, order: int = 1) -> Floats:
+        """Values of nodal fields on the regular grid of a number of points along each axis of the box.
+
+        Args:
+            u: As of :meth:`interpolate`.
+            shape: Numbers of points along x and y, 2 or more; one number for both. They are those of
+                ``np.linspace(lower, upper, n)``. The mesh must fill its box.
+            order: As of :meth:`interpolate`.
+
+        Returns:
+            The values, with the axes of the grid last, first index along x; raises as :meth:`interpolate` does.
+
+        >>> from driftmesh import Mesh
+        >>> mesh = Mesh.uniform(cells=(4, 4))
+        >>> mesh.moved(mesh.x**2, mesh.y).sample(mesh.x**2, (3, 2))
+        array([[0. , 0. ],
+               [0.5, 0.5],
+               [1. , 1. ]])
+        """
+        return sample(self, u, shape, order)

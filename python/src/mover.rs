@@ -34,8 +34,8 @@ pub struct Parts<const D: usize> {
     pub monitor: Box<dyn Monitor<D>>,
     pub mover: Mover<D>,
     pub check: Check<D>,
-    /// The mesh that the last step led to, of a domain that is no box in the unit square, and how it was going: forgotten
-    /// where the next step starts from another mesh.
+    /// The mesh that the last step led to, of a domain that is no box in the unit square, and how it was going:
+    /// forgotten where the next step starts from another mesh.
     pub last: Option<(Mesh<D>, Gait<D>)>,
 }
 

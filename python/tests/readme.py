@@ -1,4 +1,6 @@
-"""Runs the Python examples of docs/python.md in one namespace; those that need matplotlib where it is there."""
+"""Runs the Python examples of docs/python.md and docs/domains.md in one namespace; those that need matplotlib where it
+is there.
+"""
 
 import os
 import re
@@ -11,13 +13,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def examples() -> list[str]:
-    """The blocks of code of the page. That of the README is the first of them."""
+    """The blocks of code of the pages. That of the README is the first of them."""
     blocks = [
         re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.DOTALL | re.MULTILINE)
-        for page in ("README.md", "docs/python.md")
+        for page in ("README.md", "docs/python.md", "docs/domains.md")
     ]
     assert blocks[0] == blocks[1][:1], "the example of the README is not the first of docs/python.md"
-    return blocks[1]
+    return blocks[1] + blocks[2]
 
 
 def main() -> None:

@@ -46,8 +46,8 @@ pub trait Cells<const D: usize>: Sized {
     /// before, so that neighbouring points cost a few tests each.
     fn holding(&self, points: impl Iterator<Item = [f64; D]>) -> Vec<[usize; D]>;
 
-    /// The places in the unit box of points in a domain with a chart, and the points themselves in a box; else the index
-    /// of the first point outside.
+    /// The places in the unit box of points in a domain with a chart, and the points themselves in a box; else the
+    /// index of the first point outside.
     fn parameters_of<'a>(&self, points: &'a [[f64; D]]) -> Result<Cow<'a, [[f64; D]]>, usize> {
         Ok(Cow::Borrowed(points))
     }

@@ -28,12 +28,12 @@ pub struct Chart<const D: usize = 2> {
 
 /// Places and weights of Gauss's rule of six points on [0, 1].
 const GAUSS: [(f64, f64); 6] = [
-    (0.033765242898423989, 0.085662246189585173),
-    (0.169395306766867743, 0.180380786524069304),
-    (0.380690406958401545, 0.233956967286345523),
-    (0.619309593041598455, 0.233956967286345523),
-    (0.830604693233132257, 0.180380786524069304),
-    (0.966234757101576011, 0.085662246189585173),
+    (0.03376524289842399, 0.08566224618958518),
+    (0.16939530676686773, 0.1803807865240693),
+    (0.38069040695840156, 0.23395696728634552),
+    (0.6193095930415985, 0.23395696728634552),
+    (0.8306046932331322, 0.1803807865240693),
+    (0.966234757101576, 0.08566224618958518),
 ];
 /// Number of places along an axis at which a map is looked at before it is used.
 const SAMPLES: usize = 64;
@@ -117,10 +117,8 @@ impl Chart<2> {
                 return Err(Error::invalid("closed", format!("{closed:?}"), rule));
             }
         }
-        for axis in 0..2 {
-            for end in (0..2).filter(|_| !closed[axis]) {
-                chart.sides[axis][end] = chart.integrated(axis, end);
-            }
+        for axis in (0..2).filter(|&axis| !closed[axis]) {
+            chart.sides[axis] = [0, 1].map(|end| chart.integrated(axis, end));
         }
         let ends = |axis: usize| chart.sides[axis].each_ref().map(|side| side.last().copied().unwrap_or_default());
         let ([left, right], [bottom, top]) = (ends(0), ends(1));
@@ -136,8 +134,8 @@ impl Chart<2> {
     /// first turns into the second against the clock
     ///
     /// A closed axis is that of the parameter along which the map closes, and may run either way. Where no axis is
-    /// closed, the first is that of the parameter that turns into the other against the clock. With `exchange` false the
-    /// order is as it is.
+    /// closed, the first is that of the parameter that turns into the other against the clock. With `exchange` false
+    /// the order is as it is.
     ///
     /// # Errors
     /// As [`new`](Self::new), and where both axes are to be closed.

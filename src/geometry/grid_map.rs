@@ -102,7 +102,7 @@ impl Chart<2> {
     /// axis, which may run either way, the last nodes are the first ones again.
     ///
     /// # Errors
-    /// [`Error::Invalid`] as [`GridMap::new`] and [`Chart::new`], and where a cell of the mesh is folded or turned over.
+    /// [`Error::Invalid`] as [`GridMap::new`] and [`Chart::new`], and where a cell of the mesh is folded.
     pub fn through(nodes: [usize; 2], x: Vec<[f64; 2]>, closed: [bool; 2]) -> Result<Arc<Self>> {
         let chart = Self::oriented(GridMap::new(nodes, x, closed)?, closed, false).map_err(|error| match error {
             Error::Invalid { key, value, .. } if key == "map" => {

@@ -135,8 +135,8 @@ impl<const D: usize> Mesh<D> {
         Ok(Self { lattice, lower, upper, x, charted: None })
     }
 
-    /// The mesh of the unit box of which this one is the image; a mesh in a box itself. Mesh equations, their generators
-    /// and interpolation work on it, and so know boxes only.
+    /// The mesh of the unit box of which this one is the image; a mesh in a box itself. Mesh equations, their
+    /// generators and interpolation work on it, and so know boxes only.
     pub fn parameters(&self) -> &Self {
         self.charted.as_ref().map_or(self, |charted| &charted.places)
     }

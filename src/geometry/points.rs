@@ -34,8 +34,8 @@ pub enum Degree {
 ///
 /// Functions linear in x are exact on any mesh, and polynomials of the degree in each coordinate on uniform meshes.
 /// Beside bounded sides cubics take the four nodes next to the side. Where the cubic map has no ξ close to the one of
-/// the linear map, as among cells of very different shapes, the point is interpolated linearly. In a domain with a chart
-/// s takes the place of x: no point between a side and its chords is lost, and polynomials of s are exact.
+/// the linear map, as among cells of very different shapes, the point is interpolated linearly. In a domain with a
+/// chart s takes the place of x: no point between a side and its chords is lost, and polynomials of s are exact.
 ///
 /// # Example
 /// ```

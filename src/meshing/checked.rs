@@ -2,7 +2,7 @@
 
 use super::{Mmpde, Moved, Relaxation, Steps};
 use crate::error::Failure;
-use crate::geometry::{Density, Lattice, Mesh, check_unfolded, mark_folded};
+use crate::geometry::{Density, Mesh, check_unfolded, mark_folded};
 
 /// A folded mesh is blamed on noise where the standard error of the interface values exceeds this share of its shortest
 /// edge.
@@ -47,58 +47,78 @@ pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The most passes over places around folded cells.
+const PASSES: usize = 60;
 /// The most times that ways are halved.
 const HALVINGS: usize = 16;
 
-/// The mesh whose nodes go to other places of the unit box, some of them only part of the way
+/// The mesh whose nodes lie at other places of the unit box, or next to them
 ///
-/// Cells with straight edges may fold where those of the unit box do not: where few of them follow a strong curve, as
-/// around the nose of an aerofoil. The nodes of such cells go half as far, again and again, and no node goes more than
-/// twice the share of the way that its neighbours go. The mesh from which they come has no folded cells; where nothing
-/// helps it stays.
+/// Cells with straight edges may fold where those of the unit box do not: where few of them follow a strong curve, and
+/// lie aslant. Around such cells places are evened out, each half way to the mean of its neighbours, pass after pass,
+/// until no cell is folded: equal cells are none. If that takes too long, nodes go only part of the way from the mesh
+/// from which they come, which has no folded cells; where nothing helps it stays.
 pub(super) fn held_within<const D: usize>(mesh: &Mesh<D>, places: &Mesh<D>) -> Result<Mesh<D>, Failure> {
     check_unfolded(places)?;
-    let (from, lattice) = (mesh.parameters(), mesh.lattice());
-    let mut shares = vec![1.0; from.x().len()];
     let mut made = mesh.placed(places.x().to_vec())?;
-    for _ in 0..HALVINGS {
-        let mut marks = vec![false; shares.len()];
-        let any = mark_folded(&made, &mut marks) | mark_folded(made.parameters(), &mut marks);
-        if !any {
+    for _ in 0..PASSES {
+        let mut marks = vec![false; places.x().len()];
+        if !mark_folded(&made, &mut marks) {
             return Ok(made);
         }
-        shares.iter_mut().zip(marks).filter(|(_, mark)| *mark).for_each(|(share, _)| *share *= 0.5);
-        even_out(lattice, &mut shares);
-        let ways = from.x().iter().zip(places.x()).zip(&shares);
-        let way =
-            |((a, b), share): ((&[f64; D], &[f64; D]), &f64)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d]));
-        made = mesh.placed(ways.map(way).collect())?;
+        let evened = evened(made.parameters(), &marks);
+        let next = mesh.placed(evened)?;
+        if check_unfolded(next.parameters()).is_err() {
+            break;
+        }
+        made = next;
+    }
+    let (from, mut share) = (mesh.parameters(), 1.0);
+    for _ in 0..HALVINGS {
+        share *= 0.5;
+        let ways = from.x().iter().zip(places.x());
+        let part = ways.map(|(a, b)| std::array::from_fn(|d| a[d] + share * (b[d] - a[d])));
+        let held = mesh.placed(part.collect())?;
+        if check_unfolded(&held).is_ok() {
+            return Ok(held);
+        }
     }
     Ok(mesh.clone())
 }
 
-/// Lowers shares to at most twice those of the neighbours along the lattice.
-fn even_out<const D: usize>(lattice: &Lattice<D>, shares: &mut [f64]) {
+/// Places in the unit box, the marked ones and those next to them half way to the mean of their neighbours; along sides
+/// those on the side.
+fn evened<const D: usize>(places: &Mesh<D>, marks: &[bool]) -> Vec<[f64; D]> {
+    let (lattice, x, jump) = (places.lattice(), places.x(), places.jump());
     let (nodes, steps, wraps) = (lattice.nodes(), lattice.strides(), lattice.periodic());
-    loop {
-        let mut changed = false;
-        for k in 0..shares.len() {
-            let node = lattice.node(k);
-            for d in 0..D {
-                let above = match node[d] + 1 < nodes[d] {
-                    true => k + steps[d],
-                    false if wraps[d] => k - node[d] * steps[d],
-                    false => continue,
-                };
-                let [a, b] = [shares[k], shares[above]];
-                (shares[k], shares[above]) = (a.min(2.0 * b), b.min(2.0 * a));
-                changed |= [a, b] != [shares[k], shares[above]];
+    // the neighbours of a node along an axis, with the turns that lead there; none from a side
+    let beside = |k: usize, d: usize| -> Option<[(usize, f64); 2]> {
+        let (i, n) = (lattice.node(k)[d], nodes[d]);
+        let around = (n - 1) * steps[d];
+        match i {
+            0 if wraps[d] => Some([(k + around, -1.0), (k + steps[d], 0.0)]),
+            i if i + 1 == n && wraps[d] => Some([(k - steps[d], 0.0), (k - around, 1.0)]),
+            i if i == 0 || i + 1 == n => None,
+            _ => Some([(k - steps[d], 0.0), (k + steps[d], 0.0)]),
+        }
+    };
+    let sides = |k: usize| (0..D).filter(move |&d| beside(k, d).is_none());
+    let near = |k: usize| marks[k] || (0..D).filter_map(|d| beside(k, d)).flatten().any(|(n, _)| marks[n]);
+    let even = |k: usize| {
+        let (mut sum, mut count) = ([0.0; D], 0.0);
+        for (d, jump) in jump.iter().enumerate() {
+            for (n, turns) in beside(k, d).into_iter().flatten() {
+                (0..D).for_each(|c| sum[c] += x[n][c] + turns * jump[c]);
+                count += 1.0;
             }
         }
-        if !changed {
-            return;
-        }
-    }
+        let mut place: [f64; D] =
+            std::array::from_fn(|c| if count > 0.0 { 0.5 * (x[k][c] + sum[c] / count) } else { x[k][c] });
+        // along a side, and not off it
+        sides(k).for_each(|d| place[d] = x[k][d]);
+        place
+    };
+    (0..x.len()).map(|k| if near(k) { even(k) } else { x[k] }).collect()
 }
 
 /// Refuses a folded mesh; the failure carries the noise that may have folded it.

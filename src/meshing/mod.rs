@@ -38,7 +38,7 @@ use serde::{Deserialize, Serialize};
 pub trait MeshGenerator<const D: usize = 2>: Send {
     /// The mesh at t + `dt`, from the mesh at t and the density at its nodes. It calls [`solve`](Self::solve), and
     /// checks what is given and what is returned. In a domain with a chart it solves for the parameters of the nodes;
-    /// nodes whose cells would fold although those of the unit box do not are held back.
+    /// places around cells that would fold although those of the unit box do not are evened out.
     ///
     /// # Errors
     /// [`Failure::OutOfRange`] for a `dt` or τ that is not finite and positive, and for a prediction, which needs a

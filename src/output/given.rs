@@ -133,18 +133,18 @@ fn of_plot3d(bytes: &[u8]) -> std::result::Result<GivenMesh, String> {
         return block(&whole, &|head| values.len().checked_sub(head), &|k| values[k])
             .ok_or_else(|| not_plot3d(values.len()));
     }
-    let small = [u32::from_le_bytes, u32::from_be_bytes];
-    for order in 0..2 {
-        let contents = records(bytes, small[order]).unwrap_or_else(|| bytes.to_vec());
+    for reverses in [false, true] {
+        let small = if reverses { u32::from_be_bytes } else { u32::from_le_bytes };
+        let contents = records(bytes, small).unwrap_or_else(|| bytes.to_vec());
         let whole = |k: usize| {
             let four = contents.get(4 * k..4 * k + 4)?;
-            Some(small[order](four.try_into().ok()?) as usize)
+            Some(small(four.try_into().ok()?) as usize)
         };
         for width in [8, 4] {
             let number = |first: usize, k: usize| {
                 let from = 4 * first + width * k;
                 let mut bytes: Vec<u8> = contents[from..from + width].to_vec();
-                if order == 1 {
+                if reverses {
                     bytes.reverse();
                 }
                 match *bytes {
@@ -173,8 +173,8 @@ fn not_plot3d(count: usize) -> String {
     )
 }
 
-/// One block of PLOT3D: a head of whole numbers, then all x, all y and perhaps all z, the first axis fastest. `left` says
-/// how many numbers follow a head of so many.
+/// One block of PLOT3D: a head of whole numbers, then all x, all y and perhaps all z, the first axis fastest. `left`
+/// says how many numbers follow a head of so many.
 fn block(
     whole: &dyn Fn(usize) -> Option<usize>,
     left: &dyn Fn(usize) -> Option<usize>,

@@ -157,7 +157,8 @@ where
         Err(Error::invalid("time.tolerance", tolerance, rule))
     }
 
-    /// Places in the box, or in the unit square that the domain is the image of, `SAMPLES` and one along each axis but those along which they stand at one place.
+    /// Places in the box, or in the unit square that the domain is the image of: `SAMPLES` and one along each axis but
+    /// those along which they stand at one place.
     fn places(&self, at: [Option<f64>; D]) -> impl Iterator<Item = [f64; D]> {
         let (lower, upper) = (*self.domain.lower, *self.domain.upper);
         let count = at.iter().filter(|at| at.is_none()).count() as u32;
