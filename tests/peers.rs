@@ -49,7 +49,7 @@ fn gain(cells: usize, half: f64, text: &str, u: impl Fn(f64, f64) -> f64) -> f64
 /// there is to gain: its layer takes a larger share of the nodes.
 #[test]
 fn a_ring_has_less_error_than_equal_cells() {
-    for (radius, most) in [(0.3, 0.2), (0.5, 0.25), (0.7, 0.28)] {
+    for (radius, most) in [(0.3, 0.19), (0.5, 0.23), (0.7, 0.25)] {
         let text = format!("tanh((sqrt(x^2 + y^2) - {radius})/(0.03*sqrt(2)))");
         let u = |x: f64, y: f64| ((x.hypot(y) - radius) / (0.03 * 2.0_f64.sqrt())).tanh();
         let gain = gain(33, 0.99, &text, u);
@@ -57,15 +57,15 @@ fn a_ring_has_less_error_than_equal_cells() {
     }
 }
 
-/// Layers along an arc, as a solution of Poisson's equation may have: a tenth of the error of equal cells, which is
-/// what error-driven moving meshes of finite elements report.
+/// Layers along an arc, as a solution of Poisson's equation may have: about a twentieth of the error of equal cells;
+/// error-driven moving meshes of finite elements report a tenth.
 #[test]
-fn an_arc_has_a_tenth() {
+fn an_arc_has_a_twentieth() {
     for steep in [50.0, 100.0, 200.0] {
         let text = format!("tanh({steep}*(sqrt((x + 1.1)^2 + (y + 1.1)^2) - 1.4))");
         let u = |x: f64, y: f64| (steep * ((x + 1.1).hypot(y + 1.1) - 1.4)).tanh();
         let gain = gain(40, 1.0, &text, u);
-        assert!(gain <= 0.1, "{steep}: {gain:.3}");
+        assert!(gain <= 0.06, "{steep}: {gain:.3}");
     }
 }
 
@@ -79,7 +79,7 @@ fn layers_that_meet_have_their_nodes_both() {
         for e in [d, 0.2] {
             let text = format!("{}*{}", side("", "x", d), side("", "y", e));
             let gain = gain(40, 1.0, &text, |x, y| wall(x, d) * wall(y, e));
-            assert!(gain <= 0.1, "layers of {d} and {e}: {gain:.3}");
+            assert!(gain <= 0.12, "layers of {d} and {e}: {gain:.3}");
         }
     }
     let sides = [side("", "x", 0.04), side("-", "x", 0.04), side("", "y", 0.04), side("-", "y", 0.04)];
