@@ -48,8 +48,8 @@ class Arclength(Kind):
 class RootGradient(Kind):
     """ρ = 1 + 4 √|u_x| / mean of √|u_x|, smoothed, with nothing to set: ``monitor.kind = "auto"`` of a study.
 
-    In the plane there is one such density for each axis, the second with u_y: layers that lie across different axes draw
-    their own nodes each.
+    In the plane there is one such density for each axis, the second with u_y: layers that lie across different axes
+    draw their own nodes each.
 
     >>> from driftmesh import MeshGenerator, RootGradient
     >>> MeshGenerator().monitor == RootGradient()
