@@ -28,7 +28,7 @@
 //!     mesh = generator.step(&equation, &mesh, &rho, 1e-3)?.mesh;
 //! }
 //! let u: Vec<f64> = mesh.x().iter().map(|&x| front(x)).collect();
-//! let q = quality(&mesh, &monitor.density(&mesh, &u, None)?)?;
+//! let q = quality(&mesh, monitor.density(&mesh, &u, None)?.largest())?;
 //! assert!(q.min_scaled_jacobian > 0.0 && q.equidistribution < 2.0);
 //! # Ok::<(), driftmesh::Error>(())
 //! ```

@@ -157,7 +157,8 @@ fn changes(act: Act, key: &str, now: &Table) -> Vec<String> {
             (Setting::Density, "density.value") => "\"2 + x\"".into(),
             (Setting::Density, _) => "\"tanh(x)\"".into(),
             (Setting::Tolerance, _) => "1e-3".into(),
-            (Setting::Map, _) => "{ x = \"s\", y = \"r\" }".into(),
+            // a ring, whose second axis may be closed or not
+            (Setting::Map, _) => "{ x = \"(1 + r)*cos(2*pi*s)\", y = \"(1 + r)*sin(2*pi*s)\" }".into(),
             (Setting::Grading, "grid.grading.ratio") => "0.9".into(),
             (Setting::Slopes, "sides.neumann") => "[]".into(),
             (Setting::Slopes, _) => "\"exact\"".into(),

@@ -382,7 +382,7 @@ fn impossible_states_are_refused_by_name() {
         ("x", f64::NAN, "its mesh is [NaN, "),
         ("x", 0.5, "the mesh folded"),
         ("u", f64::INFINITY, "its solution is [inf] at node 0"),
-        ("rho", -1.0, "its density is -1 at node 0"),
+        ("rho", -1.0, "the mesh density is -1.000e0, not positive, at node (0, 0)"),
         ("velocity", f64::NAN, "its velocity is [NaN, "),
         ("t", 7.0, "at t = 7 is none of the run"),
         ("dt", 0.0, "its time steps are none of the run"),

@@ -395,6 +395,7 @@ fn every_study_is_tested() {
         include_str!("laplacian.rs"),
         include_str!("stefan.rs"),
         include_str!("data_sheets.rs"),
+        include_str!("curved.rs"),
         include_str!("equidistribution.rs")
     );
     for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies")).unwrap() {

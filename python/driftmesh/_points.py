@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,7 +75,7 @@ class Points:
     __slots__ = ()
 
     @property
-    def jacobian(self: Mesh) -> Floats:
+    def jacobian(self) -> Floats:
         """J = x_ξ y_η − x_η y_ξ at the nodes, ξ and η in the unit square, shape (nx + 1, ny + 1); x_ξ on a line.
 
         By the differences of :func:`gradient`, of second order, in the square of the unit of length: large where cells
@@ -87,10 +87,10 @@ class Points:
         """
         from .differences import tangents
 
-        determinants: Floats = np.linalg.det(tangents(self))
+        determinants: Floats = np.linalg.det(tangents(cast("Mesh", self)))
         return determinants
 
-    def velocity(self: Mesh, old: Mesh, dt: float) -> Floats:
+    def velocity(self, old: Mesh, dt: float) -> Floats:
         """(x_t, y_t): how fast each node moved from an earlier mesh to this one, shape (2, nx + 1, ny + 1).
 
         ::
@@ -113,10 +113,10 @@ class Points:
         >>> float(x_t[2, 0])  # from 0.5 to 0.25
         -0.5
         """
-        return velocity(self, old, dt)
+        return velocity(cast("Mesh", self), old, dt)
 
     def interpolate(
-        self: Mesh,
+        self,
         u: ArrayLike,
         x: ArrayLike,
         y: ArrayLike | None = None,
@@ -153,9 +153,10 @@ class Points:
         >>> mesh.interpolate(mesh.x * mesh.y, [0.3, 1.0], 0.5)
         array([0.15, 0.5 ])
         """
-        return interpolate(self, u, self._coordinates(x, y), order)
+        mesh = cast("Mesh", self)
+        return interpolate(mesh, u, mesh._coordinates(x, y), order)
 
-    def sample(self: Mesh, u: ArrayLike, shape: int | Sequence[int], *, order: int = 1) -> Floats:
+    def sample(self, u: ArrayLike, shape: int | Sequence[int], *, order: int = 1) -> Floats:
         """Values of nodal fields on the regular grid of a number of points along each axis of the box.
 
         Args:
@@ -174,4 +175,4 @@ class Points:
                [0.5, 0.5],
                [1. , 1. ]])
         """
-        return sample(self, u, shape, order)
+        return sample(cast("Mesh", self), u, shape, order)

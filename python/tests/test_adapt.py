@@ -264,7 +264,7 @@ def test_two_steps_with_a_mean_density_follow_the_density_first():
     """The first step from rest is the mesh equation with `density` itself."""
     mesh = Mesh.uniform(cells=(20, 20))
     u = ring(mesh.x, mesh.y)
-    generator = MeshGenerator(relaxation=0.5)
+    generator = MeshGenerator(monitor=Arclength(relative=30), relaxation=0.5)
     given = MeshGenerator(monitor=generator.density(mesh, u), relaxation=0.5)
     assert given.step(mesh, None, 0.1) == generator.step(mesh, u, 0.1)
 

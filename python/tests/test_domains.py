@@ -64,9 +64,9 @@ def test_meshes_of_domains_are_pickled():
     assert MeshGenerator().step(again, u, 0.1) == MeshGenerator().step(mesh, u, 0.1)
 
 
-def files(folder):
+def files(folder, around=40):
     """The same mesh in every format that is read, by its name."""
-    x, y = ring()
+    x, y = ring(m=around)
     n, m = x.shape
     np.savez(folder / "grid.npz", x=x, y=y)
     columns = [values.ravel(order="F") for values in (x, y)]
@@ -99,11 +99,11 @@ def test_files_of_every_format_are_the_same_mesh(tmp_path):
 def test_a_run_on_a_file_of_ones_own(tmp_path):
     from driftmesh import run
 
-    files(tmp_path)
+    files(tmp_path, around=80)
     study = {
         "study": {"name": "own", "kind": "moving-mesh"},
         "domain": {"mesh": str(tmp_path / "grid.xyz"), "closed": [False, True]},
-        "grid": {"cells": [10, 40]},
+        "grid": {"cells": [10, 80]},
         "time": {"start": 0.0, "end": 0.1, "step": 0.02},
         "pde": {"kind": "prescribed", "u": "tanh(10*(x - 0.3 - t))"},
         "output": {"report": False},

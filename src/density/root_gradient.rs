@@ -8,15 +8,16 @@ use std::borrow::Cow;
 /// The root of the slope, over its mean: no number to set
 ///
 /// ```text
-/// ρ_d = 1 + 4 s_d r / ⟨r⟩,   r = max(√|g_d| − b, 0),   b = ⟨|g_d|^⅛⟩⁴,   ⟨·⟩ the mean over the domain
+/// ρ_d = 1 + 4 s_d (m_d/m)² r / m_d,   r = max(√|g_d| − b, 0),   b = ⟨|g_d|^⅛⟩⁴,   m_d = ⟨r⟩
 /// ```
 ///
-/// for each axis d, with g the gradient of u in each mesh cell per uniform cell along each axis, (h_x u_x, h_y u_y), so
-/// that a box of any shape is treated alike. A layer of any width gets the same share of the nodes, about half of them:
-/// the mean of the root falls with the width as fast as its largest value grows. The background b is 0 where u is flat
-/// outside its layers, and takes out the slopes between the shocks of a saw tooth, which would share the nodes
-/// otherwise. With a density for each axis, layers along two adjacent sides, or across each other, have their nodes
-/// both.
+/// for each axis d, ⟨·⟩ the mean over the domain, m the largest m_d, with g the gradient of u in each mesh cell per
+/// uniform cell along each axis, (h_x u_x, h_y u_y), so that a box of any shape is treated alike. A layer of any width
+/// gets the same share of the nodes, about half of them: the mean of the root falls with the width as fast as its
+/// largest value grows. The background b is 0 where u is flat outside its layers, and takes out the slopes between the
+/// shocks of a saw tooth, which would share the nodes otherwise. With a density for each axis, layers along two
+/// adjacent sides, or across each other, have their nodes both. An axis along which less changes draws less, by
+/// (m_d/m)²: along a wave-shaped layer its slopes are those of flanks that mesh lines follow anyway.
 ///
 /// Of several unknowns, each in units of its range, the largest |g_d| counts, and the largest need: what equal cells
 /// resolve of one unknown would not be resolved any more where all nodes go to a layer of another.
@@ -96,7 +97,10 @@ impl RootGradient {
         let Followed { slopes, needs, step } = Followed::of(mesh, unknowns);
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
         let contrast = CONTRAST * (CONTRAST_OF_JUMPS / CONTRAST).powf(between(JUMPS, step));
-        let axes = slopes.into_iter().zip(needs).map(|(slopes, need)| along(mesh, slopes, need, contrast));
+        let axes = slopes.into_iter().zip(needs).map(|(slopes, need)| Roots::of(mesh, slopes, need));
+        let axes: Vec<Option<Roots>> = axes.collect();
+        let most = axes.iter().flatten().map(|roots| roots.mean).fold(0.0, larger);
+        let axes = axes.into_iter().map(|roots| Some(along(mesh, roots?, most, contrast)));
         let axes: Vec<Option<Vec<f64>>> = axes.collect();
         if axes.iter().all(Option::is_none) {
             return Ok(vec![1.0; lattice.len()].into());
@@ -112,20 +116,14 @@ impl RootGradient {
     }
 }
 
-/// ρ along an axis from |g_d| of the cells and the need; nothing where it is even.
-fn along<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>, need: f64, contrast: f64) -> Option<Vec<f64>>
+/// ρ along an axis; `most` is the largest mean of an axis.
+fn along<const D: usize>(mesh: &Mesh<D>, roots: Roots, most: f64, contrast: f64) -> Vec<f64>
 where
     Mesh<D>: Cells<D>,
 {
-    if need == 0.0 {
-        return None;
-    }
     let lattice = mesh.lattice();
-    let Roots { mut roots, background, mean, steepest } = Roots::of(mesh, slopes);
-    let beta = BETA * need * between(STEEPER, steepest / (background * background));
-    if beta == 0.0 || mean <= ROUNDING * background {
-        return None;
-    }
+    let Roots { mut roots, background, mean, steepest, beta } = roots;
+    let beta = beta * (mean / most).powi(2);
     let mean = mean.max(BETA * (steepest.sqrt() - background) / contrast);
     roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
     let mut rho = roots;
@@ -136,7 +134,7 @@ where
         (passes - 1.0).max(0.0)
     });
     smooth_widely(cells, lattice.periodic(), &mut rho, passes);
-    Some(Mesh::<D>::at_nodes(lattice, rho))
+    Mesh::<D>::at_nodes(lattice, rho)
 }
 
 /// What the mesh follows.
@@ -245,14 +243,19 @@ struct Roots {
     mean: f64,
     /// The largest |g_d|.
     steepest: f64,
+    /// β as far as there is a need.
+    beta: f64,
 }
 
 impl Roots {
-    /// From |g_d| of the cells.
-    fn of<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>) -> Self
+    /// From |g_d| of the cells and the need; nothing where ρ is even.
+    fn of<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>, need: f64) -> Option<Self>
     where
         Mesh<D>: Cells<D>,
     {
+        if need == 0.0 {
+            return None;
+        }
         let box_volume: f64 = mesh.extent().iter().product();
         let steepest = slopes.iter().copied().fold(0.0, larger);
         let mut roots = slopes;
@@ -260,7 +263,9 @@ impl Roots {
         let background = sum(roots.iter().zip(mesh.volumes()).map(|(root, volume)| volume * root.sqrt().sqrt()));
         let background = (background / box_volume).powi(4);
         let above = sum(roots.iter().zip(mesh.volumes()).map(|(root, volume)| (root - background).max(0.0) * volume));
-        Self { roots, background, mean: above / box_volume, steepest }
+        let (mean, beta) = (above / box_volume, BETA * need * between(STEEPER, steepest / (background * background)));
+        let is_even = beta == 0.0 || mean <= ROUNDING * background;
+        (!is_even).then_some(Self { roots, background, mean, steepest, beta })
     }
 }
 

@@ -41,8 +41,8 @@ pub enum Form {
     /// ```
     ///
     /// ρ is averaged from the nodes to the mesh cells; ρ_e is the mean over the cells beside an edge of the density
-    /// along its axis, W_i the mean over the cells around a node, the largest over the axes. Multiplied by W, the matrix
-    /// is a symmetric M-matrix for any ρ, and the same for x and y.
+    /// along its axis, W_i the mean over the cells around a node, the largest over the axes. Multiplied by W, the
+    /// matrix is a symmetric M-matrix for any ρ, and the same for x and y.
     Conservative,
 }
 

@@ -177,7 +177,7 @@ impl Estimates {
 /// make the mesh of [`Whole`](crate::meshing::Whole).
 ///
 /// ```
-/// use driftmesh::geometry::{Lattice, Mesh};
+/// use driftmesh::geometry::{Density, Lattice, Mesh};
 /// use driftmesh::meshing::{Estimate, Estimates, Estimator, MeshGenerator, Mmpde, Problem, Stochastic, Strips, Whole};
 /// use driftmesh::{Failure, Work};
 ///
