@@ -157,8 +157,12 @@ fn changes(act: Act, key: &str, now: &Table) -> Vec<String> {
             (Setting::Density, "density.value") => "\"2 + x\"".into(),
             (Setting::Density, _) => "\"tanh(x)\"".into(),
             (Setting::Tolerance, _) => "1e-3".into(),
-            // a ring, whose second axis may be closed or not
-            (Setting::Map, _) => "{ x = \"(1 + r)*cos(2*pi*s)\", y = \"(1 + r)*sin(2*pi*s)\" }".into(),
+            (Setting::Map, _) => match at(now, "domain.closed").and_then(Value::as_array) {
+                Some(closed) if closed.contains(&Value::Boolean(true)) => {
+                    "{ x = \"(1 + r)*cos(2*pi*s)\", y = \"(1 + r)*sin(2*pi*s)\" }".into()
+                }
+                _ => "{ x = \"s\", y = \"r\" }".into(),
+            },
             (Setting::Grading, "grid.grading.ratio") => "0.9".into(),
             (Setting::Slopes, "sides.neumann") => "[]".into(),
             (Setting::Slopes, _) => "\"exact\"".into(),

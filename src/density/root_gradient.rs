@@ -8,7 +8,7 @@ use std::borrow::Cow;
 /// The root of the slope, over its mean: no number to set
 ///
 /// ```text
-/// ρ_d = 1 + 4 s_d (m_d/m)² r / m_d,   r = max(√|g_d| − b, 0),   b = ⟨|g_d|^⅛⟩⁴,   m_d = ⟨r⟩
+/// ρ_d = 1 + 4 s_d w_d r / m_d,   w_d = max((m_d/m)³, 0.1),   r = max(√|g_d| − b, 0),   b = ⟨|g_d|^⅛⟩⁴,   m_d = ⟨r⟩
 /// ```
 ///
 /// for each axis d, ⟨·⟩ the mean over the domain, m the largest m_d, with g the gradient of u in each mesh cell per
@@ -16,8 +16,8 @@ use std::borrow::Cow;
 /// gets the same share of the nodes, about half of them: the mean of the root falls with the width as fast as its
 /// largest value grows. The background b is 0 where u is flat outside its layers, and takes out the slopes between the
 /// shocks of a saw tooth, which would share the nodes otherwise. With a density for each axis, layers along two
-/// adjacent sides, or across each other, have their nodes both. An axis along which less changes draws less, by
-/// (m_d/m)²: along a wave-shaped layer its slopes are those of flanks that mesh lines follow anyway.
+/// adjacent sides, or across each other, have their nodes both. An axis along which less changes draws less, by w_d:
+/// along a wave-shaped layer its slopes are those of flanks that mesh lines follow anyway.
 ///
 /// Of several unknowns, each in units of its range, the largest |g_d| counts, and the largest need: what equal cells
 /// resolve of one unknown would not be resolved any more where all nodes go to a layer of another.
@@ -39,6 +39,8 @@ pub struct RootGradient {}
 
 /// β where equal cells do not resolve u: the density is 1 + β (√|∇u| − background)/mean before it is smoothed.
 const BETA: f64 = 4.0;
+/// Smallest weight w_d of an axis: thin layers across one axis leave thick ones across another their nodes.
+const LEAST_WEIGHT: f64 = 0.1;
 /// Largest ratio of two values of the density before it is smoothed.
 const CONTRAST: f64 = 1e6;
 /// Largest ratio of two values of the density around a jump, which no mesh resolves, before it is smoothed: cells there
@@ -123,7 +125,7 @@ where
 {
     let lattice = mesh.lattice();
     let Roots { mut roots, background, mean, steepest, beta } = roots;
-    let beta = beta * (mean / most).powi(2);
+    let beta = beta * larger((mean / most).powi(3), LEAST_WEIGHT);
     let mean = mean.max(BETA * (steepest.sqrt() - background) / contrast);
     roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
     let mut rho = roots;
