@@ -13,7 +13,7 @@ def test_every_picture_and_report_of_the_gallery_is_there(tmp_path):
     page = (tmp_path / "index.html").read_text()
     named = re.findall(r'(?:src|srcset|href)="([^"]+/[^"]+)"', page)
     assert (
-        sum(name.endswith("report.html") for name in named) == 2 * 6
-        and sum(name.endswith(".gif") for name in named) == 6
+        sum(name.endswith("report.html") for name in named) == 2 * 9
+        and sum(name.endswith(".gif") for name in named) == 9
     )
     assert [name for name in named if not (tmp_path / name).is_file()] == []
