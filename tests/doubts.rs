@@ -27,7 +27,7 @@ fn standing_front(width: f64, relaxation: &str) -> MovingMesh {
 /// A number that is too small for the front is named with one that is not; with that, and without any, nothing is said.
 #[test]
 fn a_relaxation_that_is_too_short_is_told_the_limit() {
-    for width in [200.0, 300.0] {
+    for width in [150.0, 300.0] {
         let said = warnings(&standing_front(width, "{ steps = 15, prediction = 0.2 }"));
         let [said] = &said[..] else { panic!("{said:?}") };
         assert!(said.starts_with("`mesh.relaxation` is short: at t = 0."), "{said}");

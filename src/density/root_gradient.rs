@@ -8,16 +8,21 @@ use std::borrow::Cow;
 /// The root of the slope, over its mean: no number to set
 ///
 /// ```text
-/// ρ_d = 1 + 4 s_d w_d r / m_d,   w_d = max((m_d/m)³, 0.1),   r = max(√|g_d| − b, 0),   b = ⟨|g_d|^⅛⟩⁴,   m_d = ⟨r⟩
+/// ρ_d = c_d (1 + 4 s_d w_d r / m_d),   r = max(√|g_d| − b, 0),   b = ⟨|g_d|^⅛⟩⁴,   m_d = ⟨r⟩,
+/// w_d = max(q_d³, 0.1),   c_d = max(q_d, 1 − q_d)³,   q_d = s_d m_d / max_d s_d m_d
 /// ```
 ///
-/// for each axis d, ⟨·⟩ the mean over the domain, m the largest m_d, with g the gradient of u in each mesh cell per
-/// uniform cell along each axis, (h_x u_x, h_y u_y), so that a box of any shape is treated alike. A layer of any width
+/// for each axis d, ⟨·⟩ the mean over the domain, with g the gradient of u in each mesh cell per uniform cell along each
+/// axis, (h_x u_x, h_y u_y), so that a box of any shape is treated alike. A layer of any width
 /// gets the same share of the nodes, about half of them: the mean of the root falls with the width as fast as its
 /// largest value grows. The background b is 0 where u is flat outside its layers, and takes out the slopes between the
 /// shocks of a saw tooth, which would share the nodes otherwise. With a density for each axis, layers along two
-/// adjacent sides, or across each other, have their nodes both. An axis along which less changes draws less, by w_d:
-/// along a wave-shaped layer its slopes are those of flanks that mesh lines follow anyway.
+/// adjacent sides, or across each other, have their nodes both.
+///
+/// An axis along which less changes, q_d < 1, draws fewer nodes, by w_d: along a wave-shaped layer its slopes are those
+/// of flanks that mesh lines can follow. So that they can, neighbouring lines are tied less along that axis, by c_d.
+/// Where nothing changes along an axis, q_d = 0, lines have nothing to follow and are tied in full: on periodic axes they
+/// would drift apart otherwise.
 ///
 /// Of several unknowns, each in units of its range, the largest |g_d| counts, and the largest need: what equal cells
 /// resolve of one unknown would not be resolved any more where all nodes go to a layer of another.
@@ -39,7 +44,8 @@ pub struct RootGradient {}
 
 /// β where equal cells do not resolve u: the density is 1 + β (√|∇u| − background)/mean before it is smoothed.
 const BETA: f64 = 4.0;
-/// Smallest weight w_d of an axis: thin layers across one axis leave thick ones across another their nodes.
+/// Smallest weight w_d of an axis: thin layers across one axis leave thick ones across another their nodes, and mesh
+/// lines stay tied to their neighbours.
 const LEAST_WEIGHT: f64 = 0.1;
 /// Largest ratio of two values of the density before it is smoothed.
 const CONTRAST: f64 = 1e6;
@@ -100,14 +106,12 @@ impl RootGradient {
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
         let contrast = CONTRAST * (CONTRAST_OF_JUMPS / CONTRAST).powf(between(JUMPS, step));
         let axes = slopes.into_iter().zip(needs).map(|(slopes, need)| Roots::of(mesh, slopes, need));
-        let axes: Vec<Option<Roots>> = axes.collect();
-        let most = axes.iter().flatten().map(|roots| roots.mean).fold(0.0, larger);
-        let axes = axes.into_iter().map(|roots| Some(along(mesh, roots?, most, contrast)));
-        let axes: Vec<Option<Vec<f64>>> = axes.collect();
-        if axes.iter().all(Option::is_none) {
+        let axes: Vec<Roots> = axes.collect();
+        let most = axes.iter().map(Roots::drawn).fold(0.0, larger);
+        if most == 0.0 {
             return Ok(vec![1.0; lattice.len()].into());
         }
-        let mut axes = axes.into_iter().map(|rho| rho.unwrap_or_else(|| vec![1.0; lattice.len()]));
+        let mut axes = axes.into_iter().map(|roots| along(mesh, roots, most, contrast));
         let axes: [Vec<f64>; D] = std::array::from_fn(|_| axes.next().expect("one for each axis"));
         let bad = |rho: &Vec<f64>| rho.iter().position(|rho| !rho.is_finite()).map(|k| (k, rho[k]));
         if let Some((k, value)) = axes.iter().find_map(bad) {
@@ -118,16 +122,22 @@ impl RootGradient {
     }
 }
 
-/// ρ along an axis; `most` is the largest mean of an axis.
+/// ρ along an axis; `most` is the largest of what the axes draw.
 fn along<const D: usize>(mesh: &Mesh<D>, roots: Roots, most: f64, contrast: f64) -> Vec<f64>
 where
     Mesh<D>: Cells<D>,
 {
     let lattice = mesh.lattice();
-    let Roots { mut roots, background, mean, steepest, beta } = roots;
-    let beta = beta * larger((mean / most).powi(3), LEAST_WEIGHT);
+    let share = roots.drawn() / most;
+    let weight = larger(share.powi(3), LEAST_WEIGHT);
+    let tie = larger(share, 1.0 - share).powi(3);
+    let Roots { mut roots, background, mean, steepest, need } = roots;
+    if need == 0.0 {
+        return vec![tie; lattice.len()];
+    }
     let mean = mean.max(BETA * (steepest.sqrt() - background) / contrast);
-    roots.iter_mut().for_each(|root| *root = 1.0 + beta * (*root - background).max(0.0) / mean);
+    let height = BETA * need * weight / mean;
+    roots.iter_mut().for_each(|root| *root = 1.0 + height * (*root - background).max(0.0));
     let mut rho = roots;
     let (cells, layers) = (lattice.cells(), layers(lattice, &rho));
     let passes = std::array::from_fn(|d| {
@@ -136,7 +146,9 @@ where
         (passes - 1.0).max(0.0)
     });
     smooth_widely(cells, lattice.periodic(), &mut rho, passes);
-    Mesh::<D>::at_nodes(lattice, rho)
+    let mut rho = Mesh::<D>::at_nodes(lattice, rho);
+    rho.iter_mut().for_each(|rho| *rho *= tie);
+    rho
 }
 
 /// What the mesh follows.
@@ -245,18 +257,18 @@ struct Roots {
     mean: f64,
     /// The largest |g_d|.
     steepest: f64,
-    /// β as far as there is a need.
-    beta: f64,
+    /// The need; 0 where ρ is even.
+    need: f64,
 }
 
 impl Roots {
-    /// From |g_d| of the cells and the need; nothing where ρ is even.
-    fn of<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>, need: f64) -> Option<Self>
+    /// From |g_d| of the cells and the need as far as their size tells of it.
+    fn of<const D: usize>(mesh: &Mesh<D>, slopes: Vec<f64>, need: f64) -> Self
     where
         Mesh<D>: Cells<D>,
     {
         if need == 0.0 {
-            return None;
+            return Self { roots: slopes, background: 0.0, mean: 0.0, steepest: 0.0, need };
         }
         let box_volume: f64 = mesh.extent().iter().product();
         let steepest = slopes.iter().copied().fold(0.0, larger);
@@ -265,9 +277,15 @@ impl Roots {
         let background = sum(roots.iter().zip(mesh.volumes()).map(|(root, volume)| volume * root.sqrt().sqrt()));
         let background = (background / box_volume).powi(4);
         let above = sum(roots.iter().zip(mesh.volumes()).map(|(root, volume)| (root - background).max(0.0) * volume));
-        let (mean, beta) = (above / box_volume, BETA * need * between(STEEPER, steepest / (background * background)));
-        let is_even = beta == 0.0 || mean <= ROUNDING * background;
-        (!is_even).then_some(Self { roots, background, mean, steepest, beta })
+        let mean = above / box_volume;
+        let is_even = mean <= ROUNDING * background;
+        let need = if is_even { 0.0 } else { need * between(STEEPER, steepest / (background * background)) };
+        Self { roots, background, mean, steepest, need }
+    }
+
+    /// s_d m_d, how much the axis has for nodes to be drawn to.
+    fn drawn(&self) -> f64 {
+        self.need * self.mean
     }
 }
 

@@ -1,168 +1,171 @@
-//! A figure drawn by `plotters`.
+//! A figure as SVG.
 
 use super::figure::{COLOURS, Curve, Figure, Scale};
-use super::picture::FONT;
+use super::sheet::{Frame, LEFT, TOP, escape};
 use super::ticks::{Ticks, log_marks, short};
-use plotters::coord::combinators::{BindKeyPoints, LogCoord};
-use plotters::coord::ranged1d::ValueFormatter;
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
-use plotters::style::{FontStyle, register_font};
-use std::error::Error;
 use std::fmt::Write;
 
-/// Width and height of a figure, in pixels.
-const SIZE: (u32, u32) = (620, 430);
-/// Parts of a pixel in which everything is placed: the drawing library knows whole numbers only.
-const FINE: u32 = 8;
-/// Number of letters of a title beyond which it is drawn smaller.
-const LETTERS: f64 = 64.0;
+/// Width and height of a plot, without what is around it, in units of the drawing.
+pub(super) const PLOT: [f64; 2] = [520.0, 318.0];
+/// Room to the right of a plot, in units of the drawing.
+const RIGHT: f64 = 24.0;
 /// Number of marks of a curve beyond which they are drawn smaller.
 const MANY: usize = 40;
+/// Height of a row of the legend, in units of the drawing.
+pub(super) const ROW: f64 = 22.0;
+/// Width of what a legend has beside its words: a piece of each line, and margins; in units of the drawing.
+pub(super) const BESIDE: f64 = 64.0;
+/// Width of a letter of the legend, in units of the drawing: that of wide ones, so that the words find room.
+pub(super) const LETTER: f64 = 7.5;
 
-/// An axis of a chart.
-trait Axis: Ranged<ValueType = f64> + ValueFormatter<f64> + 'static {}
+/// A figure, and where its axes begin and end.
+struct Chart<'a> {
+    figure: &'a Figure,
+    ends: [[f64; 2]; 2],
+}
 
-impl<T: Ranged<ValueType = f64> + ValueFormatter<f64> + 'static> Axis for T {}
-
-type Chart<'a, X, Y> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>;
-
-/// A figure as SVG.
 pub(super) fn svg(figure: &Figure) -> String {
-    let mut svg = String::new();
-    figure.plot(&mut svg).expect("drawing into memory cannot fail");
-    // lines of the grid are sharp
-    let svg = with_opacity_of_paint(&svg).replace("<line ", "<line shape-rendering=\"crispEdges\" ");
-    // shown at its size, in units that are finer
-    let size = |fine: u32| format!("width=\"{}\" height=\"{}\"", SIZE.0 * fine, SIZE.1 * fine);
-    svg.replacen(&size(FINE), &size(1), 1)
+    let chart = Chart { figure, ends: [figure.ends(0), figure.ends(1)] };
+    let frame = Frame { size: PLOT, right: RIGHT };
+    let mut s = frame.begin(&figure.title);
+    chart.axes(&mut s, &frame);
+    for (curve, colour) in figure.curves.iter().zip(COLOURS.into_iter().cycle()) {
+        chart.curve(&mut s, curve, &hex(colour));
+    }
+    if figure.is_named() {
+        chart.legend(&mut s);
+    }
+    s.push_str("</svg>\n");
+    s
 }
 
-fn font(size: u32) -> FontDesc<'static> {
-    ("DejaVu Sans", size * FINE).into_font()
+fn hex([r, g, b]: [u8; 3]) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-impl Figure {
-    fn plot(&self, svg: &mut String) -> Result<(), Box<dyn Error>> {
-        use Scale::{Linear, Logarithmic};
-        let range = |d: usize| self.ends(d)[0]..self.ends(d)[1];
-        let plain = |d: usize| RangedCoordf64::from(range(d));
-        let log = |d: usize| {
-            let [bold, light] = log_marks(self.ends(d));
-            LogCoord::from(range(d).log_scale()).with_key_points(bold).with_light_points(light)
-        };
-        match self.scales {
-            [Logarithmic, Logarithmic] => self.chart(svg, log(0), log(1)),
-            [Linear, Logarithmic] => self.chart(svg, plain(0), log(1)),
-            [Logarithmic, Linear] => self.chart(svg, log(0), plain(1)),
-            [Linear, Linear] => self.chart(svg, plain(0), plain(1)),
+fn circle(s: &mut String, [x, y]: [f64; 2], radius: f64, paint: &str) {
+    let _ = writeln!(s, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" {paint}/>");
+}
+
+impl Chart<'_> {
+    /// Where a value is along an axis, as a share of its length.
+    fn share(&self, value: f64, d: usize) -> f64 {
+        let [low, high] = self.ends[d];
+        match self.figure.scales[d] {
+            Scale::Linear => (value - low) / (high - low),
+            Scale::Logarithmic => (value / low).ln() / (high / low).ln(),
         }
     }
 
-    fn chart<X: Axis, Y: Axis>(&self, svg: &mut String, x: X, y: Y) -> Result<(), Box<dyn Error>> {
-        // a font that is registered twice stays the same
-        let _ = register_font("DejaVu Sans", FontStyle::Normal, FONT);
-        let area = SVGBackend::with_string(svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
-        area.fill(&WHITE)?;
-        // room above the title, and between it and the plot; a long one is smaller
-        let inner = area.margin(8 * FINE as i32, 0, 0, 0);
-        let share = (LETTERS / self.title.chars().count() as f64).min(1.0);
-        let heading = ("DejaVu Sans", (17.0 * FINE as f64 * share) as u32).into_font();
-        let below = inner.titled(&self.title, heading)?.margin(4 * FINE as i32, 0, 0, 0);
-        let mut chart = ChartBuilder::on(&below)
-            .margin(14 * FINE)
-            .margin_right(24 * FINE)
-            .x_label_area_size(46 * FINE)
-            .y_label_area_size(74 * FINE)
-            .build_cartesian_2d(x, y)?;
-        self.draw_axes(&mut chart)?;
-        for (curve, colour) in self.curves.iter().zip(COLOURS.into_iter().cycle()) {
-            self.draw_curve(&mut chart, curve, colour)?;
-        }
-        if self.is_named() {
-            chart
-                .configure_series_labels()
-                .label_font(font(15))
-                .background_style(WHITE.mix(0.9))
-                .border_style(BLACK.mix(0.4).stroke_width(FINE))
-                .margin(8 * FINE)
-                .legend_area_size(30 * FINE)
-                .position(self.free_corner().unwrap_or(SeriesLabelPosition::UpperRight))
-                .draw()?;
-        }
-        area.present()?;
-        Ok(())
+    fn place(&self, p: [f64; 2]) -> [f64; 2] {
+        [LEFT + self.share(p[0], 0) * PLOT[0], TOP + (1.0 - self.share(p[1], 1)) * PLOT[1]]
     }
 
-    /// Draws axes, their names and labels, and the grid.
-    fn draw_axes<X: Axis, Y: Axis>(&self, chart: &mut Chart<'_, X, Y>) -> Result<(), Box<dyn Error>> {
-        let ticks = [0, 1].map(|d| {
-            let [low, high] = self.ends(d);
-            (self.scales[d] == Scale::Linear).then(|| Ticks::between(low, high))
+    /// Axes with their names and labels, over the lines of a grid.
+    fn axes(&self, s: &mut String, frame: &Frame) {
+        let mut names = self.figure.labels.clone();
+        let marks = [0, 1].map(|d| {
+            let (bold, light, labels) = match self.figure.scales[d] {
+                Scale::Linear => {
+                    let ticks = Ticks::between(self.ends[d][0], self.ends[d][1]);
+                    names[d] = ticks.named(&names[d]);
+                    let (places, labels): (Vec<f64>, Vec<String>) = ticks.marks.into_iter().unzip();
+                    (places, Vec::new(), labels)
+                }
+                Scale::Logarithmic => {
+                    let [bold, light] = log_marks(self.ends[d]);
+                    let labels = bold.iter().map(|value| short(*value)).collect();
+                    (bold, light, labels)
+                }
+            };
+            grid(s, d, light.iter().map(|value| self.share(*value, d)), 0.04);
+            grid(s, d, bold.iter().map(|value| self.share(*value, d)), 0.15);
+            bold.into_iter().map(|value| self.share(value, d)).zip(labels).collect::<Vec<_>>()
         });
-        let names =
-            [0, 1].map(|d| ticks[d].as_ref().map_or(self.labels[d].clone(), |ticks| ticks.named(&self.labels[d])));
-        let label = |value: f64, d: usize| ticks[d].as_ref().map_or_else(|| short(value), |ticks| ticks.label(value));
-        let light = |d: usize| usize::from(ticks[d].is_none());
-        chart
-            .configure_mesh()
-            .x_desc(&names[0])
-            .y_desc(&names[1])
-            .label_style(font(15))
-            .axis_desc_style(font(16))
-            .axis_style(BLACK.stroke_width(FINE))
-            .set_all_tick_mark_size(5 * FINE)
-            .bold_line_style(BLACK.mix(0.15).stroke_width(FINE))
-            .light_line_style(BLACK.mix(0.04).stroke_width(FINE))
-            .x_max_light_lines(light(0))
-            .y_max_light_lines(light(1))
-            .x_label_formatter(&|x| label(*x, 0))
-            .y_label_formatter(&|y| label(*y, 1))
-            .draw()?;
-        Ok(())
+        frame.axes(s, &marks, &names);
     }
 
-    /// Draws the line of a curve, its marks, and its row of the legend.
-    fn draw_curve<X: Axis, Y: Axis>(
-        &self,
-        chart: &mut Chart<'_, X, Y>,
-        curve: &Curve,
-        colour: RGBColor,
-    ) -> Result<(), Box<dyn Error>> {
-        let shown = |points: &[[f64; 2]]| -> Vec<(f64, f64)> {
-            points.iter().filter(|p| self.shown(p)).map(|p| (p[0], p[1])).collect()
+    /// The line of a curve, and its marks.
+    fn curve(&self, s: &mut String, curve: &Curve, colour: &str) {
+        let shown = |points: &[[f64; 2]]| -> Vec<[f64; 2]> {
+            points.iter().filter(|p| self.figure.shown(p)).map(|p| self.place(*p)).collect()
         };
-        let line = self.line(curve).into_iter().filter(|_| !curve.scattered).map(|[x, y]| (x, y));
-        let style = if curve.faint { BLACK.mix(0.25).stroke_width(FINE) } else { colour.stroke_width(2 * FINE) };
-        let drawn = chart.draw_series(LineSeries::new(line, style))?;
-        if !curve.name.is_empty() {
-            let (fine, scattered) = (FINE as i32, curve.scattered);
-            drawn.label(&curve.name).legend(move |(x, y)| match scattered {
-                true => Circle::new((x + 11 * fine, y), 4 * FINE, colour.filled()).into_dyn(),
-                false => PathElement::new([(x, y), (x + 22 * fine, y)], colour.stroke_width(2 * FINE)).into_dyn(),
-            });
+        if !curve.scattered {
+            let points: Vec<String> = self
+                .figure
+                .line(curve)
+                .into_iter()
+                .map(|p| {
+                    let [x, y] = self.place(p);
+                    format!("{x:.2},{y:.2}")
+                })
+                .collect();
+            let (stroke, opacity, width) = if curve.faint { ("#000", 0.25, 1) } else { (colour, 1.0, 2) };
+            let _ = writeln!(
+                s,
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{stroke}\" stroke-opacity=\"{opacity}\" \
+                 stroke-width=\"{width}\"/>",
+                points.join(" ")
+            );
         }
-        if !curve.plain {
-            let (measured, open) = (shown(&curve.points), shown(&curve.extrapolated));
-            let size = FINE * if measured.len() > MANY { 2 } else { 4 };
-            chart.draw_series(measured.into_iter().map(|p| Circle::new(p, size, colour.filled())))?;
-            chart.draw_series(open.into_iter().map(|p| Circle::new(p, 5 * FINE, colour.stroke_width(2 * FINE))))?;
+        if curve.plain {
+            return;
         }
-        Ok(())
+        let (measured, open) = (shown(&curve.points), shown(&curve.extrapolated));
+        let radius = if measured.len() > MANY { 2.0 } else { 4.0 };
+        measured.into_iter().for_each(|p| circle(s, p, radius, &format!("fill=\"{colour}\"")));
+        let paint = format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"");
+        open.into_iter().for_each(|p| circle(s, p, 5.0, &paint));
+    }
+
+    /// Names of the curves in a corner, at the top right where none is free.
+    fn legend(&self, s: &mut String) {
+        const MARGIN: f64 = 8.0;
+        let [right, upper] = self.figure.free_corner().unwrap_or([true, true]);
+        let named: Vec<(&Curve, [u8; 3])> = self
+            .figure
+            .curves
+            .iter()
+            .zip(COLOURS.into_iter().cycle())
+            .filter(|(curve, _)| !curve.name.is_empty())
+            .collect();
+        let letters = named.iter().map(|(curve, _)| curve.name.chars().count()).max().unwrap_or(0);
+        let size = [BESIDE + LETTER * letters as f64 - 2.0 * MARGIN, ROW * named.len() as f64 + MARGIN];
+        let x = if right { LEFT + PLOT[0] - MARGIN - size[0] } else { LEFT + MARGIN };
+        let y = if upper { TOP + MARGIN } else { TOP + PLOT[1] - MARGIN - size[1] };
+        let _ = writeln!(
+            s,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"white\" fill-opacity=\"0.9\" \
+             stroke=\"#000\" stroke-opacity=\"0.4\"/>",
+            size[0], size[1]
+        );
+        for (k, (curve, colour)) in named.into_iter().enumerate() {
+            let (x, y) = (x + MARGIN, y + 0.5 * MARGIN + ROW * (k as f64 + 0.5));
+            match curve.scattered {
+                true => circle(s, [x + 11.0, y], 4.0, &format!("fill=\"{}\"", hex(colour))),
+                false => {
+                    let _ =
+                        writeln!(s, "<path d=\"M{x:.1} {y:.1}h22\" stroke=\"{}\" stroke-width=\"2\"/>", hex(colour));
+                }
+            }
+            let _ = writeln!(s, "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>", x + 30.0, y + 4.5, escape(&curve.name));
+        }
     }
 }
 
-/// A drawing in which nothing has both a fill and a stroke, with the opacity of elements as that of their paint: it
-/// looks the same, and takes no layer for each of them.
-fn with_opacity_of_paint(svg: &str) -> String {
-    let mut parts = svg.split(" opacity=\"");
-    let mut out = parts.next().unwrap_or_default().to_string();
-    for part in parts {
-        let (value, rest) = part.split_once('"').unwrap_or((part, ""));
-        if value != "1" {
-            let _ = write!(out, " fill-opacity=\"{value}\" stroke-opacity=\"{value}\"");
-        }
-        out.push_str(rest);
+/// Lines across an axis at shares of its length.
+fn grid(s: &mut String, d: usize, shares: impl Iterator<Item = f64>, opacity: f64) {
+    let [width, height] = PLOT;
+    let line = |share: f64| match d {
+        0 => format!("M{:.1} {TOP}v{height}", LEFT + share * width),
+        _ => format!("M{LEFT} {:.1}h{width}", TOP + (1.0 - share) * height),
+    };
+    let path: String = shares.map(line).collect();
+    if !path.is_empty() {
+        let _ = writeln!(
+            s,
+            "<path d=\"{path}\" fill=\"none\" stroke=\"#000\" stroke-opacity=\"{opacity}\" \
+             shape-rendering=\"crispEdges\"/>"
+        );
     }
-    out
 }

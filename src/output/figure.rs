@@ -1,7 +1,6 @@
-use super::chart;
+use super::chart::{self, BESIDE, LETTER, PLOT, ROW};
 use super::picture::{Canvas, Picture};
 use super::ticks::{ROUND, above, below};
-use plotters::prelude::{RGBColor, SeriesLabelPosition};
 
 /// Curves over linear or logarithmic axes, drawn as SVG and PNG.
 #[derive(Debug, Clone, Default)]
@@ -46,25 +45,11 @@ pub struct Curve {
 }
 
 /// Colours that are told apart by everybody: Okabe and Ito (2008).
-pub(crate) const COLOURS: [RGBColor; 6] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-];
+pub(crate) const COLOURS: [[u8; 3]; 6] =
+    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [230, 159, 0]];
 /// Equal stretches along the bottom into which [`Curve::outlined`] divides a curve: some three pixels each, within
 /// which a curve shows no more than where it begins and ends, and how far up and down it goes.
 const STRETCHES: f64 = 150.0;
-/// Width and height of the plot itself, in pixels.
-const PLOT: [f64; 2] = [508.0, 320.0];
-/// Height of a row of the legend, in pixels.
-const ROW: f64 = 22.0;
-/// Width of what a legend has beside its words, margins and a piece of each line, in pixels.
-const BESIDE: f64 = 64.0;
-/// Width of a letter of the legend, in pixels: that of the widest ones, so that the words find room.
-const LETTER: f64 = 7.5;
 /// Equal parts of a line between two points whose ends are looked at, to see whether the legend would cover it.
 const PARTS: usize = 16;
 /// Room below and above the curves on a linear axis, as a share of their height: a curve does not lie on the frame.
@@ -180,8 +165,8 @@ impl Figure {
         [0, 1].map(|d| (size[d] / PLOT[d]).min(0.5))
     }
 
-    /// A corner of the plot where no curve would lie under the legend.
-    pub(super) fn free_corner(&self) -> Option<SeriesLabelPosition> {
+    /// A corner of the plot where no curve would lie under the legend: whether it is on the right, and at the top.
+    pub(super) fn free_corner(&self) -> Option<[bool; 2]> {
         let on = |x: f64, d: usize| if self.scales[d] == Scale::Linear { x } else { x.log10() };
         let ends = [0, 1].map(|d| self.around(d).map(|end| on(end, d)));
         let place = |p: &[f64; 2]| [0, 1].map(|d| (on(p[d], d) - ends[d][0]) / (ends[d][1] - ends[d][0]));
@@ -199,14 +184,8 @@ impl Figure {
             };
             line.first().is_some_and(|p| under(*p, corner)) || line.windows(2).any(between)
         };
-        let corners = [
-            ([true, true], SeriesLabelPosition::UpperRight),
-            ([false, false], SeriesLabelPosition::LowerLeft),
-            ([true, false], SeriesLabelPosition::LowerRight),
-            ([false, true], SeriesLabelPosition::UpperLeft),
-        ];
-        let free = |corner: [bool; 2]| !lines.iter().any(|line| crossed(line, corner));
-        corners.into_iter().find(|(corner, _)| free(*corner)).map(|(_, position)| position)
+        let free = |corner: &[bool; 2]| !lines.iter().any(|line| crossed(line, *corner));
+        [[true, true], [false, false], [true, false], [false, true]].into_iter().find(free)
     }
 }
 
@@ -274,7 +253,7 @@ mod tests {
             assert!(((high - low) / (upper - low) - (1.0 - height)).abs() < 1e-12, "{low} {high} {upper}");
             // one of them alone leaves two corners
             figure.curves.pop();
-            assert!(matches!(figure.free_corner(), Some(SeriesLabelPosition::LowerRight)));
+            assert_eq!(figure.free_corner(), Some([true, false]));
             assert_eq!(figure.ends(1), figure.around(1));
         }
     }

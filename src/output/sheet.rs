@@ -1,4 +1,4 @@
-//! The paper around a picture: its title, a box with axes, a bar of colours.
+//! The paper around a picture or a plot: its title, a frame with axes, a bar of colours.
 
 use super::ticks::Ticks;
 use std::fmt::Write;
@@ -7,7 +7,7 @@ use std::fmt::Write;
 pub(super) const LONGER: f64 = 640.0;
 /// The box of a long and narrow domain is stretched to this width, in units of the drawing.
 pub(super) const SHORTER_AT_LEAST: f64 = 160.0;
-/// Room beside the box, in units of the drawing: for labels and title, and on the right for the bar of colours.
+/// Room beside the frame, in units of the drawing: for labels and title, and on the right for the bar of colours.
 pub(super) const LEFT: f64 = 76.0;
 pub(super) const TOP: f64 = 48.0;
 const RIGHT: f64 = 116.0;
@@ -18,6 +18,69 @@ const BAR: f64 = 24.0;
 const BANDS: usize = 64;
 /// Width of a letter, as a share of the size of its font.
 const WIDE: f64 = 0.64;
+
+/// The frame around a picture or a plot.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    /// Its width and height in units of the drawing.
+    pub size: [f64; 2],
+    /// Room to the right of it, in units of the drawing.
+    pub right: f64,
+}
+
+impl Frame {
+    /// The beginning of an SVG document: white paper with a title.
+    pub fn begin(&self, title: &str) -> String {
+        let [width, height] = self.size;
+        let (w, h) = (LEFT + width + self.right, TOP + height + BOTTOM);
+        let mut s = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.0} {h:.0}\" width=\"{w:.0}\" \
+             height=\"{h:.0}\" font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"13\" \
+             fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+        );
+        heading(&mut s, title, width, w);
+        s
+    }
+
+    /// Adds the frame, its marks, each a share of the length of its axis and a label, and the names of both axes.
+    pub fn axes(&self, s: &mut String, marks: &[Vec<(f64, String)>; 2], names: &[String; 2]) {
+        let [width, height] = self.size;
+        let bottom = TOP + height;
+        let _ = writeln!(
+            s,
+            "<g stroke=\"#222\" fill=\"none\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" \
+             height=\"{height:.1}\"/></g>"
+        );
+        for (share, label) in &marks[0] {
+            let x = LEFT + share * width;
+            let _ = writeln!(
+                s,
+                "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" \
+                 text-anchor=\"middle\">{label}</text>",
+                bottom + 20.0
+            );
+        }
+        for (share, label) in &marks[1] {
+            let y = bottom - share * height;
+            let _ = writeln!(
+                s,
+                "<path d=\"M{LEFT} {y:.1}h-5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\" \
+                 text-anchor=\"end\">{label}</text>",
+                LEFT - 9.0,
+                y + 4.5
+            );
+        }
+        let [along, up] = [0, 1].map(|d| escape(&names[d]));
+        let (x, y) = (LEFT + 0.5 * width, TOP + 0.5 * height);
+        let below = bottom + 44.0;
+        let _ =
+            writeln!(s, "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"middle\" font-size=\"14\">{along}</text>");
+        let beside = y + 5.0;
+        let turned = if up.len() == 1 { String::new() } else { format!(" transform=\"rotate(-90 20 {beside:.1})\"") };
+        let _ =
+            writeln!(s, "<text x=\"20\" y=\"{beside:.1}\" text-anchor=\"middle\" font-size=\"14\"{turned}>{up}</text>");
+    }
+}
 
 /// A box of the plane, and its size on the paper.
 #[derive(Debug, Clone, Copy)]
@@ -31,17 +94,13 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
+    fn frame(&self) -> Frame {
+        Frame { size: self.size, right: RIGHT }
+    }
+
     /// The beginning of an SVG document: white paper with a title.
     pub fn begin(&self, title: &str) -> String {
-        let [width, height] = self.size;
-        let (w, h) = (LEFT + width + RIGHT, TOP + height + BOTTOM);
-        let mut s = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.0} {h:.0}\" width=\"{w:.0}\" \
-             height=\"{h:.0}\" font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"13\" \
-             fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-        );
-        heading(&mut s, title, width);
-        s
+        self.frame().begin(title)
     }
 
     /// Where a point of the plane is on the paper.
@@ -57,44 +116,14 @@ impl Sheet {
 
     /// Adds the box and its axes.
     pub fn axes(&self, s: &mut String, names: &[impl AsRef<str>]) {
-        let Self { lower, extent, size: [width, height] } = *self;
-        let bottom = TOP + height;
-        let _ = writeln!(
-            s,
-            "<g stroke=\"#222\" fill=\"none\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{width:.1}\" \
-             height=\"{height:.1}\"/></g>"
-        );
-        let [along, up] = [0, 1].map(|d| Ticks::between(lower[d], lower[d] + extent[d]));
-        for (value, label) in &along.marks {
-            let [x, _] = self.place([*value, lower[1]]);
-            let _ = writeln!(
-                s,
-                "<path d=\"M{x:.1} {bottom:.1}v5\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" \
-                 text-anchor=\"middle\">{label}</text>",
-                bottom + 20.0
-            );
-        }
-        for (value, label) in &up.marks {
-            let [_, y] = self.place([lower[0], *value]);
-            let _ = writeln!(
-                s,
-                "<path d=\"M{LEFT} {y:.1}h-5\" stroke=\"#222\"/><text x=\"{:.1}\" y=\"{:.1}\" \
-                 text-anchor=\"end\">{label}</text>",
-                LEFT - 9.0,
-                y + 4.5
-            );
-        }
-        let (x, y) = (LEFT + 0.5 * width, TOP + 0.5 * height);
-        let name = along.named(names[0].as_ref());
-        let below = bottom + 44.0;
-        let _ =
-            writeln!(s, "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"middle\" font-size=\"14\">{name}</text>");
-        let (name, beside) = (up.named(names[1].as_ref()), y + 5.0);
-        let turned = if name.len() == 1 { String::new() } else { format!(" transform=\"rotate(-90 20 {beside:.1})\"") };
-        let _ = writeln!(
-            s,
-            "<text x=\"20\" y=\"{beside:.1}\" text-anchor=\"middle\" font-size=\"14\"{turned}>{name}</text>"
-        );
+        let Self { lower, extent, .. } = *self;
+        let ticks = [0, 1].map(|d| Ticks::between(lower[d], lower[d] + extent[d]));
+        let named = [0, 1].map(|d| ticks[d].named(names[d].as_ref()));
+        let [along, up] = ticks;
+        let marks = [(along, 0), (up, 1)].map(|(ticks, d)| {
+            ticks.marks.into_iter().map(|(value, label)| ((value - lower[d]) / extent[d], label)).collect()
+        });
+        self.frame().axes(s, &marks, &named);
     }
 
     /// Adds the bar of colours for values from `low` to `high`, named after the unknown.
@@ -142,10 +171,9 @@ impl Sheet {
 
 /// The title, over the box; over the whole drawing where it is too wide for that, and as small as it needs to be; in
 /// two lines where that would be too small to read.
-fn heading(s: &mut String, title: &str, width: f64) {
+fn heading(s: &mut String, title: &str, width: f64, whole: f64) {
     const SIZE: f64 = 15.0;
     const LEGIBLE: f64 = 10.0;
-    let whole = LEFT + width + RIGHT;
     let letters = |line: &str| line.chars().count();
     let fitting = |line: &str| SIZE.min((whole - 20.0) / (WIDE * letters(line) as f64));
     let middle = |(place, _): &(usize, &str)| letters(&title[..*place]).abs_diff(letters(title) / 2);

@@ -14,15 +14,11 @@ const MOST_POWERS: i32 = 9;
 /// Round values 1, 2 or 5 times a power of ten apart, four to nine of them, with short labels.
 #[derive(Debug)]
 pub(super) struct Ticks {
-    /// Each mark: its place, and its label, which is (place − `start`)/`size`.
+    /// Each mark: its place, and its label, which is (place − `less`)/`unit`.
     pub marks: Vec<(f64, String)>,
-    /// The number from which labels count; 0 unless they would be long.
-    start: f64,
-    /// The power of ten that is the unit of labels.
-    size: f64,
-    /// `start` as text, where it is not 0.
+    /// The number from which labels count, as text; none where they count from 0, as short ones do.
     less: Option<String>,
-    /// `size` as text, where it is not 1.
+    /// The power of ten that is the unit of labels, as text, where it is not 1.
     unit: Option<String>,
 }
 
@@ -36,7 +32,7 @@ impl Ticks {
                 true => trimmed(&format!("{low:.4}")).into(),
                 false => format!("{low:.3e}"),
             };
-            return Self { marks: vec![(low, label)], less: None, unit: None, start: 0.0, size: 1.0 };
+            return Self { marks: vec![(low, label)], less: None, unit: None };
         }
         let power = 10_f64.powf((span / 4.0).log10().floor());
         let step = power * [5.0, 2.0, 1.0].into_iter().find(|m| m * power <= span / 4.0).unwrap_or(1.0);
@@ -63,20 +59,12 @@ impl Ticks {
             (value, format!("{:.decimals$}", (value - start * ten) / unit))
         });
         let named = (exponent != 0).then(|| format!("1e{exponent}"));
-        Self { marks: marks.collect(), less, unit: named, start: start * ten, size: unit }
+        Self { marks: marks.collect(), less, unit: named }
     }
 
     /// Where the marks are.
     pub(super) fn places(&self) -> impl Iterator<Item = f64> {
         self.marks.iter().map(|(place, _)| *place)
-    }
-
-    /// The label of any place on the axis.
-    pub(super) fn label(&self, value: f64) -> String {
-        // a sum of steps has rounding in it
-        let text = format!("{:.6}", (value - self.start) / self.size);
-        let text = trimmed(&text);
-        if text == "-0" { "0".into() } else { text.into() }
     }
 
     /// The name of an axis with these labels.

@@ -5,7 +5,6 @@ use crate::error::{Error, Result};
 use crate::output::{COLOURS, Canvas, Curve, Figure, Picture, Scale, svg, write_file};
 use crate::simulation::{Scene, Values};
 use gif::{Encoder, Repeat};
-use plotters::style::RGBColor;
 use std::collections::HashMap;
 
 /// Largest number of frames of an animation; of more, evenly spaced ones are taken.
@@ -181,8 +180,7 @@ impl Palette {
         let steps = |colour: [u8; 3]| {
             (0..STEPS).map(move |k| colour.map(|c| (255 - (255 - usize::from(c)) * k / (STEPS - 1)) as u8))
         };
-        let RGBColor(r, g, b) = COLOURS[0];
-        Self { colours: steps([0; 3]).chain(steps([r, g, b])).collect(), found: HashMap::new() }
+        Self { colours: steps([0; 3]).chain(steps(COLOURS[0])).collect(), found: HashMap::new() }
     }
 
     /// A palette for meshes over a colour map.
