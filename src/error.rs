@@ -7,6 +7,7 @@
 mod cause;
 mod diagnostic;
 mod failure;
+mod node_place;
 mod remedies;
 mod remedy;
 mod words;
@@ -14,6 +15,7 @@ mod words;
 pub use cause::Cause;
 pub use diagnostic::Diagnostic;
 pub use failure::Failure;
+pub use node_place::NodePlace;
 pub use remedy::{Act, Door, Plain, Remedy, Setting, sentence};
 pub(crate) use words::line_rule;
 

@@ -210,7 +210,7 @@ fn step(mut generator: impl MeshGenerator, height: f64, dt: f64) -> Failure {
 fn steep_density() {
     let error = step(Stochastic::new([2, 2], 0, EstimatorKind::default()), 1e3, 1e-3);
     assert_eq!(error.name(), "steep-density");
-    let message = "the density is too steep for random walks: |b|h = 499.500 at node (3, 1), x = (0.3750, 0.1250)";
+    let message = "the density is too steep for random walks: |b|h = 499.500 at node (3, 1), x = 0.3750, y = 0.1250";
     assert_says(error, &[message, "at most 2"], Some("gradient of the density to \"safe\""), true);
 }
 
@@ -274,7 +274,7 @@ fn not_a_box() {
     let error =
         Whole::default().step(&Mmpde::default(), &mesh().moved(x).unwrap(), &vec![1.0; 81].into(), 1e-3).unwrap_err();
     assert_eq!(error.name(), "not-a-box");
-    let message = "the mesh does not fill its box: node (0, 0) of a side across axis 0, x = 0.0100, y = 0.0000, is off";
+    let message = "the mesh does not fill its box: along axis 0 node (0, 0), x = 0.0100, y = 0.0000, is off";
     assert_says(error, &[message, "by 1.0e-2"], Some("map it to the domain"), true);
 }
 

@@ -1,6 +1,6 @@
 //! A remedy names only what the study that it is told to has, and the study takes what it says.
 
-use driftmesh::error::{Act, Cause, Remedy, Setting};
+use driftmesh::error::{Act, Cause, NodePlace, Remedy, Setting};
 use driftmesh::study::{Source, Study};
 use driftmesh::{Error, Failure};
 use std::collections::BTreeSet;
@@ -13,8 +13,8 @@ fn failures() -> Vec<Failure> {
     let causes = [Cause::BlowUp, Cause::Restless, Cause::Start, Cause::Stiff];
     all.extend(causes.map(|cause| Failure::VanishingStep { dt: 1e-9, cause }));
     let given = vec![("u".to_string(), 0.1)];
-    let (what, value, node, x) = ("`pde.source.u`".into(), f64::NAN, [0; 2], [0.0; 2]);
-    all.push(Failure::Formula { what, value, node, x, given });
+    let (what, value, at) = ("`pde.source.u`".into(), f64::NAN, NodePlace::new([0; 2], [0.0; 2]));
+    all.push(Failure::Formula { what, value, at, given });
     // iterations on a line, which know their own remedies, have these
     let acts = [
         Act::Raise(Setting::Tolerance),
@@ -258,7 +258,7 @@ fn study(file: &str, assignments: &[&str]) -> Study {
 }
 
 fn folded() -> Failure {
-    Failure::Folded { cell: [1, 2], jacobian: -0.1, x: [0.5; 2], noise: None }
+    Failure::Folded { cell: vec![1, 2], jacobian: -0.1, x: vec![0.5; 2], noise: None }
 }
 
 /// A folded mesh is cured by what the monitor has: `auto` has nothing to set, and a mesh in conservative form no

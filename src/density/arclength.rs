@@ -101,8 +101,8 @@ impl<const D: usize> Monitor<D> for Arclength {
         match rho.iter().position(|r| !r.is_finite()) {
             None => Ok(rho.into()),
             Some(k) => {
-                let (node, x) = mesh.told(k);
-                Err(Failure::NonFinite { what: "the mesh density", value: rho[k], node, x })
+                let at = mesh.node_place(k);
+                Err(Failure::NonFinite { what: "the mesh density", value: rho[k], at })
             }
         }
     }

@@ -50,8 +50,8 @@ impl<const D: usize> Monitor<D> for Following<D> {
         match values.iter().position(|[u]| !u.is_finite()) {
             None => Ok(values.into_flattened()),
             Some(k) => {
-                let ((node, x), what, value) = (mesh.told(k), "`monitor.of`".into(), values[k][0]);
-                Err(Failure::Formula { what, value, node, x, given: Vec::new() })
+                let (at, what, value) = (mesh.node_place(k), "`monitor.of`".into(), values[k][0]);
+                Err(Failure::Formula { what, value, at, given: Vec::new() })
             }
         }
     }

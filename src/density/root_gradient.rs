@@ -115,8 +115,8 @@ impl RootGradient {
         let axes: [Vec<f64>; D] = std::array::from_fn(|_| axes.next().expect("one for each axis"));
         let bad = |rho: &Vec<f64>| rho.iter().position(|rho| !rho.is_finite()).map(|k| (k, rho[k]));
         if let Some((k, value)) = axes.iter().find_map(bad) {
-            let (node, x) = domain.told(k);
-            return Err(Failure::NonFinite { what: "the mesh density", value, node, x });
+            let at = domain.node_place(k);
+            return Err(Failure::NonFinite { what: "the mesh density", value, at });
         }
         Ok(Density::of_axes(axes).expect("one value a node each"))
     }

@@ -1,7 +1,7 @@
 //! What the mathematics can do wrong in a step.
 
-use super::words::{counted, given_as, line_rule, node_at, noisy, place, short, tuple};
-use super::{Cause, Remedy};
+use super::words::{counted, given_as, indices, line_rule, noisy, place, short, tuple};
+use super::{Cause, NodePlace, Remedy};
 use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
 /// A numerical failure inside one step. It never carries a time: the loop that knows it adds it
@@ -13,55 +13,49 @@ pub enum Failure {
     #[strum(serialize = "mesh-folded")]
     #[error(
         "the mesh folded: cell {} has a corner of scaled Jacobian {jacobian:.1e} at {}{}",
-        tuple(cell), place(x), noisy(*noise)
+        indices(cell), place(x), noisy(*noise)
     )]
     Folded {
-        /// Indices of the cell along ξ and η.
-        cell: [usize; 2],
+        /// Indices of the cell, one for each axis.
+        cell: Vec<usize>,
         /// Smallest corner Jacobian of the cell over that of the uniform mesh; at most 0.
         jacobian: f64,
         /// Where the corner is.
-        x: [f64; 2],
+        x: Vec<f64>,
         /// Standard error of the interface values that made the mesh, as a share of its shortest edge before.
         noise: Option<f64>,
     },
     /// A quantity stopped being finite.
-    #[error("{what} is {value} at {}", node_at(node, x))]
+    #[error("{what} is {value} at {at}")]
     NonFinite {
         /// The quantity, in the reader's words.
         what: &'static str,
         /// The value found: NaN or ±∞.
         value: f64,
-        /// Indices of the node along ξ and η.
-        node: [usize; 2],
-        /// Where the node is.
-        x: [f64; 2],
+        /// The node.
+        at: NodePlace,
     },
     /// A formula of the study has no finite value, or what it makes of an unknown has none.
-    #[error("{what} is {value} at {}{}", node_at(node, x), given_as(.given))]
+    #[error("{what} is {value} at {at}{}", given_as(.given))]
     Formula {
         /// The formula's dotted key, in the reader's words.
         what: String,
         /// The value found: NaN or ±∞.
         value: f64,
-        /// Indices of the node along ξ and η.
-        node: [usize; 2],
-        /// Where the node is.
-        x: [f64; 2],
+        /// The node.
+        at: NodePlace,
         /// The unknowns there, where the formula takes them.
         given: Vec<(String, f64)>,
     },
     /// A quantity that must be positive is not.
-    #[error("{what} is {value:.3e}, not positive, at {}", node_at(node, x))]
+    #[error("{what} is {value:.3e}, not positive, at {at}")]
     NotPositive {
         /// The quantity, in the reader's words.
         what: &'static str,
         /// The value found, at most 0.
         value: f64,
-        /// Indices of the node along ξ and η.
-        node: [usize; 2],
-        /// Where the node is.
-        x: [f64; 2],
+        /// The node.
+        at: NodePlace,
     },
     /// An equation that is made for periodic axes met a bounded one.
     #[error("{what} need periodic axes, but axis {axis} is bounded")]
@@ -72,16 +66,14 @@ pub enum Failure {
         axis: usize,
     },
     /// An equation that is made for the uniform mesh met another, or one that moves.
-    #[error("the stepper rk4 needs the uniform mesh, but along axis {axis} {}, is off by {off:.1e}", node_at(node, x))]
+    #[error("the stepper rk4 needs the uniform mesh, but along axis {axis} {at}, is off by {off:.1e}")]
     NotUniform {
         /// Distance from the place in the uniform mesh.
         off: f64,
         /// The axis along which it is off.
         axis: usize,
-        /// Indices of the node along ξ and η.
-        node: [usize; 2],
-        /// Where the node is.
-        x: [f64; 2],
+        /// The node.
+        at: NodePlace,
     },
     /// An explicit step that would not end in any time worth waiting for.
     #[error("the step would take {substeps:.1e} explicit substeps for speeds up to {speed:.1e}")]
@@ -125,17 +117,12 @@ pub enum Failure {
         iterations: usize,
     },
     /// The density is so steep that the weights of the mesh equation are no probabilities.
-    #[error(
-        "the density is too steep for random walks: |b|h = {skew:.3} at node {}, x = {}, and must be at most 2",
-        tuple(node), tuple(x.iter().map(|&x| short(x)))
-    )]
+    #[error("the density is too steep for random walks: |b|h = {skew:.3} at {at}, and must be at most 2")]
     SteepDensity {
         /// Largest |b|h of the node.
         skew: f64,
-        /// Indices of the node.
-        node: Vec<usize>,
-        /// Where the node is.
-        x: Vec<f64>,
+        /// The node.
+        at: NodePlace,
     },
     /// Random walks that would not end in any time worth waiting for.
     #[error(
@@ -261,12 +248,10 @@ pub enum Failure {
         x: [f64; 2],
     },
     /// The nodes around a node determine no Laplacian.
-    #[error("the nodes around {}, give no Laplacian: condition number {condition:.1e}", node_at(node, x))]
+    #[error("the nodes around {at}, give no Laplacian: condition number {condition:.1e}")]
     DegenerateStencil {
-        /// Indices of the node along ξ and η.
-        node: [usize; 2],
-        /// Where the node is.
-        x: [f64; 2],
+        /// The node.
+        at: NodePlace,
         /// Condition number of its stencil.
         condition: f64,
     },
@@ -333,21 +318,14 @@ pub enum Failure {
         melting: f64,
     },
     /// A mesh generator met a mesh whose sides are not those of the box around it: it would pull them straight.
-    #[error(
-        "the mesh does not fill its box: node {} of a side across axis {axis}, {}, is off that side of the box by \
-         {off:.1e}",
-        tuple(node),
-        place(x)
-    )]
+    #[error("the mesh does not fill its box: along axis {axis} {at}, is off its side of the box by {off:.1e}")]
     NotABox {
         /// Distance from the side of the box.
         off: f64,
         /// The axis across the side.
         axis: usize,
-        /// Indices of the node along ξ and η.
-        node: [usize; 2],
-        /// Where the node is.
-        x: [f64; 2],
+        /// The node.
+        at: NodePlace,
     },
     /// A setting or an argument of a step is out of range.
     #[error("{what} is {value}, but {rule}")]

@@ -5,14 +5,18 @@ pub(super) fn tuple(items: impl IntoIterator<Item = impl std::fmt::Display>) -> 
     format!("({})", items.into_iter().map(|item| item.to_string()).collect::<Vec<_>>().join(", "))
 }
 
-/// A place in the plane.
-pub(super) fn place(x: &[f64; 2]) -> String {
-    format!("x = {}, y = {}", short(x[0]), short(x[1]))
+/// Coordinates, one for each axis, with the names of the axes.
+pub(super) fn place(x: &[f64]) -> String {
+    let named = ["x", "y", "z"].into_iter().zip(x).map(|(name, x)| format!("{name} = {}", short(*x)));
+    named.collect::<Vec<_>>().join(", ")
 }
 
-/// A node with its place.
-pub(super) fn node_at(node: &[usize; 2], x: &[f64; 2]) -> String {
-    format!("node {}, {}", tuple(node), place(x))
+/// Indices of a node or a cell, in parentheses where there are several.
+pub(super) fn indices(indices: &[usize]) -> String {
+    match indices {
+        [index] => index.to_string(),
+        _ => tuple(indices),
+    }
 }
 
 /// A number of iterations.

@@ -3,7 +3,6 @@
 use super::Mesh;
 use super::determinant::determinant;
 use super::lattice::strides;
-use super::mesh::first_two;
 use crate::error::Failure;
 
 /// Refuses a mesh with a node that is not finite or a cell that is folded
@@ -30,8 +29,8 @@ use crate::error::Failure;
 pub fn check_unfolded<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
     if let Some(k) = mesh.x().iter().position(|x| !x.iter().all(|v| v.is_finite())) {
         let value = mesh.x()[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
-        let (node, x) = mesh.told(k);
-        return Err(Failure::NonFinite { what: "the mesh", value, node, x });
+        let at = mesh.node_place(k);
+        return Err(Failure::NonFinite { what: "the mesh", value, at });
     }
     if mesh.chart().is_some() {
         check_unfolded(mesh.parameters())?;
@@ -54,7 +53,7 @@ pub fn check_unfolded<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
     let Some((volume, cell, at)) = worst else { return Ok(()) };
     let uniform = mesh.volume() / cells.iter().product::<usize>() as f64;
     let cell: [usize; D] = std::array::from_fn(|d| cell / steps[d] % (cells[d] + 1));
-    Err(Failure::Folded { cell: first_two(&cell), jacobian: volume / uniform, x: first_two(&x[at]), noise: None })
+    Err(Failure::Folded { cell: cell.to_vec(), jacobian: volume / uniform, x: x[at].to_vec(), noise: None })
 }
 
 /// Marks the nodes at the corners of folded cells; see [`check_unfolded`]. Returns whether there are any.

@@ -1,5 +1,5 @@
 use super::{Chart, Lattice, lattice::diagonal, lattice::strides, nodal::check_length};
-use crate::error::{Error, Failure, Result};
+use crate::error::{Error, Failure, NodePlace, Result};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -203,8 +203,8 @@ impl<const D: usize> Mesh<D> {
         check_length(&self.lattice, "the mesh", x.len())?;
         if let Some(k) = x.iter().position(|x| !x.iter().all(|v| v.is_finite())) {
             let value = x[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
-            let (node, x) = (first_two(&self.lattice.node(k)), first_two(&x[k]));
-            return Err(Failure::NonFinite { what: "the mesh", value, node, x });
+            let at = NodePlace::new(self.lattice.node(k), x[k]);
+            return Err(Failure::NonFinite { what: "the mesh", value, at });
         }
         let Self { lattice, lower, upper, .. } = *self;
         Ok(Self { lattice, lower, upper, x, charted: None })
@@ -320,9 +320,9 @@ impl<const D: usize> Mesh<D> {
         std::array::from_fn(|d| self.upper[d] - self.lower[d])
     }
 
-    /// Indices and position of a node, as failures carry them: with two entries, of which the second is 0 on a line.
-    pub(crate) fn told(&self, k: usize) -> ([usize; 2], [f64; 2]) {
-        (first_two(&self.lattice.node(k)), first_two(&self.x[k]))
+    /// A node with its indices and coordinates, as failures tell of it.
+    pub fn node_place(&self, k: usize) -> NodePlace {
+        NodePlace::new(self.lattice.node(k), self.x[k])
     }
 
     /// What positions jump by on a turn around each axis: the extent of the box along it; nothing on closed axes.

@@ -22,9 +22,9 @@ pub(crate) fn check_positive<const D: usize>(
     values: &[f64],
 ) -> Result<(), Failure> {
     let Some(k) = values.iter().position(|value| !(value.is_finite() && *value > 0.0)) else { return Ok(()) };
-    let (value, (node, x)) = (values[k], mesh.told(k));
+    let (value, at) = (values[k], mesh.node_place(k));
     Err(match value.is_finite() {
-        true => Failure::NotPositive { what, value, node, x },
-        false => Failure::NonFinite { what, value, node, x },
+        true => Failure::NotPositive { what, value, at },
+        false => Failure::NonFinite { what, value, at },
     })
 }

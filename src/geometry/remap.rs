@@ -109,8 +109,8 @@ where
         (None, 1.0) => Ok(u),
         (None, unit) => Ok(u.into_iter().map(|u| (u / unit).clamp(range[0], range[1])).collect()),
         (Some(k), _) => {
-            let (what, value, (node, x)) = ("the carried field", u[k], to.told(k));
-            Err(Failure::NonFinite { what, value, node, x })
+            let (what, value, at) = ("the carried field", u[k], to.node_place(k));
+            Err(Failure::NonFinite { what, value, at })
         }
     };
     fields.into_iter().zip(ranges).map(finished).collect()

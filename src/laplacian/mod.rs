@@ -176,8 +176,8 @@ fn node(patch: &Patch<2>, k: usize) -> [usize; 2] {
 }
 
 fn degenerate(mesh: &Mesh<2>, patch: &Patch<2>, k: usize, condition: f64) -> Failure {
-    let node = node(patch, k);
-    Failure::DegenerateStencil { node, x: mesh.x()[mesh.lattice().index(node)], condition }
+    let at = mesh.node_place(mesh.lattice().index(node(patch, k)));
+    Failure::DegenerateStencil { at, condition }
 }
 
 impl Laplacian {

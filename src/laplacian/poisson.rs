@@ -1,7 +1,7 @@
 //! Poisson's equation on any structured mesh.
 
 use super::{NEAR_DEGENERATE, Stencils};
-use crate::error::Failure;
+use crate::error::{Failure, NodePlace};
 use crate::geometry::{Lattice, Mesh, check_length};
 use crate::numerics::lanes::{Lanes, Qr};
 use crate::numerics::larger;
@@ -220,7 +220,7 @@ fn derivative(
             return Ok(row);
         }
     }
-    Err(Failure::DegenerateStencil { node, x: x[index], condition })
+    Err(Failure::DegenerateStencil { at: NodePlace::new(node, x[index]), condition })
 }
 
 /// The weights a with the smallest Σ(|ξ_j|³ a_j)² among those with given values Σ a_j p_k(ξ_j), for p = x, y, xy, x² −

@@ -38,8 +38,8 @@ pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
             for end in (0..2).filter(|&end| beyond[end]) {
                 let off = (mesh.x()[k][axis] - ends[end][axis]).abs();
                 if off.is_nan() || off > ROUNDING * extent[axis] {
-                    let (node, x) = mesh.told(k);
-                    return Err(Failure::NotABox { off, axis, node, x });
+                    let at = mesh.node_place(k);
+                    return Err(Failure::NotABox { off, axis, at });
                 }
             }
         }

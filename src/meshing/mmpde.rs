@@ -281,8 +281,7 @@ impl<const D: usize> MeshOperator<D> {
             None => Ok(()),
             Some(k) => {
                 let skews = self.weights[k].map(|[below, above]| 2.0 * ((above - below) / (above + below)).abs());
-                let node = self.lattice.node(k).to_vec();
-                Err(Failure::SteepDensity { skew: skews.into_iter().fold(0.0, larger), node, x: mesh.x()[k].to_vec() })
+                Err(Failure::SteepDensity { skew: skews.into_iter().fold(0.0, larger), at: mesh.node_place(k) })
             }
         }
     }

@@ -54,8 +54,8 @@ impl<const D: usize, const B: usize> Bounds<D, B> {
         let mut bounds = vec![own; mesh.x().len()];
         for (c, name) in self.names.iter().enumerate() {
             let failure = |k: usize, what: String, value: f64| {
-                let (node, x) = mesh.told(k);
-                Failure::Formula { what, value, node, x, given: Vec::new() }
+                let at = mesh.node_place(k);
+                Failure::Formula { what, value, at, given: Vec::new() }
             };
             for (end, program) in self.given[c].iter().enumerate() {
                 let Some(program) = program else { continue };

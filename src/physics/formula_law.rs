@@ -115,8 +115,8 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
 
     fn failure(&self, what: String, value: f64, mesh: &Mesh<D>, k: usize, u: Option<&[f64; B]>) -> Failure {
         let given = u.map_or(Vec::new(), |u| self.names.iter().cloned().zip(*u).collect());
-        let (node, x) = mesh.told(k);
-        Failure::Formula { what, value, node, x, given }
+        let at = mesh.node_place(k);
+        Failure::Formula { what, value, at, given }
     }
 
     /// The node at a place of padded arrays. In the ring it is the node of which there is an image or a repetition.

@@ -282,8 +282,8 @@ fn check_finite<const D: usize, const K: usize>(
         None => Ok(()),
         Some(place) => {
             let (k, c) = (place / K, place % K);
-            let (node, x) = mesh.told(k);
-            Err(Failure::NonFinite { what: what[c], value: values[k][c], node, x })
+            let at = mesh.node_place(k);
+            Err(Failure::NonFinite { what: what[c], value: values[k][c], at })
         }
     }
 }

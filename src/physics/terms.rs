@@ -253,8 +253,8 @@ fn evaluated<const D: usize, const B: usize, To: Copy + Sync, R: Copy + Send>(
     if let Some((place, (n, value))) =
         results.iter().enumerate().find_map(|(place, (_, wrong))| Some((place, (*wrong)?)))
     {
-        let (node, x) = mesh.told(node(place));
-        return Err(Failure::Formula { what: terms[n].what.clone(), value, node, x, given: Vec::new() });
+        let at = mesh.node_place(node(place));
+        return Err(Failure::Formula { what: terms[n].what.clone(), value, at, given: Vec::new() });
     }
     Ok(results.into_iter().map(|(result, _)| result).collect())
 }

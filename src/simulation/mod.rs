@@ -122,8 +122,8 @@ where
         self.physics.check(t, &mesh, &u).map_err(at_start)?;
         if let Some(place) = u.values().iter().position(|v| !v.is_finite()) {
             let (value, k) = (u.values()[place], place / u.components());
-            let (node, x) = mesh.told(k);
-            return Err(at_start(Failure::NonFinite { what: "the initial solution", value, node, x }));
+            let at = mesh.node_place(k);
+            return Err(at_start(Failure::NonFinite { what: "the initial solution", value, at }));
         }
         let rho = coupling::density(self.physics.as_ref(), self.monitor.as_ref(), t, &mesh, &u).map_err(at_start)?;
         let gait = Gait::at_rest(&mesh);

@@ -1,4 +1,4 @@
-use crate::error::{Error, Failure, Result};
+use crate::error::{Error, Failure, NodePlace, Result};
 use crate::geometry::{Lattice, Mesh};
 
 /// The phase below the front, warm: number 1 of the equations.
@@ -96,7 +96,7 @@ impl Columns {
     /// The failure of a quantity that is not finite at the k-th node of a phase, whose height is y.
     pub(super) fn not_finite(&self, what: &'static str, value: f64, phase: usize, k: usize, y: f64) -> Failure {
         let [i, j] = [k / (self.rows[phase] + 1), k % (self.rows[phase] + 1)];
-        Failure::NonFinite { what, value, node: [i, j], x: [self.x[i], y] }
+        Failure::NonFinite { what, value, at: NodePlace::new([i, j], [self.x[i], y]) }
     }
 
     /// Height of the wall of a phase, the bottom for the lower one.
@@ -189,7 +189,11 @@ impl Columns {
     pub fn check(&self, front: &[f64], bare: &[Option<usize>]) -> Result<(), Failure> {
         for (i, (&x, &y)) in self.x.iter().zip(front).enumerate() {
             if !y.is_finite() {
-                return Err(Failure::NonFinite { what: "the front", value: y, node: [i, self.rows[LOWER]], x: [x, y] });
+                return Err(Failure::NonFinite {
+                    what: "the front",
+                    value: y,
+                    at: NodePlace::new([i, self.rows[LOWER]], [x, y]),
+                });
             }
             let [bottom, top] = self.walls.each_ref().map(|wall| wall[i]);
             if y <= bottom {

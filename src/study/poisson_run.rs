@@ -116,8 +116,8 @@ impl PoissonStudy {
         };
         seconds.solve = clock.elapsed().as_secs_f64();
         if let Some(k) = u.iter().position(|u| !u.is_finite()) {
-            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
-            return Err(Failure::NonFinite { what: "the solution", value: u[k], node, x }.into());
+            let at = mesh.node_place(k);
+            return Err(Failure::NonFinite { what: "the solution", value: u[k], at }.into());
         }
         let error = exact.as_ref().map(|exact| PoissonError::of(&mesh, &u, exact));
         Ok(Solved { mesh, u, exact, stencils, error, work, seconds })
@@ -307,8 +307,8 @@ fn values<const K: usize>(
         None => Ok(out),
         Some(k) => {
             let value = out[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
-            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
-            Err(Failure::Formula { what: what.into(), value, node, x, given: Vec::new() })
+            let at = mesh.node_place(k);
+            Err(Failure::Formula { what: what.into(), value, at, given: Vec::new() })
         }
     }
 }

@@ -26,8 +26,8 @@ impl<const D: usize, const B: usize, const P: usize, const K: usize, Solver: Def
             let [least, largest] = values().fold([0.0_f64; 2], |[l, h], value| [l.min(value), h.max(value.abs())]);
             if least < -share * largest {
                 let k = node(values().position(|value| value == least).unwrap_or_default());
-                let (node, x) = mesh.told(k);
-                return Err(Failure::NotPositive { what: "the diffusivity of a formula", value: least, node, x });
+                let at = mesh.node_place(k);
+                return Err(Failure::NotPositive { what: "the diffusivity of a formula", value: least, at });
             }
         }
         Ok(())

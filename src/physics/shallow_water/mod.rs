@@ -278,8 +278,8 @@ fn check(mesh: &Mesh<2>, values: &[Water]) -> Result<(), Failure> {
     match values.iter().position(|w| w[0] <= 0.0) {
         None => Ok(()),
         Some(k) => {
-            let (node, x) = (mesh.lattice().node(k), mesh.x()[k]);
-            Err(Failure::NotPositive { what: "the depth h", value: values[k][0], node, x })
+            let at = mesh.node_place(k);
+            Err(Failure::NotPositive { what: "the depth h", value: values[k][0], at })
         }
     }
 }

@@ -4,7 +4,7 @@ mod band;
 mod stencil;
 
 use super::{Burgers, Convection, Motion, Physics, check_finite, nodal};
-use crate::error::{Error, Failure, Result};
+use crate::error::{Error, Failure, NodePlace, Result};
 use crate::geometry::{Field, Mesh};
 use crate::numerics::larger;
 use crate::work::Work;
@@ -158,7 +158,7 @@ fn check_uniform(mesh: &Mesh<2>) -> Result<(), Failure> {
             let tolerance = 1e-9 * extent[d] / cells[d] as f64 + 4.0 * f64::EPSILON * x[d].abs();
             // NaN counts as off
             if off.abs().partial_cmp(&tolerance).is_none_or(|o| o.is_gt()) {
-                return Err(Failure::NotUniform { off, axis: d, node, x });
+                return Err(Failure::NotUniform { off, axis: d, at: NodePlace::new(node, x) });
             }
         }
     }

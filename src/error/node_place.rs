@@ -1,0 +1,24 @@
+use super::words::{indices, place};
+use std::fmt;
+
+/// A node of a mesh, and where it is.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct NodePlace {
+    /// Its indices, one for each axis.
+    pub node: Vec<usize>,
+    /// Its coordinates, one for each axis.
+    pub x: Vec<f64>,
+}
+
+impl NodePlace {
+    /// A node by its indices and coordinates.
+    pub fn new(node: impl Into<Vec<usize>>, x: impl Into<Vec<f64>>) -> Self {
+        Self { node: node.into(), x: x.into() }
+    }
+}
+
+impl fmt::Display for NodePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "node {}, {}", indices(&self.node), place(&self.x))
+    }
+}
