@@ -1,9 +1,8 @@
 use crate::{
     StudyArgs,
-    terminal::{complain, say, succeeded, warn},
+    terminal::{Status, complain, say, succeeded, warn},
 };
 use clap::Args;
-use std::process::ExitCode;
 
 #[derive(Args)]
 pub struct Check {
@@ -12,7 +11,7 @@ pub struct Check {
 }
 
 impl Check {
-    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+    pub fn execute(&self) -> driftmesh::Result<Status> {
         let study = self.study.read()?;
         study.warnings()?.iter().for_each(|warning| warn(warning));
         if let Err(error) = study.try_start() {

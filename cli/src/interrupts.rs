@@ -1,5 +1,6 @@
 //! Ctrl-C and SIGTERM end a run with its step; a second one ends the program at once.
 
+use crate::terminal;
 use driftmesh::Result;
 use driftmesh::simulation::{Event, Observer, Snapshot};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -43,7 +44,7 @@ pub fn outlive_file_limits() {
 /// The command that goes on with a run: this command line, or where the study came from standard input, which is read
 /// once, one with the study in the directory of the run.
 pub fn command(standard_input: bool, out: &Path) -> String {
-    let mut words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    let mut words = terminal::words();
     if standard_input {
         let [study, out] = [&out.join("study.toml"), out].map(|path| path.to_string_lossy().into_owned());
         words.truncate(1);

@@ -1,4 +1,4 @@
-use crate::terminal::say;
+use crate::terminal::{DONE, Status, say};
 use clap::{Args, ValueEnum};
 use driftmesh::{
     Failure,
@@ -8,7 +8,6 @@ use driftmesh::{
     physics::PdeKind,
     study::{LineDensityKind, MethodName},
 };
-use std::process::ExitCode;
 
 #[derive(Args)]
 pub struct List {
@@ -29,7 +28,7 @@ enum Topic {
 }
 
 impl List {
-    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+    pub fn execute(&self) -> driftmesh::Result<Status> {
         let topics = [
             (Topic::Pdes, "pdes", "pde.kind", PdeKind::KINDS),
             (Topic::Monitors, "monitors", "monitor.kind", MonitorKind::KINDS),
@@ -49,6 +48,6 @@ impl List {
             say("errors (error.kind in summary.json)");
             Failure::all().for_each(|[name, what]| say(format_args!("  {name:<19}{what}")));
         }
-        Ok(ExitCode::SUCCESS)
+        Ok(DONE)
     }
 }

@@ -1,7 +1,6 @@
-use crate::terminal::{say, warn};
+use crate::terminal::{DONE, Status, say, warn};
 use clap::Args;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 #[derive(Args)]
 pub struct Report {
@@ -11,10 +10,10 @@ pub struct Report {
 }
 
 impl Report {
-    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+    pub fn execute(&self) -> driftmesh::Result<Status> {
         let built = driftmesh::report::build(&self.directory)?;
         built.notes.iter().for_each(|note| warn(note));
         say(format_args!("report   {} ({:.1} MB)", built.path.display(), built.bytes as f64 / 1e6));
-        Ok(ExitCode::SUCCESS)
+        Ok(DONE)
     }
 }

@@ -1,10 +1,9 @@
-use crate::terminal::{say, use_threads};
+use crate::terminal::{DONE, FAILED, Status, say, use_threads};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use driftmesh::Error;
 use driftmesh_reproduce::{Done, ITEMS, Item, Options, Rerun, page};
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::Instant;
 
 #[derive(Args)]
@@ -27,7 +26,7 @@ pub struct Reproduce {
 }
 
 impl Reproduce {
-    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+    pub fn execute(&self) -> driftmesh::Result<Status> {
         use_threads(self.threads)?;
         std::fs::create_dir_all(&self.out)
             .map_err(|error| Error::Unwritable { path: self.out.clone(), reason: error.to_string() })?;
@@ -49,12 +48,12 @@ impl Reproduce {
             }
         }
         if !self.all {
-            return Ok(ExitCode::SUCCESS);
+            return Ok(DONE);
         }
         self.write("index.html", page(&done, self.quick).as_bytes())?;
         say(self.out.join("index.html").display());
         let failed = done.iter().any(|done| done.outcome.is_err());
-        Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+        Ok(if failed { FAILED } else { DONE })
     }
 
     /// Reruns an item, prints its tables and writes them with its pictures.

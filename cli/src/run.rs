@@ -1,12 +1,12 @@
 use crate::interrupts::{self, Interrupts};
-use crate::{StudyArgs, progress::Progress, tables::Told, terminal};
+use crate::terminal::{self, Status};
+use crate::{StudyArgs, progress::Progress, tables::Told};
 use clap::Args;
 use driftmesh::Error;
 use driftmesh::output::{RunDirectory, Standing};
 use driftmesh::simulation::Observer;
 use driftmesh::study::{Begin, Finished, Study};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 #[derive(Args)]
 pub struct Run {
@@ -27,7 +27,7 @@ pub struct Run {
 }
 
 impl Run {
-    pub fn execute(&self) -> driftmesh::Result<ExitCode> {
+    pub fn execute(&self) -> driftmesh::Result<Status> {
         if self.resume && self.study.is_standard_input() {
             return Err(unrepeated());
         }
@@ -66,7 +66,7 @@ impl Run {
     }
 
     /// Runs a study, and says how it went.
-    fn watched<K: Told>(&self, study: &K, out: &Path) -> driftmesh::Result<ExitCode> {
+    fn watched<K: Told>(&self, study: &K, out: &Path) -> driftmesh::Result<Status> {
         let mut progress = Progress::new();
         // what nobody can end half-way ends with the program
         let mut interrupts = study.has_steps().then(Interrupts::listen);
@@ -103,7 +103,7 @@ impl Run {
         }
     }
 
-    fn succeeded(&self, out: &Path) -> ExitCode {
+    fn succeeded(&self, out: &Path) -> Status {
         terminal::succeeded(self.study.strict, &format!("the run is complete in {}", out.display()))
     }
 

@@ -1,9 +1,8 @@
-use crate::terminal;
+use crate::terminal::{self, DONE, Status};
 use driftmesh::study::Study;
-use std::process::ExitCode;
 
 /// Prints the schema of a study file.
-pub fn execute() -> driftmesh::Result<ExitCode> {
+pub fn execute() -> driftmesh::Result<Status> {
     terminal::say(format_args!("{:#}", Study::schema()));
-    Ok(ExitCode::SUCCESS)
+    Ok(DONE)
 }

@@ -1,16 +1,40 @@
 //! Words to the user. A closed pipe is not an error worth a word.
 
 use driftmesh::Error;
+use std::ffi::OsString;
 use std::io::{ErrorKind, Write, stderr, stdout};
 use std::path::Path;
-use std::process::ExitCode;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+/// How the program ends, for whoever called it.
+pub type Status = u8;
+/// Everything that was asked for is done.
+pub const DONE: Status = 0;
+/// The computation failed, or warned where warnings were to be failures.
+pub const FAILED: Status = 1;
+/// The study or the command line is wrong.
+pub const WRONG: Status = 2;
 
 /// Why something could not be printed.
 static UNSAID: OnceLock<String> = OnceLock::new();
 /// Warnings printed so far.
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
+
+/// The command line.
+static WORDS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Forgets what was said before, and keeps the command line.
+pub fn begin(words: &[OsString]) {
+    WARNINGS.store(0, Ordering::Relaxed);
+    *WORDS.lock().unwrap_or_else(PoisonError::into_inner) =
+        words.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+}
+
+/// The words of the command line.
+pub fn words() -> Vec<String> {
+    WORDS.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
 
 /// Prints to standard output.
 pub fn say(text: impl std::fmt::Display) {
@@ -22,12 +46,12 @@ pub fn say(text: impl std::fmt::Display) {
 }
 
 /// How the program ends if it would end so: what was not printed, on a full disk say, is an error.
-pub fn ended(code: ExitCode) -> ExitCode {
+pub fn ended(code: Status) -> Status {
     match UNSAID.get() {
         None => code,
         Some(reason) => {
             let _ = writeln!(stderr(), "error: cannot write standard output: {reason}");
-            ExitCode::FAILURE
+            FAILED
         }
     }
 }
@@ -50,15 +74,15 @@ pub fn warn(text: &str) {
 
 /// How the program ends where nothing failed: with `strict`, any warning makes it fail, and one line says so. `what`
 /// says what there is all the same.
-pub fn succeeded(strict: bool, what: &str) -> ExitCode {
+pub fn succeeded(strict: bool, what: &str) -> Status {
     let count = match WARNINGS.load(Ordering::Relaxed) {
-        _ if !strict => return ExitCode::SUCCESS,
-        0 => return ExitCode::SUCCESS,
+        _ if !strict => return DONE,
+        0 => return DONE,
         1 => "1 warning, which --strict makes a failure".into(),
         n => format!("{n} warnings, which --strict makes a failure"),
     };
     let _ = writeln!(stderr(), "error: {count}: {what}");
-    ExitCode::FAILURE
+    FAILED
 }
 
 /// Prints what the user may not expect.
@@ -67,7 +91,7 @@ pub fn note(text: &str) {
 }
 
 /// Prints an error with its remedy and a note, and says how the program ends.
-pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> ExitCode {
+pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> Status {
     let mut text = format!("error: {error}\n");
     for (title, words) in [("help", help), ("note", note)] {
         if let Some(words) = words {
@@ -75,7 +99,7 @@ pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> Ex
         }
     }
     let _ = stderr().write_all(text.as_bytes());
-    ExitCode::from(if error.is_failure() { 1 } else { 2 })
+    if error.is_failure() { FAILED } else { WRONG }
 }
 
 /// Makes the pool of threads, all cores where no number is given. The caller is one of them: handing each small piece

@@ -4,7 +4,7 @@ Three ways in:
 
 * move a mesh to the data of your own solver: :class:`Mesh`, :class:`MeshGenerator`, :func:`transfer`,
   :func:`gradient`;
-* run a study: :func:`run`, :func:`load`;
+* run a study: :func:`run`, :func:`load`, :func:`studies`;
 * the tools by themselves: :func:`laplacian_stencils`, :func:`equidistribute`, :func:`schwarz`.
 
 Arrays over a mesh have shape ``(nx + 1, ny + 1)``, first index along ξ, over a line ``(nx + 1,)``; periodic axes
@@ -21,10 +21,10 @@ from .laplacian import laplacian_stencils
 from .line import SchwarzResult, equidistribute, schwarz
 from .mesh import Mesh
 from .methods import Fixed, GridWalk, Interpolation, MonteCarlo, ResidualWalk, Schwarz, Stochastic, Strip, Whole
-from .monitors import Arclength, Given, RootGradient
+from .monitors import Arclength, Given, Largest, RootGradient
 from .quality import Quality
 from .remap import transfer
-from .study import Run, load, run
+from .study import Run, load, run, studies
 
 __all__ = [
     "Arclength",
@@ -33,6 +33,7 @@ __all__ = [
     "Given",
     "GridWalk",
     "Interpolation",
+    "Largest",
     "Mesh",
     "MeshError",
     "MeshGenerator",
@@ -55,5 +56,6 @@ __all__ = [
     "load",
     "run",
     "schwarz",
+    "studies",
     "transfer",
 ]

@@ -50,13 +50,12 @@ class Frame:
         arrays = {}
         for element in root.iterfind(".//Points/DataArray"):
             arrays["points"] = _decoded(element).reshape(*self.shape, 3)
-        for element in root.iterfind(".//PointData/DataArray"):
-            values = _decoded(element)
-            arrays[element.attrib["Name"]] = (
-                values.reshape(*self.shape, -1).squeeze(-1)
-                if values.size == np.prod(self.shape)
-                else values.reshape(*self.shape, 3)[..., :2]
-            )
+        cells = tuple(n - 1 for n in self.shape)
+        for place, shape in (("PointData", self.shape), ("CellData", cells)):
+            for element in root.iterfind(f".//{place}/DataArray"):
+                values = _decoded(element)
+                scalar = values.size == np.prod(shape)
+                arrays[element.attrib["Name"]] = values.reshape(shape) if scalar else values.reshape(*shape, 3)[..., :2]
         return arrays
 
     @property
@@ -76,11 +75,12 @@ class Frame:
 
     @property
     def names(self) -> list[str]:
-        """Names of the nodal fields: the unknowns first."""
+        """Names of the fields, those of the nodes first and of these the unknowns."""
         return [name for name in self._arrays if name != "points"]
 
     def __getitem__(self, name: str) -> Floats:
-        """A nodal field by name: of the shape of the frame, with two components behind that for a vector."""
+        """A field by name: of the shape of the frame, one less along each axis where it has one value a cell, with two
+        components behind that for a vector."""
         if name not in self.names:
             raise KeyError(f"{name!r}; this frame has {', '.join(self.names)}")
         return self._arrays[name]

@@ -17,10 +17,10 @@ from ._boxes import check_box, fills_box, images, periodic_values
 from ._toml import Kind
 from .mesh import Mesh
 from .methods import Fixed, Schwarz, Stochastic, Whole
-from .monitors import Arclength, Given, RootGradient
+from .monitors import Given, Largest, MonitorKind, RootGradient
 
 #: Where a mesh should be fine: a monitor of u, the density itself, or a function of mesh and u that gives it.
-Monitor: TypeAlias = "Arclength | RootGradient | Given | ArrayLike | Callable[[Mesh, Any], ArrayLike]"
+Monitor: TypeAlias = "MonitorKind | Largest | ArrayLike | Callable[[Mesh, Any], ArrayLike]"
 
 #: τ in units of time or in time steps, or chosen.
 Relaxation: TypeAlias = "float | Mapping[str, float] | Literal['auto']"
@@ -39,8 +39,8 @@ class MeshGenerator:
 
     Args:
         monitor: :class:`RootGradient` (the default, with nothing to set), :class:`Arclength` or :class:`Given`; or the
-            density itself, an array of the shape of the mesh; or a function of mesh and u that returns it. A density
-            is positive, and only its ratios matter.
+            density itself, an array of the shape of the mesh; or a function of mesh and u that returns it. ``a | b``
+            is the larger of two monitors (:class:`Largest`). A density is positive, and only its ratios matter.
         method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`. Meshes of lines
             take :class:`Whole` and :class:`Fixed`.
         relaxation: τ, the time that the mesh takes to follow the density. ``"auto"`` chooses it from how the mesh

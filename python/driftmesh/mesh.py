@@ -316,8 +316,8 @@ class Mesh(_points.Points):
         return Quality(*_driftmesh.quality(self._given(), rho))
 
     def to_meshio(self, **fields: ArrayLike) -> Any:
-        """The mesh as a ``meshio.Mesh`` of quadrilaterals or lines, with nodal fields by name, each of the shape of the
-        mesh.
+        """The mesh as a ``meshio.Mesh`` of quadrilaterals or lines, with fields by name: nodal ones of the shape of the
+        mesh, and those with one value a cell, one less along each axis.
 
         Raises:
             ImportError: meshio is not there.
@@ -330,7 +330,8 @@ class Mesh(_points.Points):
         return _exchange.to_meshio(self, fields)
 
     def to_pyvista(self, **fields: ArrayLike) -> Any:
-        """The mesh as a ``pyvista.StructuredGrid``, with nodal fields by name, each of the shape of the mesh.
+        """The mesh as a ``pyvista.StructuredGrid``, with fields by name: nodal ones of the shape of the mesh, and those
+        with one value a cell, one less along each axis.
 
         Raises:
             ImportError: pyvista is not there.
@@ -341,6 +342,20 @@ class Mesh(_points.Points):
         16
         """
         return _exchange.to_pyvista(self, fields)
+
+    def to_xarray(self, **fields: ArrayLike) -> Any:
+        """The fields as an ``xarray.Dataset`` over the lattice, with the coordinates x and y of the nodes: nodal fields
+        of the shape of the mesh along i and j, and those with one value a cell along cell_i and cell_j.
+
+        Raises:
+            ImportError: xarray is not there.
+
+        >>> from driftmesh import Mesh
+        >>> mesh = Mesh.uniform(cells=(4, 4))
+        >>> dict(mesh.to_xarray(u=mesh.x).sizes)
+        {'i': 5, 'j': 5}
+        """
+        return _exchange.to_xarray(self, fields)
 
     def plot(self, u: ArrayLike | None = None, ax: Axes | None = None) -> Axes:
         """Draws the mesh over colours for u of its shape, if that is given; a line as u over its nodes. Needs

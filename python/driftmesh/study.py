@@ -139,6 +139,24 @@ def load(directory: str | PathLike[str]) -> Run:
     return Run(path, told, _table(path / "history.csv"), final, frames_of(path, final, domain), domain)
 
 
+def studies(directory: str | PathLike[str] = "studies") -> list[Path]:
+    """Write the example studies, with the files they read, into a directory, and return the paths of all.
+
+    Args:
+        directory: Where they go. It is made where there is none; what is there by the same names is kept.
+
+    Raises:
+        OSError: The directory cannot be written.
+
+    >>> import tempfile
+    >>> from driftmesh import studies
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     "burgers.toml" in [path.name for path in studies(directory)]
+    True
+    """
+    return _driftmesh.write_examples(Path(directory))
+
+
 def run(
     study: str | PathLike[str] | Mapping[str, Any],
     out: str | PathLike[str] | None = None,

@@ -9,6 +9,7 @@ mod line;
 mod memory;
 mod mesh;
 mod mover;
+mod program;
 mod stencils;
 mod study;
 mod threads;
@@ -25,6 +26,8 @@ mod _driftmesh {
     use super::line::{equidistribute, schwarz};
     #[pymodule_export]
     use super::mesh::{areas, interpolate, quality, transfer, uniform};
+    #[pymodule_export]
+    use super::program::{program, write_examples};
     #[pymodule_export]
     use super::stencils::stencils;
     #[pymodule_export]

@@ -23,6 +23,7 @@ from driftmesh import (
     Given,
     GridWalk,
     Interpolation,
+    Largest,
     Mesh,
     MeshGenerator,
     MonteCarlo,
@@ -335,3 +336,29 @@ def test_a_relaxation_that_is_too_short_is_warned_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         follow_ring("auto")
+
+
+def test_monitors_combine():
+    """The larger of two densities, each over its mean, whatever the size of either."""
+    mesh = Mesh.uniform(cells=(24, 16), upper=(2, 1))
+    one, other = lambda m, u: 1 + 9 * (m.x < 0.5), lambda m, u: 500 * (1 + 3 * (m.y > 0.5) * u)
+    both = one | RootGradient() | other
+    assert [both.monitors[k] for k in (0, 2)] == [one, other] and both.monitors[1] == RootGradient()
+    mean = lambda rho: rho / ((rho * mesh.areas).sum() / mesh.areas.sum())
+    u = 1 + mesh.x
+    expected = np.maximum(mean(one(mesh, u)), mean(other(mesh, u)))
+    assert np.allclose(MeshGenerator(monitor=Largest(one, other)).density(mesh, u), expected, rtol=1e-12)
+    fields = np.stack([mesh.x, np.zeros(mesh.shape)])  # one field each: the second density is even
+    assert np.allclose(Largest(one, other)(mesh, fields), np.maximum(mean(one(mesh, u)), 1), rtol=1e-12)
+    # layers of two fields, thin enough that both draw half of all nodes
+    generator = MeshGenerator(monitor=RootGradient() | RootGradient())
+    layers = lambda x, y: (np.tanh(100 * (x - 0.4)), np.tanh(100 * (x - 1.7)))
+    adapted = generator.adapt(Mesh.uniform(cells=(40, 4), upper=(2, 1)), layers)
+    widths = np.interp([0.4, 1.7], adapted.x[1:, 0], np.diff(adapted.x[:, 0]))
+    assert (widths < 0.3 * 2 / 40).all(), widths
+    for wrong, message in [((mesh.x,), "1 fields for 2"), ((mesh.x, mesh.x, mesh.x), "3 fields for 2")]:
+        with pytest.raises(ValueError, match=message):
+            generator.step(mesh, wrong, 0.1)
+    for nonsense in (lambda: Largest(), lambda: RootGradient() | 3, lambda: Largest(RootGradient)):
+        with pytest.raises(ValueError, match="monitor"):
+            nonsense()

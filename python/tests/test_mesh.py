@@ -275,3 +275,22 @@ def test_how_a_field_is_carried_is_checked(arguments, said):
     mesh = bent()
     with pytest.raises(ValueError, match=re.escape(said)):
         transfer(np.ones(SHAPE), mesh, mesh, **arguments)
+
+
+def test_fields_of_nodes_and_of_cells_go_out():
+    mesh = Mesh.uniform(cells=(3, 2), upper=(3, 2))
+    moved = Mesh(mesh.x + 0.1 * np.sin(np.pi * mesh.x / 3) * np.sin(np.pi * mesh.y / 2), mesh.y)
+    u, k = moved.x * moved.y, np.arange(6.0).reshape(3, 2)
+    data = moved.to_xarray(u=u, k=k)
+    assert dict(data.sizes) == {"i": 4, "j": 3, "cell_i": 3, "cell_j": 2}
+    assert np.array_equal(data.u, data.x * data.y) and np.array_equal(data.k, k)
+    out = moved.to_meshio(u=u, k=k)
+    centres = out.points[out.cells_dict["quad"]].mean(axis=1)
+    assert np.array_equal(out.cell_data["k"][0], k.ravel())
+    assert np.allclose(centres[:, 0] // 1 * 2 + centres[:, 1] // 1, k.ravel())
+    grid = moved.to_pyvista(u=u, k=k)
+    assert np.allclose(grid.points[:, 0] * grid.points[:, 1], grid.point_data["u"])
+    centres = grid.cell_centers().points
+    assert np.allclose(centres[:, 0] // 1 * 2 + centres[:, 1] // 1, grid.cell_data["k"])
+    with pytest.raises(ValueError, match="shape"):
+        moved.to_xarray(u=np.zeros((4, 2)))

@@ -4,6 +4,7 @@ mod any;
 mod common;
 mod dimension;
 mod equidistribution;
+mod examples;
 mod front_checks;
 mod front_figures;
 mod front_given;
@@ -38,6 +39,7 @@ pub use equidistribution::{
     Discretization, EquidistributionStudy, FirstMesh, Integral, Interval, LineArclength, LineDensityKind, LineDomain,
     LineFormula, LineGrid, LineTime, MethodName, SchwarzTable, Start, StopTable,
 };
+pub use examples::write_examples;
 pub use front_figures::{FrontError, FrontFigures, FrontParts, FrontReport, FrontSummary};
 pub use front_run::{FrontCourse, FrontRun};
 pub use kind::{Kind, Running, SpentBy};
