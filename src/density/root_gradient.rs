@@ -12,17 +12,17 @@ use std::borrow::Cow;
 /// w_d = max(q_d³, 0.1),   c_d = max(q_d, 1 − q_d)³,   q_d = s_d m_d / max_d s_d m_d
 /// ```
 ///
-/// for each axis d, ⟨·⟩ the mean over the domain, with g the gradient of u in each mesh cell per uniform cell along each
-/// axis, (h_x u_x, h_y u_y), so that a box of any shape is treated alike. A layer of any width
-/// gets the same share of the nodes, about half of them: the mean of the root falls with the width as fast as its
-/// largest value grows. The background b is 0 where u is flat outside its layers, and takes out the slopes between the
-/// shocks of a saw tooth, which would share the nodes otherwise. With a density for each axis, layers along two
-/// adjacent sides, or across each other, have their nodes both.
+/// for each axis d, ⟨·⟩ the mean over the domain, with g the gradient of u in each mesh cell per uniform cell along
+/// each axis, (h_x u_x, h_y u_y), so that a box of any shape is treated alike. A layer of any width gets the same share
+/// of the nodes, about half of them: the mean of the root falls with the width as fast as its largest value grows. The
+/// background b is 0 where u is flat outside its layers, and takes out the slopes between the shocks of a saw tooth,
+/// which would share the nodes otherwise. With a density for each axis, layers along two adjacent sides, or across each
+/// other, have their nodes both.
 ///
 /// An axis along which less changes, q_d < 1, draws fewer nodes, by w_d: along a wave-shaped layer its slopes are those
 /// of flanks that mesh lines can follow. So that they can, neighbouring lines are tied less along that axis, by c_d.
-/// Where nothing changes along an axis, q_d = 0, lines have nothing to follow and are tied in full: on periodic axes they
-/// would drift apart otherwise.
+/// Where nothing changes along an axis, q_d = 0, lines have nothing to follow and are tied in full: on periodic axes
+/// they would drift apart otherwise.
 ///
 /// Of several unknowns, each in units of its range, the largest |g_d| counts, and the largest need: what equal cells
 /// resolve of one unknown would not be resolved any more where all nodes go to a layer of another.
