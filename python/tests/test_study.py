@@ -239,7 +239,7 @@ def test_warnings_are_warnings(tmp_path):
         "grid": {"cells": [40, 40]},
         "time": {"start": 0.0, "end": 0.5, "step": 0.01},
         "pde": {"kind": "prescribed", "u": "tanh(200*(x + 0.09*sin(2*pi*y) - 0.5))"},
-        "mesh": {"relaxation": {"steps": 15, "prediction": 0.2}},
+        "mesh": {"relaxation": {"steps": 2, "prediction": 0.2}},
     }
     with pytest.warns(RuntimeWarning, match="mesh.relaxation"):
         result = driftmesh.run(study, out=tmp_path / "out")
