@@ -103,10 +103,9 @@ fn followed(start: &Mesh<2>, f: &Field, generator: impl MeshGenerator + 'static,
     now
 }
 
-/// The mean error of interpolation of a moved mesh is a third of that of equal cells, and of one of 18 .357 of it.
+/// The mean error of interpolation of a moved mesh is at most a quarter of that of equal cells.
 #[test]
-fn moved_meshes_are_three_times_as_good() {
-    let mut missed = 0;
+fn moved_meshes_are_four_times_as_good() {
     for (name, chart) in domains() {
         for (what, f) in features(&chart) {
             let start = mesh(name, &chart, 40);
@@ -114,11 +113,9 @@ fn moved_meshes_are_three_times_as_good() {
             let ([before, mean_before], [after, mean]) = (errors(&start, &f), errors(&moved, &f));
             let ratio = mean / mean_before;
             println!("{name:14} {what:7} {before:.3} {:.3} | {mean_before:.4} {ratio:.3}", after / before);
-            assert!(ratio < 0.36, "{name}, {what}: {ratio:.3} of the error of equal cells");
-            missed += usize::from(ratio > 1.0 / 3.0);
+            assert!(ratio < 0.25, "{name}, {what}: {ratio:.3} of the error of equal cells");
         }
     }
-    assert!(missed <= 1, "{missed} of 18 meshes are not three times as good");
 }
 
 /// Nodes all over the place, those on sides on their sides; along a closed axis also a turn further.
