@@ -1,29 +1,15 @@
 //! Phases that begin or end along a part of a wall, and set-ups that no front can have.
 
+mod front_runs;
+
 use driftmesh::stefan::{Change, Material, Similarity};
-use driftmesh::study::{FrontCourse, Kind, Source, StefanStudy, Study};
+use driftmesh::study::Kind;
 use driftmesh::{Error, Failure};
+use front_runs::{course, study};
 
-fn source(text: &str, set: &[&str]) -> Source {
-    let mut source = Source::new("front", text.to_string());
-    set.iter().for_each(|assignment| source.set(assignment).unwrap());
-    source
-}
-
-fn run(text: &str, set: &[&str]) -> (FrontCourse, Option<Error>) {
-    let (run, failure) = StefanStudy::from_source(&source(text, set)).unwrap().compute().unwrap();
-    (run.course, failure)
-}
-
-/// A run to its end.
-fn course(text: &str, set: &[&str]) -> FrontCourse {
-    let (course, failure) = run(text, set);
-    assert!(failure.is_none(), "{set:?}: {failure:?}");
-    course
-}
-
-fn refused(text: &str, set: &[&str]) -> String {
-    let error = Study::from_source(&source(text, set)).unwrap_err();
+/// What a study is refused with, and the remedy.
+fn refused(text: &str, set: &[impl AsRef<str>]) -> String {
+    let error = front_runs::refused(text, set);
     format!("{error} {}", error.help().unwrap_or_default())
 }
 
@@ -127,7 +113,8 @@ fn a_phase_appears_at_a_wall_that_heat_flows_through() {
 #[test]
 fn a_wall_that_passes_the_melting_temperature_is_named() {
     for wall in ["\"cos(3*t) - cos(0.3) + exp(0.1) - 1\"", "{ flux = \"cos(8*t)\" }"] {
-        let (course, failure) = run(WEDGE, &[&format!("phase.lower.boundary={wall}")]);
+        let (run, failure) = study(WEDGE, &[format!("phase.lower.boundary={wall}")]).compute().unwrap();
+        let course = run.course;
         let failure = failure.unwrap();
         println!("{wall}: {failure}");
         assert!(matches!(&failure, Error::Failed { failure: Failure::WallPassesMelting { .. }, .. }), "{failure}");
@@ -161,7 +148,7 @@ fn contradictions_are_named() {
     let said = refused(SPOT, &KELVIN);
     assert!(["below the melting", "one scale", "front.melting"].iter().any(|w| said.contains(w)), "{said}");
     let on_wall = [&KELVIN[..], &["domain.front=\"0\""]].concat();
-    let study = StefanStudy::from_source(&source(SPOT, &on_wall)).unwrap();
+    let study = study(SPOT, &on_wall);
     let said = study.warnings().unwrap().join("\n");
     assert!(said.contains("the lower phase never appears") && said.contains("273.15"), "{said}");
     // a front that begins outside the box is not cured by an earlier end
@@ -200,7 +187,7 @@ fn results_do_not_depend_on_units() {
             "time.report=[]".into(),
             "grid.cells=[4, 20, 10]".into(),
         ];
-        let front = course(WEDGE, &set.iter().map(String::as_str).collect::<Vec<_>>()).state.front[0];
+        let front = course(WEDGE, &set).state.front[0];
         assert!((front / (l * usual) - 1.0).abs() < 1e-8, "{l} {s} {k}: {front}, not {}", l * usual);
     }
 }

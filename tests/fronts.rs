@@ -1,24 +1,8 @@
 //! Fronts by default: order in space and time, data sheets, walls with a flux, against exact solutions.
 
-use driftmesh::Error;
-use driftmesh::study::{FrontCourse, Kind, Source, StefanStudy, Study};
+mod front_runs;
 
-/// A run to its end.
-fn course(text: &str, set: &[String]) -> FrontCourse {
-    let (run, failure) = StefanStudy::from_source(&source(text, set)).unwrap().compute().unwrap();
-    assert!(failure.is_none(), "{set:?}: {failure:?}");
-    run.course
-}
-
-fn source(text: &str, set: &[String]) -> Source {
-    let mut source = Source::new("front", text.to_string());
-    set.iter().for_each(|assignment| source.set(assignment).unwrap());
-    source
-}
-
-fn refused(text: &str, set: &[&str]) -> Error {
-    Study::from_source(&source(text, &set.iter().map(|s| s.to_string()).collect::<Vec<_>>())).unwrap_err()
-}
+use front_runs::{AS_IT_IS, course, refused};
 
 /// Neumann's solution from a front that starts at a twentieth of the height.
 const NEAR_THE_WALL: &str = r#"
@@ -46,7 +30,7 @@ report = [1.0, 3.0, 5.0]
 /// With nothing said of steps the front is right to .2 % and energy to 1e-5 while it moves to six times its distance.
 #[test]
 fn a_front_that_starts_near_a_wall_is_right_by_default() {
-    let reports = course(NEAR_THE_WALL, &[]).reports;
+    let reports = course(NEAR_THE_WALL, AS_IT_IS).reports;
     assert_eq!(reports.len(), 3);
     for report in reports {
         let [error, energy] = [report.front.error_linf.unwrap(), report.energy_imbalance.unwrap()];
@@ -58,7 +42,7 @@ fn a_front_that_starts_near_a_wall_is_right_by_default() {
 /// The explicit front follows the wall by its automatic steps, too.
 #[test]
 fn explicit_steps_follow_the_distance_from_the_wall() {
-    let report = course(NEAR_THE_WALL, &["front.stepping=\"explicit\"".into()]).reports[0];
+    let report = course(NEAR_THE_WALL, &["front.stepping=\"explicit\""]).reports[0];
     let error = report.front.error_linf.unwrap() / report.front.mean;
     println!("{error:e}");
     assert!(error <= 2e-3, "{error:e}");
@@ -145,7 +129,7 @@ fn ice_melts_in_the_units_of_a_data_sheet() {
     for set in
         [&[][..], &["front.latent_heat=3.34e8"], &["front.melting=273.15", "exact.wall=293.15", "exact.far=268.15"]]
     {
-        let report = course(ICE, &set.iter().map(|s| s.to_string()).collect::<Vec<_>>()).reports[0];
+        let report = course(ICE, set).reports[0];
         let [error, energy] = [report.front.error_linf.unwrap(), report.energy_imbalance.unwrap()];
         println!("{set:?}: {} {:e} {energy:e}", report.front.mean, error / report.front.mean);
         assert!(error <= 1e-3 * report.front.mean, "{set:?}: {error:e} of {}", report.front.mean);

@@ -1,20 +1,10 @@
 //! Phases that vanish and appear, and melts below their melting temperature, against exact solutions.
 
+mod front_runs;
+
 use driftmesh::stefan::{Change, LOWER, UPPER};
-use driftmesh::study::{Begin, FrontCourse, Kind, Source, StefanStudy, Study};
-
-fn source(text: &str, set: &[&str]) -> Source {
-    let mut source = Source::new("front", text.to_string());
-    set.iter().for_each(|assignment| source.set(assignment).unwrap());
-    source
-}
-
-/// A run to its end.
-fn course(text: &str, set: &[&str]) -> FrontCourse {
-    let (run, failure) = StefanStudy::from_source(&source(text, set)).unwrap().compute().unwrap();
-    assert!(failure.is_none(), "{set:?}: {failure:?}");
-    run.course
-}
+use driftmesh::study::{Begin, Kind};
+use front_runs::{AS_IT_IS, course, refused, study};
 
 /// u = exp(t − y) − 1 below h = t, and ice at its melting point above: the ice is gone at t = 1.
 const MELT_OUT: &str = r#"
@@ -92,7 +82,7 @@ end = 1.0
 
 #[test]
 fn a_phase_appears_at_a_warm_wall() {
-    let course = course(FROM_NOTHING, &[]);
+    let course = course(FROM_NOTHING, AS_IT_IS);
     let h = course.state.front[0];
     println!("{:?} {h} {:e} {} steps", course.phases, h / (2.0 * 0.469851) - 1.0, course.work.steps);
     let [event] = &course.phases[..] else { panic!("{:?}", course.phases) };
@@ -152,7 +142,7 @@ fn undercooled() -> String {
 fn an_undercooled_melt_freezes() {
     let growth = std::f64::consts::PI.sqrt() * LAMBDA * (LAMBDA * LAMBDA).exp() * libm::erfc(LAMBDA);
     assert!((growth - 0.5).abs() < 1e-9);
-    let course = course(&undercooled(), &[]);
+    let course = course(&undercooled(), AS_IT_IS);
     let (h, exact) = (course.state.front[0], 2.0 * LAMBDA * course.state.t.sqrt());
     println!("{h} {exact} {:e} {} steps", h / exact - 1.0, course.work.steps);
     assert!((h / exact - 1.0).abs() <= 5e-3, "{h}, not {exact}");
@@ -163,7 +153,7 @@ fn an_undercooled_melt_freezes() {
 fn a_front_on_too_few_rows_is_in_doubt() {
     for (rows, doubtful) in [(8, true), (60, false)] {
         let set = format!("grid.cells=[4, 8, {rows}]");
-        let study = StefanStudy::from_source(&source(&undercooled(), &[&set])).unwrap();
+        let study = study(&undercooled(), &[&set]);
         let out = tempfile::tempdir().unwrap();
         let summary = study.run(&out.path().join("run"), Begin::Anew, &mut []).unwrap().summary;
         let doubt = summary.figures.reports[0].front.doubt.unwrap();
@@ -182,13 +172,13 @@ fn an_undercooled_melt_is_named() {
         turned.replace("front = \"0.1\"", "front = \"3.9\"").replace("cells = [4, 8, 60]", "cells = [4, 60, 8]");
     let turned = turned.replace("phase.lower", "phase.other").replace("phase.upper", "phase.lower");
     let turned = turned.replace("phase.other", "phase.upper");
-    let course = course(&turned, &[]);
+    let course = course(&turned, AS_IT_IS);
     let (h, exact) = (4.0 - course.state.front[0], 2.0 * LAMBDA * course.state.t.sqrt());
     assert!((h / exact - 1.0).abs() <= 5e-3, "{h}, not {exact}");
-    let error = Study::from_source(&source(&turned, &["front.undercooled=false"])).unwrap_err();
+    let error = refused(&turned, &["front.undercooled=false"]);
     let said = format!("{error} {:?}", error.help());
     assert!(["ill-posed", "front.undercooled"].iter().all(|word| said.contains(word)), "{said}");
-    let error = Study::from_source(&source(MELT_OUT, &["front.undercooled=true"])).unwrap_err();
+    let error = refused(MELT_OUT, &["front.undercooled=true"]);
     assert!(error.to_string().contains("front.undercooled"), "{error}");
     assert_eq!((LOWER, UPPER), (0, 1));
 }
@@ -221,13 +211,13 @@ duration = 0.2
     let planar = ["exact={ kind = \"planar-growth\", far = -0.5, start_front = 0.5, tilt = 10.0 }"];
     for set in [&[][..], &planar] {
         let course = course(GROWTH, set);
-        let start = StefanStudy::from_source(&source(GROWTH, set)).unwrap().begin().unwrap().course.state.front[5];
+        let start = study(GROWTH, set).begin().unwrap().course.state.front[5];
         let [error, way] = [course.reports[0].front.error_linf.unwrap(), course.state.front[5] - start];
         println!("{set:?}: {error:e} of {way}");
         assert!(way > 0.1 && error <= 5e-3 * way, "{set:?}: {error:e} of {way}");
     }
-    let error = Study::from_source(&source(GROWTH, &["front.undercooled=false"])).unwrap_err();
+    let error = refused(GROWTH, &["front.undercooled=false"]);
     assert!(error.to_string().contains("front.undercooled"), "{error}");
-    let error = Study::from_source(&source(GROWTH, &["exact.far=-1.0"])).unwrap_err();
+    let error = refused(GROWTH, &["exact.far=-1.0"]);
     assert!(error.to_string().contains("latent heat over capacity"), "{error}");
 }
