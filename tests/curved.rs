@@ -1,18 +1,14 @@
 //! Studies of moving meshes in domains that are not boxes.
 
+mod runs;
+
 use driftmesh::error::Error;
 use driftmesh::geometry::Mesh;
-use driftmesh::study::{Begin, Kind, MovingMesh, MovingRun, PoissonStudy, Source};
+use driftmesh::study::{Begin, Kind, MovingMesh, PoissonStudy, Source};
+use runs::{HEAD, plane};
 
 fn study(text: &str) -> Result<MovingMesh, Error> {
-    let head = "[study]\nname = \"curved\"\nkind = \"moving-mesh\"\n";
-    MovingMesh::from_source(&Source::new("curved.toml", format!("{head}{text}")))
-}
-
-fn run(text: &str) -> MovingRun {
-    let (run, failure) = study(text).unwrap().compute().unwrap();
-    assert!(failure.is_none(), "{failure:?}");
-    run
+    MovingMesh::from_source(&Source::new("curved.toml", format!("{HEAD}{text}")))
 }
 
 const ANNULUS: &str = r#"
@@ -70,7 +66,7 @@ fn manufactured(domain: &str, [n, m]: [usize; 2], kind: &str) -> f64 {
         "#,
         step = 0.8 / n as f64
     );
-    let run = run(&text);
+    let run = plane(&text);
     let cell = 1.0 / n as f64;
     assert!(run.record.travelled > 0.2 * cell, "the mesh moved by {}", run.record.travelled);
     run.record.reports.last().unwrap().error.unwrap().l2
@@ -116,7 +112,7 @@ fn mass_is_kept_to_rounding() {
             boundary = {{ u = "no-flux" }}
             "#
         );
-        let run = run(&text);
+        let run = plane(&text);
         let drift = run.record.reports.last().unwrap().conserved.drift;
         assert!(drift.abs() < 1e-12, "{name}: {drift:.1e}");
         assert!(run.record.travelled > 0.02, "{name}: {}", run.record.travelled);
@@ -168,9 +164,9 @@ fn a_turned_box_has_the_numbers_of_the_box() {
             "#
         )
     };
-    let flat = run(&text("", "x", "y"));
+    let flat = plane(&text("", "x", "y"));
     let domain = format!("[domain]\nmap = {{ x = \"{c}*s - {s}*r\", y = \"{s}*s + {c}*r\" }}\n");
-    let turned = run(&text(&domain, &format!("({c}*x + {s}*y)"), &format!("({c}*y - {s}*x)")));
+    let turned = plane(&text(&domain, &format!("({c}*x + {s}*y)"), &format!("({c}*y - {s}*x)")));
     let [a, b] = [&flat, &turned].map(|run| run.state.as_ref().unwrap());
     for (a, b) in a.u.values().iter().zip(b.u.values()) {
         assert!((a - b).abs() < 1e-10, "{a} and {b}");
@@ -219,7 +215,7 @@ fn runs_go_on_where_they_ended() {
          step = 0.02\n[pde]\nkind = \"prescribed\"\nu = \"tanh(20*(x - 1 + t))\"\n",
         long.join("final.npz").display().to_string()
     );
-    let mesh = &run(&again).state.unwrap().mesh;
+    let mesh = &plane(&again).state.unwrap().mesh;
     for (k, [x, y]) in mesh.x().iter().enumerate().filter(|(k, _)| mesh.lattice().on_side(*k)) {
         let off = (x.hypot(*y) - 1.0).abs().min((x.hypot(*y) - 2.0).abs());
         assert!(off < 0.02, "node {k} is off its circle by {off:.1e}");
