@@ -132,6 +132,11 @@ impl<'de> Deserialize<'de> for Text {
     }
 }
 
+/// A formula that may be left out.
+pub(crate) fn text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    Text::deserialize(deserializer).map(|Text(text)| Some(text))
+}
+
 /// Formulas by name.
 pub(crate) fn texts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, String>, D::Error> {
     let entries = BTreeMap::<String, Text>::deserialize(deserializer)?;

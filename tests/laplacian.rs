@@ -238,7 +238,10 @@ fn bad_studies_are_refused_at_their_place() {
         (&["laplacian.kind=\"best\""], &["laplacian.kind", "optimised, harmonic"]),
         (&["laplacian.scaling=\"local\""], &["laplacian.scaling", "published"]),
         (&["exact.u=\"x +* y\""], &["exact.u"]),
-        (&["sides.neumann=[\"left\", \"right\", \"top\", \"bottom\"]"], &["sides.neumann", "constant"]),
+        (
+            &["sides.neumann=[\"left\", \"right\", \"top\", \"bottom\"]", "equation.flux=\"1\""],
+            &["equation.boundary", "defect"],
+        ),
         (&["solver.kind=\"krylov\"", "laplacian.kind=\"compact25\""], &["solver.kind", "nine-point"]),
         (&["solver.kind=\"krylov\"", "sides.neumann=[\"left\"]"], &["solver.kind", "all sides"]),
         (&["grid.cells=[1, 4]"], &["grid.cells", "2 cells"]),

@@ -116,8 +116,51 @@ impl Graph {
                 });
                 self.minus(d(a), right)
             }
+            Node::Binary(Binary::Atan2, a, b) => self.angle([a, b], [d(a), d(b)]),
             Node::Choice(comparison, [left, right, a, b]) => self.choice(comparison, left, right, [d(a), d(b)]),
+            Node::Table(table, at, orders) => self.along(table, at, orders, at.map(d)),
         }
+    }
+
+    /// atan2(a, b)′ = (b a′ − a b′)/(a² + b²)
+    fn angle(&mut self, [a, b]: [Id; 2], [da, db]: [Option<Id>; 2]) -> Option<Id> {
+        let (left, right) = (da.map(|da| self.times(b, da)), db.map(|db| self.times(a, db)));
+        let top = self.minus(left, right)?;
+        let (a, b) = (self.times(a, a), self.times(b, b));
+        let square = self.binary(Binary::Add, a, b);
+        Some(self.over(top, square))
+    }
+
+    /// The slopes of a table along its axes, each times the derivative of its operand.
+    fn along(&mut self, number: u32, at: [Id; 2], orders: [u8; 2], d: [Option<Id>; 2]) -> Option<Id> {
+        let table = self.tables().iter().find(|table| table.number() == number)?.clone();
+        let mut sum = None;
+        for axis in 0..table.axes() {
+            if orders[axis] >= table.degree() {
+                continue;
+            }
+            let mut next = orders;
+            next[axis] += 1;
+            let term = d[axis].map(|d| {
+                let slope = self.push(Node::Table(number, at, next));
+                self.times(slope, d)
+            });
+            sum = self.plus(sum, term);
+        }
+        sum
+    }
+
+    /// asin(a)′ = a′/√(1 − a²) = −acos(a)′, atan(a)′ = a′/(1 + a²)
+    fn inverse(&mut self, f: Unary, a: Id, da: Id) -> Id {
+        let (one, square) = (self.constant(1.0), self.times(a, a));
+        if f == Unary::Atan {
+            let bottom = self.binary(Binary::Add, one, square);
+            return self.over(da, bottom);
+        }
+        let rest = self.binary(Binary::Subtract, one, square);
+        let bottom = self.unary(Unary::Sqrt, rest);
+        let slope = self.over(da, bottom);
+        if f == Unary::Acos { self.unary(Unary::Negate, slope) } else { slope }
     }
 
     /// f(a)′ = f′(a) a′, with `id` the place of f(a) itself.
@@ -141,6 +184,7 @@ impl Graph {
                 let square = self.times(id, id);
                 self.binary(Binary::Add, one, square)
             }
+            Unary::Asin | Unary::Acos | Unary::Atan => return Some(self.inverse(f, a, da)),
             Unary::Sinh => self.unary(Unary::Cosh, a),
             Unary::Cosh => self.unary(Unary::Sinh, a),
             Unary::Tanh => {

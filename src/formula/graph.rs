@@ -1,7 +1,9 @@
 //! Formulas as a graph in which no two nodes are equal: repeated parts take memory and time once.
 
 use super::program;
+use super::table::Table;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Index of a node. Operands stand before the operation, so that every traversal of a graph is a loop.
 pub(super) type Id = u32;
@@ -13,6 +15,9 @@ pub(super) enum Unary {
     Sin,
     Cos,
     Tan,
+    Asin,
+    Acos,
+    Atan,
     Sinh,
     Cosh,
     Tanh,
@@ -38,6 +43,8 @@ pub(super) enum Binary {
     Max,
     /// With the sign of the second operand.
     Modulo,
+    /// The angle of the point (second operand, first operand).
+    Atan2,
 }
 
 /// The comparison in the first place of `if`.
@@ -63,6 +70,9 @@ pub(super) enum Node {
     Power(Id, i32),
     /// Left and right side of the comparison, the value if it holds, and the value if not.
     Choice(Comparison, [Id; 4]),
+    /// A table at a place, by its number, and how often it is differentiated along each of its axes. The operand of a
+    /// table of one axis stands twice.
+    Table(u32, [Id; 2], [u8; 2]),
 }
 
 /// Whole powers above this are computed by `powf`: a long product loses digits.
@@ -77,6 +87,7 @@ impl Node {
             Self::Binary(f, a, b) => Self::Binary(f, to(a), to(b)),
             Self::Power(a, n) => Self::Power(to(a), n),
             Self::Choice(c, ids) => Self::Choice(c, ids.map(to)),
+            Self::Table(table, ids, orders) => Self::Table(table, ids.map(to), orders),
         }
     }
 
@@ -94,11 +105,25 @@ impl Node {
 pub(super) struct Graph {
     nodes: Vec<Node>,
     places: HashMap<Node, Id>,
+    /// The tables that nodes name.
+    tables: Vec<Arc<Table>>,
 }
 
 impl Graph {
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
+    }
+
+    /// The tables that the nodes name.
+    pub fn tables(&self) -> &[Arc<Table>] {
+        &self.tables
+    }
+
+    /// Adds a table that nodes may name.
+    pub fn know(&mut self, table: &Arc<Table>) {
+        if !self.tables.iter().any(|known| known.number() == table.number()) {
+            self.tables.push(table.clone());
+        }
     }
 
     /// A number.
@@ -157,7 +182,7 @@ impl Graph {
             operands.len() as Id - 1
         });
         let mut value = [0.0];
-        (known && !operands.is_empty()).then(|| program::step(local, &operands, 1, &mut value))?;
+        (known && !operands.is_empty()).then(|| program::step(local, &operands, 1, &mut value, &self.tables))?;
         Some(value[0])
     }
 
@@ -175,7 +200,8 @@ impl Graph {
     }
 
     /// Copies the nodes of another graph, and returns their new indices.
-    pub fn import(&mut self, nodes: &[Node]) -> Vec<Id> {
+    pub fn import(&mut self, nodes: &[Node], tables: &[Arc<Table>]) -> Vec<Id> {
+        tables.iter().for_each(|table| self.know(table));
         let mut ids = Vec::with_capacity(nodes.len());
         for node in nodes {
             let id = self.place(node.map(|id| ids[id as usize]));

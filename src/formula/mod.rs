@@ -7,7 +7,9 @@
 //! |---|---|
 //! | numbers | `1`, `.5`, `1e-3`, `2.5E+4`; the constants `pi` and `e` |
 //! | operators | `+ - * / ^ ( )`; `^` binds tighter than a sign, and to the right: `-2^2` is -4, `2^3^2` is 512 |
-//! | functions | `sin cos tan sinh cosh tanh exp log sqrt abs erf floor min max mod`; `log` is the natural logarithm |
+//! | functions | `sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs erf floor min max`; `log` is to base e |
+//! | angles | `atan2(y, x)` is the angle of the point (x, y), from −π to π |
+//! | tables | a [`Table`] is a function by its name within [`with_tables`] |
 //! | remainders | `mod(a, b)` is a − b ⌊a/b⌋, which has the sign of b: `mod(-1, 3)` is 2, `mod(1, -3)` is -2 |
 //! | cases | `if(x < 0, a, b)`, with one of `< <= > >= == !=` in its first place and nowhere else |
 //!
@@ -31,16 +33,19 @@ mod derivative;
 mod graph;
 mod parse;
 mod program;
+mod table;
 mod tokens;
 
 #[cfg(test)]
 mod tests;
 
 pub use program::Program;
+pub use table::{Interpolation, Table, with_tables};
 
 use graph::{Graph, Node};
 use std::fmt;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Longest text that is parsed, in bytes.
 pub const MAX_LENGTH: usize = 10_000;
@@ -96,6 +101,7 @@ pub struct Formula {
     by: Vec<usize>,
     /// Operands before operations; the last one is the value.
     nodes: Vec<Node>,
+    tables: Vec<Arc<Table>>,
 }
 
 impl Formula {
@@ -108,7 +114,8 @@ impl Formula {
     pub fn parse(text: &str, variables: &[&str]) -> Result<Self, Mistake> {
         let (graph, root) = parse::parse(text, variables)?;
         let variables = variables.iter().map(|name| name.to_string()).collect();
-        Ok(Self { text: text.into(), variables, by: Vec::new(), nodes: graph.only(root) })
+        let (nodes, tables) = (graph.only(root), graph.tables().to_vec());
+        Ok(Self { text: text.into(), variables, by: Vec::new(), nodes, tables })
     }
 
     /// The text that was parsed. A derivative has the text of the original formula.
@@ -144,13 +151,14 @@ impl Formula {
             return Err(Mistake::new(0..0, message));
         };
         let mut graph = Graph::default();
-        graph.import(&self.nodes);
+        graph.import(&self.nodes, &self.tables);
         let Some(root) = graph.derivative(variable as u32) else {
             let message = format!("the derivative by {name} takes more than {MAX_OPERATIONS} operations");
             return Err(Mistake::new(0..self.text.len(), message).help("write a shorter formula"));
         };
         let by = self.by.iter().copied().chain([variable]).collect();
-        Ok(Self { by, nodes: graph.only(root), text: self.text.clone(), variables: self.variables.clone() })
+        let (text, variables, tables) = (self.text.clone(), self.variables.clone(), self.tables.clone());
+        Ok(Self { by, nodes: graph.only(root), text, variables, tables })
     }
 
     /// The value at one point; a variable without a value counts as NaN. A [`Program`] is faster for many points.
@@ -167,7 +175,7 @@ impl Formula {
             let (done, to) = done.split_at_mut(k);
             match *node {
                 Node::Variable(v) => to[0] = values.get(v as usize).copied().unwrap_or(f64::NAN),
-                node => program::step(node, done, 1, &mut to[..1]),
+                node => program::step(node, done, 1, &mut to[..1], &self.tables),
             }
         }
         done.last().copied().unwrap_or(f64::NAN)

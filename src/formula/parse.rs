@@ -1,9 +1,11 @@
 //! Parses text into the graph of a formula by recursive descent, without a syntax tree in between.
 
 use super::graph::{Binary, Comparison, Graph, Id, Node, Unary};
+use super::table::{Table, all_named, named};
 use super::tokens::{COMPARISONS, Token, is_letter, is_start, shortened, tokens};
 use super::{MAX_DEPTH, MAX_LENGTH, Mistake};
 use std::ops::Range;
+use std::sync::Arc;
 
 type Result<T, E = Mistake> = std::result::Result<T, E>;
 
@@ -16,10 +18,14 @@ enum Function {
     If,
 }
 
-const FUNCTIONS: [(&str, Function); 16] = [
+const FUNCTIONS: [(&str, Function); 20] = [
     ("sin", Function::Unary(Unary::Sin)),
     ("cos", Function::Unary(Unary::Cos)),
     ("tan", Function::Unary(Unary::Tan)),
+    ("asin", Function::Unary(Unary::Asin)),
+    ("acos", Function::Unary(Unary::Acos)),
+    ("atan", Function::Unary(Unary::Atan)),
+    ("atan2", Function::Binary(Binary::Atan2)),
     ("sinh", Function::Unary(Unary::Sinh)),
     ("cosh", Function::Unary(Unary::Cosh)),
     ("tanh", Function::Unary(Unary::Tanh)),
@@ -36,7 +42,7 @@ const FUNCTIONS: [(&str, Function); 16] = [
 ];
 
 /// Names from other languages for which the nearest name here would mislead, with what to write instead.
-const ABSENT: [(&str, &str); 19] = [
+const ABSENT: [(&str, &str); 23] = [
     ("ln", "the natural logarithm is log(…)"),
     ("log10", "write log(…)/log(10)"),
     ("log2", "write log(…)/log(2)"),
@@ -49,6 +55,10 @@ const ABSENT: [(&str, &str); 19] = [
     ("sign", "write if(x < 0, -1, 1)"),
     ("sgn", "write if(x < 0, -1, 1)"),
     ("heaviside", "write if(x < 0, 0, 1)"),
+    ("arcsin", "write asin(…)"),
+    ("arccos", "write acos(…)"),
+    ("arctan", "write atan(…)"),
+    ("arctan2", "write atan2(…, …)"),
     ("cot", "write 1/tan(…)"),
     ("sec", "write 1/cos(…)"),
     ("csc", "write 1/sin(…)"),
@@ -86,12 +96,24 @@ fn check_variables(variables: &[&str]) -> Result<()> {
             () if !is_name => "is not a name of ASCII letters, digits and _",
             () if CONSTANTS.iter().any(|(known, _)| known == name) => "has the name of a constant",
             () if FUNCTIONS.iter().any(|(known, _)| known == name) => "has the name of a function",
+            () if named(name).is_some() => "has the name of a table of [data]",
             () if variables[..k].contains(name) => "is given twice",
             () => continue,
         };
         return Err(Mistake::new(0..0, format!("the variable `{}` {rule}", shortened(name))));
     }
     Ok(())
+}
+
+/// Refuses a name that is none, or that of a function, a constant or a coordinate in every formula.
+pub(super) fn check_table_name(name: &str) -> Result<(), String> {
+    match check_variables(&[name]) {
+        Err(mistake) => Err(mistake.message.replace("the variable", "the table")),
+        Ok(()) if ["x", "y", "t", "s", "r"].contains(&name) => {
+            Err(format!("the table `{name}` has the name of a variable of formulas"))
+        }
+        Ok(()) => Ok(()),
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -260,9 +282,13 @@ impl Parser<'_> {
         if let Some((_, value)) = CONSTANTS.iter().find(|(known, _)| *known == name) {
             return Ok(self.part(span, Node::Constant(value.to_bits())));
         }
-        match FUNCTIONS.iter().find(|(known, _)| *known == name) {
-            Some((_, function)) if self.token() == Token::Symbol("(") => self.call(*function, span),
-            Some(_) => {
+        let function = FUNCTIONS.iter().find(|(known, _)| *known == name).map(|(_, function)| *function);
+        let opens = self.token() == Token::Symbol("(");
+        match (function, named(name)) {
+            (Some(function), _) if opens => self.call(function, span),
+            (None, Some(table)) if opens => self.look_up(&table, span),
+            (None, None) => Err(self.unknown(name, span)),
+            _ => {
                 let argument = match self.token() {
                     Token::Number(_) | Token::Name => shortened(&self.text[self.span()]),
                     _ => "…".into(),
@@ -270,11 +296,11 @@ impl Parser<'_> {
                 Err(Mistake::new(span, format!("the function `{name}` has no parentheses"))
                     .help(format!("write {name}({argument})")))
             }
-            None => Err(self.unknown(name, span)),
         }
     }
 
-    fn call(&mut self, function: Function, name: Range<usize>) -> Result<Part> {
+    /// What stands between the parentheses of a function, and the place of all of it.
+    fn arguments(&mut self, name: &Range<usize>) -> Result<(Vec<Part>, Range<usize>)> {
         let open = self.skip();
         let mut arguments = Vec::new();
         if self.token() != Token::Symbol(")") {
@@ -285,7 +311,27 @@ impl Parser<'_> {
             }
         }
         let close = self.close(&open)?;
-        let span = name.start..close.end;
+        Ok((arguments, name.start..close.end))
+    }
+
+    /// A table of `[data]` at a place.
+    fn look_up(&mut self, table: &Arc<Table>, name: Range<usize>) -> Result<Part> {
+        let (arguments, span) = self.arguments(&name)?;
+        let at = match (arguments.as_slice(), table.axes()) {
+            ([a], 1) => [self.number(a)?; 2],
+            ([a, b], 2) => [self.number(a)?, self.number(b)?],
+            (_, axes) => {
+                let wanted = ["1 argument", "2 arguments"][axes - 1];
+                let message = format!("the table `{}` takes {wanted}, not {}", &self.text[name], arguments.len());
+                return Err(Mistake::new(span, message));
+            }
+        };
+        self.graph.know(table);
+        Ok(self.part(span, Node::Table(table.number(), at, [0; 2])))
+    }
+
+    fn call(&mut self, function: Function, name: Range<usize>) -> Result<Part> {
+        let (arguments, span) = self.arguments(&name)?;
         let node = match (function, arguments.as_slice()) {
             (Function::Unary(f), [a]) => Node::Unary(f, self.number(a)?),
             (Function::Binary(f), [a, b]) => Node::Binary(f, self.number(a)?, self.number(b)?),
@@ -350,9 +396,11 @@ impl Parser<'_> {
     }
 
     fn unknown(&self, name: &str, span: Range<usize>) -> Mistake {
+        let tables = all_named();
         let known: Vec<&str> = (self.variables.iter().copied())
             .chain(CONSTANTS.iter().map(|(name, _)| *name))
             .chain(FUNCTIONS.iter().map(|(name, _)| *name))
+            .chain(tables.iter().map(|table| table.name()))
             .collect();
         let lower = name.to_ascii_lowercase();
         // short names are all similar, so a suggestion may differ in every other letter at most

@@ -1,5 +1,7 @@
 use super::Formula;
 use super::graph::{Binary, Comparison, Graph, Id, Node, Unary, reordered};
+use super::table::Table;
+use std::sync::Arc;
 
 /// Number of doubles in the registers of one block of points: they fit the second-level cache.
 const CACHE: usize = 16384;
@@ -30,13 +32,15 @@ pub struct Program<const P: usize, const K: usize> {
     pub(super) nodes: Vec<Node>,
     shared: usize,
     roots: [Id; K],
+    tables: Vec<Arc<Table>>,
 }
 
 impl<const P: usize, const K: usize> Program<P, K> {
     /// Compiles K formulas.
     pub fn new(formulas: [&Formula; K]) -> Self {
         let mut graph = Graph::default();
-        let roots = formulas.map(|formula| graph.import(&formula.nodes).last().copied().unwrap_or_default());
+        let roots =
+            formulas.map(|formula| graph.import(&formula.nodes, &formula.tables).last().copied().unwrap_or_default());
         let mut shared: Vec<bool> = Vec::with_capacity(graph.nodes().len());
         for node in graph.nodes() {
             let mut own = !matches!(node, Node::Variable(v) if (*v as usize) < P);
@@ -45,7 +49,8 @@ impl<const P: usize, const K: usize> Program<P, K> {
         }
         let (first, then): (Vec<Id>, Vec<Id>) = (0..shared.len() as Id).partition(|&id| shared[id as usize]);
         let (nodes, places) = reordered(graph.nodes(), first.iter().chain(&then).copied());
-        Self { nodes, shared: first.len(), roots: roots.map(|id| places[id as usize]) }
+        let tables = graph.tables().to_vec();
+        Self { nodes, shared: first.len(), roots: roots.map(|id| places[id as usize]), tables }
     }
 
     /// The values of all formulas at one point.
@@ -64,7 +69,7 @@ impl<const P: usize, const K: usize> Program<P, K> {
             let (done, to) = rows.split_at_mut(k * width);
             match self.nodes[k] {
                 Node::Variable(v) => to[..width].fill(shared.get(v as usize - P).copied().unwrap_or(f64::NAN)),
-                node => step(node, done, width, &mut to[..width]),
+                node => step(node, done, width, &mut to[..width], &self.tables),
             }
         }
         for (points, out) in points.chunks(width).zip(out.chunks_mut(width)) {
@@ -73,7 +78,7 @@ impl<const P: usize, const K: usize> Program<P, K> {
                 let to = &mut to[..points.len()];
                 match self.nodes[k] {
                     Node::Variable(v) => to.iter_mut().zip(points).for_each(|(to, point)| *to = point[v as usize]),
-                    node => step(node, done, width, to),
+                    node => step(node, done, width, to, &self.tables),
                 }
             }
             for (k, root) in self.roots.iter().enumerate() {
@@ -89,7 +94,7 @@ impl<const P: usize, const K: usize> Program<P, K> {
 /// Every operation is defined here alone, for one point, for many points and for constants. The function is inlined, so
 /// that for one point the loops over rows disappear.
 #[inline(always)]
-pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
+pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64], tables: &[Arc<Table>]) {
     let lanes = to.len();
     let row = |id: Id| &done[id as usize * width..][..lanes];
     match node {
@@ -102,6 +107,9 @@ pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
                 Unary::Sin => each(to, a, f64::sin),
                 Unary::Cos => each(to, a, f64::cos),
                 Unary::Tan => each(to, a, f64::tan),
+                Unary::Asin => each(to, a, f64::asin),
+                Unary::Acos => each(to, a, f64::acos),
+                Unary::Atan => each(to, a, f64::atan),
                 Unary::Sinh => each(to, a, f64::sinh),
                 Unary::Cosh => each(to, a, f64::cosh),
                 Unary::Tanh => each(to, a, f64::tanh),
@@ -126,6 +134,7 @@ pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
                 Binary::Min => pairs(to, a, b, |a, b| if b < a || b.is_nan() { b } else { a }),
                 Binary::Max => pairs(to, a, b, |a, b| if b > a || b.is_nan() { b } else { a }),
                 Binary::Modulo => pairs(to, a, b, modulo),
+                Binary::Atan2 => pairs(to, a, b, f64::atan2),
             }
         }
         Node::Power(a, n) => {
@@ -145,6 +154,12 @@ pub(super) fn step(node: Node, done: &[f64], width: usize, to: &mut [f64]) {
             for ((to, (l, r)), (a, b)) in to.iter_mut().zip(sides).zip(row(a).iter().zip(row(b))) {
                 *to = if comparison.holds(*l, *r) { *a } else { *b };
             }
+        }
+        Node::Table(number, [a, b], orders) => {
+            let Some(table) = tables.iter().find(|table| table.number() == number) else {
+                return to.fill(f64::NAN);
+            };
+            pairs(to, row(a), row(b), |a, b| table.slope([a, b], orders));
         }
     }
 }

@@ -424,8 +424,8 @@ proptest! {
 /// Every kind of mistake: what is marked, what is said, what is advised.
 #[test]
 fn mistakes_say_what_where_and_what_instead() {
-    let known = "known here: x, y, t, pi, e, sin, cos, tan, sinh, cosh, tanh, exp, log, sqrt, abs, erf, floor, min, \
-                 max, mod, if";
+    let known = "known here: x, y, t, pi, e, sin, cos, tan, asin, acos, atan, atan2, sinh, cosh, tanh, exp, log, sqrt, \
+                 abs, erf, floor, min, max, mod, if";
     let stray = |sign: &str| format!("`{sign}` has no meaning in a formula");
     let cases: &[(&str, &str, &str, Option<&str>)] = &[
         ("", "", "the formula is empty", Some("write a number, such as 0")),
@@ -436,8 +436,9 @@ fn mistakes_say_what_where_and_what_instead() {
         ("x*q", "q", "unknown name `q`", Some(known)),
         ("velocity + 1", "velocity", "unknown name `velocity`", Some(known)),
         ("ln(x)", "ln", "unknown name `ln`", Some("the natural logarithm is log(…)")),
-        ("atan(x)", "atan", "unknown name `atan`", Some(known)),
-        ("arctan2(x, y)", "arctan2", "unknown name `arctan2`", Some(known)),
+        ("arsinh(x)", "arsinh", "unknown name `arsinh`", Some(known)),
+        ("arctan2(x, y)", "arctan2", "unknown name `arctan2`", Some("write atan2(…, …)")),
+        ("atan2(y)", "atan2(y)", "`atan2` takes 2 arguments, not 1", None),
         ("cot(x)", "cot", "unknown name `cot`", Some("write 1/tan(…)")),
         ("2*(x + (y)", "(", "this parenthesis is never closed", None),
         ("sin(x", "(", "this parenthesis is never closed", None),

@@ -11,10 +11,12 @@
 //! Castillo and Izsák, *Efficient discretization of the Laplacian: application to moving boundary problems* (2024).
 
 mod compact25;
+mod diffusion;
 mod nine;
 mod poisson;
 mod stencils;
 
+pub use diffusion::diffusion;
 pub use poisson::{Poisson, outward};
 pub use stencils::{NearDegenerate, Stencils};
 

@@ -2,10 +2,10 @@
 
 use super::{NEAR_DEGENERATE, Stencils};
 use crate::error::{Failure, NodePlace};
-use crate::geometry::{Lattice, Mesh, check_length};
+use crate::geometry::{Lattice, Mesh, check_length, node_areas};
 use crate::numerics::lanes::{Lanes, Qr};
-use crate::numerics::larger;
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustTransport, SparseSystem};
+use crate::numerics::{larger, sum};
 use crate::work::Work;
 
 /// Tolerance of the iteration: the largest residual, with each row divided by its diagonal, as a share of the largest
@@ -14,13 +14,17 @@ const ITERATED: f64 = 1e-13;
 /// Condition number above which the one-sided derivative at a side counts as lost to rounding.
 const DEGENERATE: f64 = 1e7;
 
-/// Poisson's equation with given values or normal derivatives on the sides of a mesh
+/// Poisson's equation with given values or fluxes on the sides of a mesh
 ///
 /// ```text
-/// Δu = f inside,   u = g   or   n·∇u = g on the sides,   n outward
+/// ∇·(D ∇u) = f inside,   u = g   or   D n·∇u = g + c u on the sides,   n outward
 /// ```
 ///
-/// All arrays have one value a node in lattice order.
+/// All arrays have one value a node in lattice order. Inside, D is that of the stencils, which are those of Δu or of
+/// [`diffusion`](super::diffusion).
+///
+/// Where u is given nowhere and c is 0, what flows in must be the integral of f, and u is known up to a constant. What
+/// the discrete system lacks to that is spread evenly over f, and the constant follows from `mean`.
 ///
 /// # Example
 /// ```
@@ -28,17 +32,23 @@ const DEGENERATE: f64 = 1e7;
 /// use driftmesh::laplacian::{Laplacian, Poisson, stencils};
 /// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 2.0])?;
 /// let exact: Vec<f64> = mesh.x().iter().map(|[x, y]| x * x + x * y).collect();
-/// let problem = Poisson { source: &[2.0; 25], side: &exact, neumann: [[false; 2]; 2] };
+/// let problem = Poisson { source: &[2.0; 25], side: &exact, ..Poisson::default() };
 /// let u = problem.solve(&mesh, &stencils(&mesh, Laplacian::Optimised)?)?;
 /// assert!(u.iter().zip(&exact).all(|(u, e)| (u - e).abs() < 1e-13));
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Poisson<'a> {
     /// f, at every node.
     pub source: &'a [f64],
-    /// g, at every node of the sides: a value, or on Neumann sides the normal derivative.
+    /// g, at every node of the sides: a value, or on Neumann sides the flux, which with D = 1 is the normal derivative.
     pub side: &'a [f64],
+    /// c, at every node of Neumann sides; 0 where the array is empty.
+    pub robin: &'a [f64],
+    /// D, at every node of Neumann sides; 1 where the array is empty.
+    pub diffusivity: &'a [f64],
+    /// The mean of u over the domain, where nothing else determines it.
+    pub mean: f64,
     /// Which sides are Neumann sides: the lower and the upper one across each axis. A corner with a side of the other
     /// kind belongs to that.
     pub neumann: [[bool; 2]; 2],
@@ -49,7 +59,7 @@ impl Poisson<'_> {
     ///
     /// # Errors
     /// [`Failure::WrongLength`] where an array does not fit the mesh; [`Failure::LinearStalled`] where the system is
-    /// singular, as it is with Neumann sides alone.
+    /// singular.
     pub fn solve(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<Vec<f64>, Failure> {
         let lattice = mesh.lattice();
         let expected = self.check(lattice)?;
@@ -58,10 +68,13 @@ impl Poisson<'_> {
         let unknown: Vec<usize> = (0..expected).filter(|&index| !known(index)).collect();
         unknown.iter().enumerate().for_each(|(k, &index)| place[index] = k);
 
+        // with a constant free: the first node is 0 until the mean is known, and what f lacks is unknown in its place
+        let free = self.is_free(lattice);
         let mut system = SparseSystem::new(unknown.len());
         let mut b = vec![0.0; unknown.len()];
         let mut couple = |row: usize, index: usize, a: f64, b: &mut f64| match place[index] {
             usize::MAX => *b -= a * self.side[index],
+            0 if free => {}
             column => system.add(row, column, a),
         };
         for k in 0..stencils.patch().len() {
@@ -74,22 +87,48 @@ impl Poisson<'_> {
         for &index in &unknown {
             if let Some(side) = self.neumann_side(lattice, index) {
                 let row = place[index];
+                let [d, c] = [(self.diffusivity, 1.0), (self.robin, 0.0)]
+                    .map(|(values, none)| values.get(index).copied().unwrap_or(none));
                 for (index, a) in derivative(mesh, index, side, outward(mesh, index, side))? {
-                    couple(row, index, a, &mut b[row]);
+                    couple(row, index, d * a, &mut b[row]);
                 }
+                couple(row, index, -c, &mut b[row]);
                 b[row] += self.side[index];
             }
+        }
+        if free {
+            (0..stencils.patch().len()).for_each(|k| system.add(place[stencils.index(k)], 0, 1.0));
         }
         let solution = system.solve(&b)?;
         let mut u = self.side.to_vec();
         unknown.iter().zip(solution).for_each(|(&index, value)| u[index] = value);
+        if free {
+            u[unknown[0]] = 0.0;
+            let areas = node_areas(mesh);
+            let mean = sum(areas.iter().zip(&u).map(|(area, u)| area * u)) / sum(areas.iter().copied());
+            u.iter_mut().for_each(|u| *u += self.mean - mean);
+        }
         Ok(u)
+    }
+
+    /// Whether u is known up to a constant only: it is given nowhere, and no flux depends on it.
+    pub fn is_free(&self, lattice: &Lattice<2>) -> bool {
+        let determines = |&index: &usize| {
+            let given = self.neumann_side(lattice, index).is_none();
+            given || self.robin.get(index).is_some_and(|c| *c != 0.0)
+        };
+        !lattice.sides().any(|index| determines(&index))
     }
 
     /// Refuses arrays that do not fit the lattice; returns its number of nodes.
     fn check(&self, lattice: &Lattice<2>) -> Result<usize, Failure> {
         check_length(lattice, "the source", self.source.len())?;
         check_length(lattice, "the side data", self.side.len())?;
+        for (what, values) in [("the diffusivity", self.diffusivity), ("what fluxes take of u", self.robin)] {
+            if !values.is_empty() {
+                check_length(lattice, what, values.len())?;
+            }
+        }
         Ok(lattice.len())
     }
 

@@ -70,6 +70,11 @@ impl Stencils {
         Self { laplacian, patch, nodes: mesh.lattice().nodes(), rows: Rows::Nine(Vec::new()), near_degenerate }
     }
 
+    /// The same stencils with other weights of nine points.
+    pub(super) fn with_rows(&self, rows: Vec<[f64; 9]>) -> Self {
+        Self { rows: Rows::Nine(rows), ..self.clone() }
+    }
+
     /// The kind of Laplacian.
     pub fn laplacian(&self) -> Laplacian {
         self.laplacian

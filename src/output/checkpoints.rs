@@ -293,6 +293,10 @@ impl<const D: usize> Keeper<D> for Checkpoints {
 fn numbers(study: &str) -> Result<toml::Table, toml::de::Error> {
     let mut table: toml::Table = study.parse()?;
     table.remove("output");
+    // a table of `[data]` is its content, wherever its file lies
+    for (_, file) in table.get_mut("data").and_then(toml::Value::as_table_mut).into_iter().flatten() {
+        file.as_table_mut().and_then(|file| file.remove("file"));
+    }
     Ok(table)
 }
 

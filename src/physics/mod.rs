@@ -21,6 +21,7 @@ pub use formula_pde::{FormulaPde, MAX_UNKNOWNS, MAX_UNKNOWNS_ON_A_LINE, Scheme};
 pub use line::{Coordinates, LineBurgers, LineFormulaPde, LinePdeKind};
 pub use prescribed::{Prescribed, PrescribedField};
 pub use shallow_water::{ShallowWater, WaterForm};
+pub(crate) use sides::SIDES;
 pub use sides::{Condition, Conditions};
 pub use uniform::UniformBurgers;
 

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 /// Names of the sides: the lower and the upper end of each axis.
-pub(super) const SIDES: [[&str; 2]; 2] = [["left", "right"], ["bottom", "top"]];
+pub(crate) const SIDES: [[&str; 2]; 2] = [["left", "right"], ["bottom", "top"]];
 const NO_FLUX: &str = "no-flux";
 const OUTFLOW: &str = "outflow";
 

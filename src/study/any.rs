@@ -130,7 +130,7 @@ impl Study {
 
     /// The times of its steps, where it has some.
     fn schedule(&self) -> Result<Option<Schedule>> {
-        each!(self, study => study.begin().map(|mut run| run.schedule().cloned()))
+        each!(self, study => study.data.known(|| study.begin().map(|mut run| run.schedule().cloned())))
     }
 
     /// The step of a checkpoint of this study, from the bytes behind its checksum: whatever they are, what a run could
@@ -172,7 +172,7 @@ impl Study {
     /// # Errors
     /// As [`Kind::resolve`].
     pub fn warnings(&self) -> Result<Vec<String>> {
-        each!(self, study => study.warnings())
+        each!(self, study => study.data.known(|| study.warnings()))
     }
 
     /// Tries what a check of the settings alone does not tell, as far as that takes no time.
@@ -180,6 +180,6 @@ impl Study {
     /// # Errors
     /// [`Error::Failed`] with what a run would end with at its start.
     pub fn try_start(&self) -> Result<()> {
-        each!(self, study => study.try_start())
+        each!(self, study => study.data.known(|| study.try_start()))
     }
 }

@@ -5,6 +5,7 @@ use crate::output::{CheckpointsAt, FramesAt};
 use crate::simulation::Schedule;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::io::Read;
 
 /// `[study]`: name and kind of the study.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -107,4 +108,21 @@ impl Output {
         frames.check([start, end]).map_err(|error| error.within("output"))?;
         Ok(frames)
     }
+}
+
+/// A study is a page of text; more is some other file.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// The text of a study.
+pub(super) fn text_of(reader: impl Read) -> Result<String, String> {
+    let mut bytes = Vec::new();
+    reader.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(format!("it has more than {MAX_BYTES} bytes, which no study has"));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let line = error.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
+        format!("it is not UTF-8 text (byte {at}, line {line}); save it as UTF-8")
+    })
 }

@@ -1,6 +1,7 @@
 //! Studies of kind `equidistribution`: what they say.
 
 use super::common::{Header, Output};
+use super::data::DataTables;
 use crate::equidistribution::{Coarse, FaceDensity, LineDensity, Measure, Robin, Sweep};
 use crate::error::{Error, Result};
 use crate::kind::kinds;
@@ -14,6 +15,9 @@ use serde::{Deserialize, Serialize};
 pub struct EquidistributionStudy {
     /// Name and kind of the study.
     pub study: Header,
+    /// Tables of values from files, which every formula may call as functions by their names.
+    #[serde(default, skip_serializing_if = "DataTables::is_empty")]
+    pub data: DataTables,
     /// The ends of the line; 0 and 1 where nothing is said.
     #[serde(default)]
     pub domain: LineDomain,

@@ -1,6 +1,7 @@
 //! Studies of kind `stefan`: what is refused, what is doubtful, and what runs.
 
 use super::common::{Header, Output, StudyKind};
+use super::data::DataTables;
 use super::front_given::Given;
 use super::front_run::{FrontCourse, FrontRun};
 use super::front_start;
@@ -25,6 +26,14 @@ impl Kind for StefanStudy {
 
     fn common(&self) -> (&Header, &Output) {
         (&self.study, &self.output)
+    }
+
+    fn data(&self) -> &DataTables {
+        &self.data
+    }
+
+    fn data_mut(&mut self) -> &mut DataTables {
+        &mut self.data
     }
 
     /// Refuses a start that no run can begin with, too.

@@ -1,7 +1,7 @@
 //! What a kind of study is to the one runner of all kinds: its settings, and what runs.
 
 use super::runner::{self, Finished, Stage};
-use super::{Begin, Header, Output, Source, StudyKind};
+use super::{Begin, DataTables, Header, Output, Source, StudyKind};
 use crate::error::{Act, Error, Failure, Result, Unfit};
 use crate::kept::Kept;
 use crate::output::{Figures, FramesAt, RunDirectory, Spent, Summary, moment};
@@ -19,6 +19,12 @@ pub trait Kind: Clone + Serialize + DeserializeOwned {
 
     /// `[study]` and `[output]`.
     fn common(&self) -> (&Header, &Output);
+
+    /// `[data]`.
+    fn data(&self) -> &DataTables;
+
+    /// `[data]`, to be read.
+    fn data_mut(&mut self) -> &mut DataTables;
 
     /// Checks all settings and fills in the defaults that depend on others.
     ///
@@ -57,13 +63,24 @@ pub trait Kind: Clone + Serialize + DeserializeOwned {
     /// As [`Kind::resolve`].
     fn begin(&self) -> Result<Self::Run>;
 
+    /// Reads the files of `[data]`, then [resolves](Kind::resolve) the study.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where a file makes no table; as [`Kind::resolve`].
+    fn ready(&mut self) -> Result<()> {
+        self.data_mut().load()?;
+        let tables = self.data().clone();
+        tables.known(|| self.resolve())
+    }
+
     /// Reads and checks a study, every default filled in.
     ///
     /// # Errors
     /// [`Error::Study`] at the place of the first mistake.
     fn from_source(source: &Source) -> Result<Self> {
         let mut study: Self = source.parse()?;
-        study.resolve().map_err(|error| source.locate(error))?;
+        study.data_mut().lie_in(source.directory());
+        study.ready().map_err(|error| source.locate(error))?;
         Ok(study)
     }
 

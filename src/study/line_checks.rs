@@ -1,6 +1,7 @@
 //! Studies of kind `equidistribution`: what is refused, and what is completed.
 
 use super::common::{Header, Output, StudyKind};
+use super::data::DataTables;
 use super::equidistribution::{
     EquidistributionStudy, FirstMesh, Integral, Interval, LineDomain, LineTime, MethodName, SchwarzTable, StopTable,
 };
@@ -34,6 +35,14 @@ impl Kind for EquidistributionStudy {
 
     fn common(&self) -> (&Header, &Output) {
         (&self.study, &self.output)
+    }
+
+    fn data(&self) -> &DataTables {
+        &self.data
+    }
+
+    fn data_mut(&mut self) -> &mut DataTables {
+        &mut self.data
     }
 
     fn resolve(&mut self) -> Result<()> {

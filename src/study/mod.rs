@@ -2,6 +2,7 @@
 
 mod any;
 mod common;
+mod data;
 mod dimension;
 mod equidistribution;
 mod examples;
@@ -23,6 +24,7 @@ mod moving_mesh;
 mod moving_run;
 mod poisson;
 mod poisson_run;
+mod poisson_sides;
 mod remedy;
 mod rest;
 mod runner;
@@ -34,6 +36,7 @@ mod uniform;
 pub use crate::output::{GivenMesh, read_mesh};
 pub use any::Study;
 pub use common::{Header, Output, StudyKind};
+pub use data::{DataTables, TableFile};
 pub use dimension::{GeneratorTable, PdeTable, Settings, Studied};
 pub use equidistribution::{
     Discretization, EquidistributionStudy, FirstMesh, Integral, Interval, LineArclength, LineDensityKind, LineDomain,

@@ -1,6 +1,7 @@
 //! Studies of kind `moving-mesh`: what is refused, what is completed, and what is doubtful.
 
 use super::common::{Header, Output, StudyKind};
+use super::data::DataTables;
 use super::dimension::{GeneratorTable, PdeTable, Studied};
 use super::kind::Kind;
 use super::moving_mesh::{MovingStudy, StartMesh, Stepper};
@@ -30,6 +31,14 @@ where
 
     fn common(&self) -> (&Header, &Output) {
         (&self.study, &self.output)
+    }
+
+    fn data(&self) -> &DataTables {
+        &self.data
+    }
+
+    fn data_mut(&mut self) -> &mut DataTables {
+        &mut self.data
     }
 
     fn resolve(&mut self) -> Result<()> {

@@ -1,6 +1,7 @@
 //! Studies of kind `moving-mesh`: what they say, and what they describe.
 
 use super::common::{Header, Output};
+use super::data::DataTables;
 use super::dimension::{GeneratorTable, PdeTable, Studied};
 use super::mapped::{Ends, Mapping};
 use crate::density::MonitorKind;
@@ -25,6 +26,9 @@ where
 {
     /// Name and kind of the study.
     pub study: Header,
+    /// Tables of values from files, which every formula may call as functions by their names.
+    #[serde(default, skip_serializing_if = "DataTables::is_empty")]
+    pub data: DataTables,
     /// The box in which the equation is solved, its periodic axes, and the coordinate along a line.
     #[serde(default)]
     pub domain: Domain<D>,
@@ -313,7 +317,7 @@ where
     /// [`Error::Invalid`](crate::Error::Invalid) where the grid or the domain makes no mesh.
     pub fn uniform_mesh(&self) -> Result<Mesh<D>> {
         let lattice = Lattice::new(*self.grid.cells, self.domain.wraps()).map_err(|error| error.within("grid"))?;
-        Mesh::in_domain(&self.domain, lattice)
+        self.data.known(|| Mesh::in_domain(&self.domain, lattice))
     }
 
     /// The simulation that this study describes.
@@ -321,8 +325,11 @@ where
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) with the dotted key of a setting out of range.
     pub fn simulation(&self) -> Result<Simulation<D>> {
-        let physics = self.physics()?;
-        let monitor = self.monitor().into_monitor(&physics.unknowns()).map_err(|error| error.within("monitor"))?;
+        let (physics, monitor) = self.data.known(|| {
+            let physics = self.physics()?;
+            let monitor = self.monitor().into_monitor(&physics.unknowns());
+            Ok::<_, crate::Error>((physics, monitor.map_err(|error| error.within("monitor"))?))
+        })?;
         Ok(Simulation {
             physics,
             monitor,

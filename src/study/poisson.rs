@@ -1,24 +1,28 @@
 //! Studies of kind `poisson`: what they say.
 
 use super::common::{Header, Output, StudyKind};
+use super::data::DataTables;
 use super::kind::Kind;
-use super::mapped::{Grading, MappedDomain, Side, mistaken, parse};
+use super::mapped::{Grading, MappedDomain, Side};
 use super::poisson_run::PoissonRun;
 use crate::error::{Error, Result};
-use crate::formula::{Formula, Program};
 use crate::geometry::Mesh;
 use crate::laplacian::{Laplacian, Polynomials, Scaling};
 use crate::output::FramesAt;
-use crate::setting::pair;
+use crate::physics::Conditions;
+use crate::setting::{Text, pair, text};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A study of kind `poisson`: Δu = f on a structured mesh of any shape.
+/// A study of kind `poisson`: ∇·(D ∇u) = f on a structured mesh of any shape.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoissonStudy {
     /// Name and kind of the study.
     pub study: Header,
+    /// Tables of values from files, which every formula may call as functions by their names.
+    #[serde(default, skip_serializing_if = "DataTables::is_empty")]
+    pub data: DataTables,
     /// The shape of the domain, and how its mesh is distorted.
     pub domain: MappedDomain,
     /// The number of cells, and a side toward which they get smaller.
@@ -26,15 +30,16 @@ pub struct PoissonStudy {
     /// The exact solution, against which errors are reported; it gives whatever `[equation]` does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<ExactSolution>,
-    /// The right-hand side of Δu = f, and what holds on the sides.
+    /// The right-hand side and the diffusivity of ∇·(D ∇u) = f, and what holds on the sides.
     #[serde(default)]
     pub equation: Equation,
     /// The sides on which the normal derivative is given.
     #[serde(default)]
     pub sides: Sides,
-    /// The discrete Laplacian, whose weights follow from the positions of the neighbours of a node.
-    #[serde(default)]
-    pub laplacian: LaplacianTable,
+    /// The discrete Laplacian, whose weights follow from the positions of the neighbours of a node; where nothing is said
+    /// "optimised", and "mapped" with a diffusivity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laplacian: Option<LaplacianTable>,
     /// How the linear system is solved.
     #[serde(default)]
     pub solver: SolverTable,
@@ -67,24 +72,34 @@ pub struct ExactSolution {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Equation {
-    /// Right-hand side f of Δu = f, a formula of x and y; the Laplacian of `exact.u` where nothing is said.
+    /// Right-hand side f of ∇·(D ∇u) = f, a formula of x and y; that of `exact.u` where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
-    /// u on the sides, a formula of x and y; `exact.u` where nothing is said.
+    /// D > 0, a formula of x and y; 1 where nothing is said.
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "text")]
+    #[schemars(with = "Option<Text>")]
+    pub diffusivity: Option<String>,
+    /// What holds on the sides: u, a formula of x and y; `"no-flux"`; or `{ flux = "…" }`, what flows into the domain,
+    /// D n·∇u with n outward, a formula of x, y and u that is linear in u. One for all sides, or a table of them by
+    /// side: `left`, `right`, `bottom`, `top`. u = `exact.u` where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub boundary: Option<String>,
-    /// The outward normal derivative n·∇u on the sides of `sides.neumann`, a formula of x and y; that of `exact.u`
-    /// where nothing is said.
+    pub boundary: Option<Conditions>,
+    /// D n·∇u, n outward, on the sides of `sides.neumann`, a formula of x, y and u; that of `exact.u` where nothing is
+    /// said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flux: Option<String>,
+    /// The mean of u over the domain, where all sides have a flux without u; that of `exact.u` where that is known and
+    /// nothing is said, else 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean: Option<f64>,
 }
 
 /// `[sides]`: the sides on which the normal derivative is given.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sides {
-    /// Sides on which the normal derivative of u is given instead of its value: any of left, right, bottom and top, but
-    /// not all.
+    /// Sides on which the flux is given instead of u: any of left, right, bottom and top. `equation.boundary` by side
+    /// says more.
     pub neumann: Vec<Side>,
 }
 
@@ -141,8 +156,6 @@ impl LaplacianTable {
     }
 }
 
-/// Formulas of x and y.
-const VARIABLES: [&str; 2] = ["x", "y"];
 /// Bytes of memory that a run needs for each node: rows, the sparse matrix and its factors.
 const BYTES_PER_NODE: u128 = 6000;
 
@@ -155,15 +168,25 @@ impl Kind for PoissonStudy {
         (&self.study, &self.output)
     }
 
+    fn data(&self) -> &DataTables {
+        &self.data
+    }
+
+    fn data_mut(&mut self) -> &mut DataTables {
+        &mut self.data
+    }
+
     fn resolve(&mut self) -> Result<()> {
         self.output.check()?;
         if let Some(FramesAt::Every(0)) = self.output.frames {
             return Err(Error::invalid("output.frames.every", 0, "must be 1 or more"));
         }
         self.study.check_name()?;
-        let laplacian = self.laplacian.laplacian()?;
-        self.data()?;
-        let neumann = self.neumann();
+        let kind = if self.equation.diffusivity.is_some() { Laplacian::Mapped } else { Laplacian::default() };
+        self.laplacian.get_or_insert_with(|| LaplacianTable { kind: kind.name().into(), ..LaplacianTable::default() });
+        let laplacian = self.laplacian()?;
+        let data = self.data()?;
+        let neumann = data.fluxes();
         if laplacian == Laplacian::Compact25 && self.grid.cells.iter().any(|&cells| cells < 4) {
             let rule =
                 "needs at least 4 cells along each axis; raise them, or take another laplacian.kind than \"compact25\"";
@@ -174,12 +197,16 @@ impl Kind for PoissonStudy {
             let rule = "takes nine-point stencils with values on all sides; set it to \"lu\"";
             return Err(Error::invalid("solver.kind", "\"krylov\"", rule));
         }
-        if neumann == [[true; 2]; 2] {
-            let rule = "the solution is then known up to a constant only; leave one side out";
-            return Err(Error::invalid("sides.neumann", "all four sides", rule));
+        if laplacian == Laplacian::Compact25 && self.equation.diffusivity.is_some() {
+            let rule = "has 25 points, which take no diffusivity; take \"mapped\" or another kind of nine points";
+            return Err(Error::invalid("laplacian.kind", "\"compact25\"", rule));
+        }
+        if let Some(mean) = self.equation.mean.filter(|mean| !mean.is_finite()) {
+            return Err(Error::invalid("equation.mean", mean, "must be a finite number"));
         }
         super::memory::check_memory(self.nodes(), BYTES_PER_NODE, &self.grid.cells)?;
-        self.mesh().map(|_| ())
+        self.mesh()?;
+        self.check_balance(&data)
     }
 
     fn memory(&self) -> u128 {
@@ -201,54 +228,15 @@ impl PoissonStudy {
     /// # Errors
     /// As [`MappedDomain::mesh`].
     pub fn mesh(&self) -> Result<Mesh<2>> {
-        self.domain.mesh(self.grid.cells, self.grid.grading)
+        self.data.known(|| self.domain.mesh(self.grid.cells, self.grid.grading))
+    }
+
+    /// The kind of Laplacian.
+    pub(super) fn laplacian(&self) -> Result<Laplacian> {
+        self.laplacian.as_ref().map_or(Ok(Laplacian::default()), LaplacianTable::laplacian)
     }
 
     fn nodes(&self) -> u128 {
         self.grid.cells.iter().map(|&n| n as u128 + 1).product()
     }
-
-    pub(super) fn neumann(&self) -> [[bool; 2]; 2] {
-        let mut neumann = [[false; 2]; 2];
-        for side in &self.sides.neumann {
-            let (axis, upper) = side.place();
-            neumann[axis][usize::from(upper)] = true;
-        }
-        neumann
-    }
-
-    /// u, its gradient and its Laplacian where they are known, then what `[equation]` gives.
-    pub(super) fn data(&self) -> Result<Data> {
-        let exact = match &self.exact {
-            None => None,
-            Some(ExactSolution { u: text }) => {
-                let u = parse("exact.u", text, &VARIABLES)?;
-                let slope = |f: &Formula, d| f.derivative(d).map_err(|mistake| mistaken("exact.u", text, mistake));
-                let [x, y] = [slope(&u, 0)?, slope(&u, 1)?];
-                Some(Program::new([&u, &x, &y, &slope(&x, 0)?, &slope(&y, 1)?]))
-            }
-        };
-        let given = |key: &str, text: &Option<String>, needed: bool| match text {
-            Some(text) => Ok(Some(Program::new([&parse(&format!("equation.{key}"), text, &VARIABLES)?]))),
-            None if exact.is_some() || !needed => Ok(None),
-            None => {
-                Err(Error::invalid(format!("equation.{key}"), "not given", "add it, or the exact solution: exact.u"))
-            }
-        };
-        Ok(Data {
-            source: given("source", &self.equation.source, true)?,
-            boundary: given("boundary", &self.equation.boundary, true)?,
-            flux: given("flux", &self.equation.flux, !self.sides.neumann.is_empty())?,
-            exact,
-        })
-    }
-}
-
-/// The formulas of a study, compiled.
-pub(super) struct Data {
-    /// u, u_x, u_y, u_xx and u_yy.
-    pub exact: Option<Program<2, 5>>,
-    pub source: Option<Program<2, 1>>,
-    pub boundary: Option<Program<2, 1>>,
-    pub flux: Option<Program<2, 1>>,
 }

@@ -1,13 +1,14 @@
 //! Studies of kind `poisson`: how they are solved, and what is found.
 
 use super::kind::{Running, SpentBy};
-use super::poisson::{Data, PoissonStudy, SolverKind};
+use super::poisson::{PoissonStudy, SolverKind};
+use super::poisson_sides::Given;
 use super::runner::Stage;
 use crate::error::{Failure, Result, Unfit};
 use crate::formula::Program;
 use crate::geometry::{Mesh, node_areas};
 use crate::kept::Kept;
-use crate::laplacian::{Laplacian, Poisson, Stencils, outward, unchecked};
+use crate::laplacian::{Laplacian, Poisson, Stencils, diffusion, unchecked};
 use crate::numerics::{larger, sum};
 use crate::output::{Ended, Failed, Figures, Summary};
 use crate::simulation::Scene;
@@ -103,16 +104,37 @@ impl PoissonStudy {
     /// As [`Kind::resolve`](super::Kind::resolve); [`Error::Failed`](crate::Error::Failed) where a formula has no
     /// value, a stencil is degenerate or the system is singular.
     pub fn solve(&self) -> Result<Solved> {
+        self.data.known(|| self.solve_known())
+    }
+
+    fn solve_known(&self) -> Result<Solved> {
         let mesh = self.mesh()?;
         let data = self.data()?;
-        let (stencils, spent) = timed(&mesh, self.laplacian.laplacian()?)?;
+        let (stencils, spent) = timed(&mesh, self.laplacian()?)?;
         let mut seconds = PoissonParts { stencils: spent, ..PoissonParts::default() };
-        let Values { source, side, exact } = self.values(&mesh, &stencils, &data)?;
+        let weighted = match &data.diffusivity {
+            Some(d) => Some(diffusion(&mesh, &stencils, |x| d.eval(x, &[])[0])?),
+            None => None,
+        };
+        let mut counts = vec![false; mesh.x().len()];
+        for k in 0..stencils.patch().len() {
+            stencils.row(k).into_iter().flatten().for_each(|(index, _, source)| counts[index] |= source != 0.0);
+        }
+        let given = Given::at(&mesh, &data, &counts)?;
+        let exact = data.exact.as_ref().map(|exact| values(&mesh, exact)).transpose()?;
         let clock = Instant::now();
-        let problem = Poisson { source: &source, side: &side, neumann: self.neumann() };
+        let problem = Poisson {
+            source: &given.source,
+            side: &given.side,
+            robin: &given.robin,
+            diffusivity: &given.diffusivity,
+            mean: self.equation.mean.unwrap_or_else(|| exact.as_ref().map_or(0.0, |exact| mean(&mesh, exact))),
+            neumann: data.fluxes(),
+        };
+        let solved = weighted.as_ref().unwrap_or(&stencils);
         let (u, work) = match self.solver.kind {
-            SolverKind::Lu => (problem.solve(&mesh, &stencils)?, Work { linear_solves: 1, ..Work::default() }),
-            SolverKind::Krylov => problem.iterate(&mesh, &stencils)?,
+            SolverKind::Lu => (problem.solve(&mesh, solved)?, Work { linear_solves: 1, ..Work::default() }),
+            SolverKind::Krylov => problem.iterate(&mesh, solved)?,
         };
         seconds.solve = clock.elapsed().as_secs_f64();
         if let Some(k) = u.iter().position(|u| !u.is_finite()) {
@@ -122,58 +144,12 @@ impl PoissonStudy {
         let error = exact.as_ref().map(|exact| PoissonError::of(&mesh, &u, exact));
         Ok(Solved { mesh, u, exact, stencils, error, work, seconds })
     }
-
-    /// What the formulas give at the nodes: they need a value only where it counts.
-    fn values(&self, mesh: &Mesh<2>, stencils: &Stencils, data: &Data) -> Result<Values> {
-        let lattice = mesh.lattice();
-        let problem = Poisson { source: &[], side: &[], neumann: self.neumann() };
-        let mut counts = vec![false; lattice.len()];
-        for k in 0..stencils.patch().len() {
-            stencils.row(k).into_iter().flatten().for_each(|(index, _, source)| counts[index] |= source != 0.0);
-        }
-        let flows: Vec<bool> = (0..lattice.len()).map(|k| problem.neumann_side(lattice, k).is_some()).collect();
-        let given: Vec<bool> = (0..lattice.len()).map(|k| lattice.on_side(k) && !flows[k]).collect();
-        let known = match &data.exact {
-            Some(program) => {
-                let slopes: Vec<bool> = flows.iter().map(|flows| *flows && data.flux.is_none()).collect();
-                let sources: Vec<bool> = counts.iter().map(|counts| *counts && data.source.is_none()).collect();
-                let everywhere = vec![true; lattice.len()];
-                let needed = [&everywhere, &slopes, &slopes, &sources, &sources];
-                Some(values(mesh, "exact.u or a derivative of it", program, needed)?)
-            }
-            None => None,
-        };
-        let source = match &data.source {
-            Some(program) => values(mesh, "equation.source", program, [&counts])?.into_iter().map(|[f]| f).collect(),
-            None => known.iter().flatten().map(|[_, _, _, xx, yy]| xx + yy).collect::<Vec<f64>>(),
-        };
-        let mut side = match &data.boundary {
-            Some(program) => values(mesh, "equation.boundary", program, [&given])?.into_iter().map(|[u]| u).collect(),
-            None => known.iter().flatten().map(|v| v[0]).collect::<Vec<f64>>(),
-        };
-        let flux = data.flux.as_ref().map(|program| values(mesh, "equation.flux", program, [&flows])).transpose()?;
-        for index in lattice.sides() {
-            if let Some(at) = problem.neumann_side(lattice, index) {
-                let n = outward(mesh, index, at);
-                side[index] = match (&flux, &known) {
-                    (Some(flux), _) => flux[index][0],
-                    (None, known) => {
-                        known.as_ref().map_or(0.0, |known| n[0] * known[index][1] + n[1] * known[index][2])
-                    }
-                };
-            }
-        }
-        let exact = known.map(|known| known.iter().map(|v| v[0]).collect());
-        Ok(Values { source, side, exact })
-    }
 }
 
-/// Nodal values of the formulas of a study.
-struct Values {
-    source: Vec<f64>,
-    /// u on the sides; its normal derivative on Neumann sides.
-    side: Vec<f64>,
-    exact: Option<Vec<f64>>,
+/// The mean of nodal values over the domain.
+fn mean(mesh: &Mesh<2>, u: &[f64]) -> f64 {
+    let areas = node_areas(mesh);
+    sum(areas.iter().zip(u).map(|(area, u)| area * u)) / sum(areas.iter().copied())
 }
 
 /// Stencils, and the seconds that they take.
@@ -272,7 +248,7 @@ impl Running for PoissonRun {
     }
 
     fn caption(&self, _scene: &Scene) -> String {
-        self.study.laplacian.kind.clone()
+        self.study.laplacian.as_ref().map_or_else(String::new, |laplacian| laplacian.kind.clone())
     }
 
     fn tell(&self, summary: &mut Summary<PoissonFigures>) {
@@ -287,28 +263,16 @@ impl Running for PoissonRun {
     fn warn(&mut self, _warnings: Vec<String>) {}
 }
 
-/// Formulas at every node, 0 where they have no value and need none.
-fn values<const K: usize>(
-    mesh: &Mesh<2>,
-    what: &str,
-    program: &Program<2, K>,
-    needed: [&Vec<bool>; K],
-) -> Result<Vec<[f64; K]>, Failure> {
-    let mut out = vec![[0.0; K]; mesh.x().len()];
-    program.eval_each(mesh.x(), &[], &mut out);
-    for (k, values) in out.iter_mut().enumerate() {
-        for (value, needed) in values.iter_mut().zip(needed) {
-            if !value.is_finite() && !needed[k] {
-                *value = 0.0;
-            }
-        }
-    }
-    match out.iter().position(|v| !v.iter().all(|v| v.is_finite())) {
-        None => Ok(out),
+/// The exact solution at every node.
+fn values(mesh: &Mesh<2>, exact: &Program<2, 5>) -> Result<Vec<f64>, Failure> {
+    let mut out = vec![[0.0; 5]; mesh.x().len()];
+    exact.eval_each(mesh.x(), &[], &mut out);
+    let u: Vec<f64> = out.into_iter().map(|[u, ..]| u).collect();
+    match u.iter().position(|u| !u.is_finite()) {
+        None => Ok(u),
         Some(k) => {
-            let value = out[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
             let at = mesh.node_place(k);
-            Err(Failure::Formula { what: what.into(), value, at, given: Vec::new() })
+            Err(Failure::Formula { what: "exact.u".into(), value: u[k], at, given: Vec::new() })
         }
     }
 }

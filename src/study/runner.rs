@@ -143,12 +143,14 @@ impl<'a> Stage<'a> {
 /// See [`Kind::compute`].
 pub(super) fn compute<K: Kind>(study: &K) -> Result<(K::Run, Option<Error>)> {
     let mut study = study.clone();
-    study.resolve()?;
-    let mut run = study.begin()?;
-    match run.go(&mut Stage::bare()) {
-        Err(error) if run.scenes().is_ok_and(|scenes| scenes.is_empty()) => Err(error),
-        outcome => Ok((run, outcome.err())),
-    }
+    study.ready()?;
+    study.data().known(|| {
+        let mut run = study.begin()?;
+        match run.go(&mut Stage::bare()) {
+            Err(error) if run.scenes().is_ok_and(|scenes| scenes.is_empty()) => Err(error),
+            outcome => Ok((run, outcome.err())),
+        }
+    })
 }
 
 /// See [`Kind::run`].
@@ -160,14 +162,25 @@ pub(super) fn run<K: Kind>(
 ) -> Result<Finished<K::Run>> {
     let clock = Stopwatch::start();
     let mut study = study.clone();
-    study.resolve()?;
+    study.ready()?;
+    study.data().known(|| run_ready(&study, path, begin, watchers, clock))
+}
+
+/// Runs a study that is resolved, where its formulas may name its tables.
+fn run_ready<K: Kind>(
+    study: &K,
+    path: &Path,
+    begin: Begin,
+    watchers: &mut [&mut dyn Observer],
+    clock: Stopwatch,
+) -> Result<Finished<K::Run>> {
     let (mut run, warnings) = (study.begin()?, study.warnings()?);
     let (header, output) = study.common();
     let directory = RunDirectory::open(path)?;
     let mut checkpoints = Checkpoints::new(path, output.checkpoint, &study.to_toml())?;
     let resumed = match begin {
         Begin::Anew => None,
-        Begin::Resumed => checkpoints.resume(|found, behind| take_up(&study, path, found, behind))?,
+        Begin::Resumed => checkpoints.resume(|found, behind| take_up(study, path, found, behind))?,
     };
     let mut stage = Stage::bare();
     match resumed {
@@ -193,7 +206,7 @@ pub(super) fn run<K: Kind>(
     directory.write_summary(&summary)?;
     directory.write("study.toml", study.to_toml().as_bytes())?;
     let failure = run.go(&mut stage).err();
-    end(&study, stage, &directory, Finished { summary, run, failure })
+    end(study, stage, &directory, Finished { summary, run, failure })
 }
 
 /// What runs, at a checkpoint, with the frames that were there by then and the seconds that it took.
@@ -222,6 +235,10 @@ fn begun<K: Kind>(study: &K) -> Result<K::Run, Unfit> {
 
 /// See [`Study::decode`](super::Study::decode).
 pub(super) fn decode<K: Kind>(study: &K, bytes: &[u8]) -> Result<usize, Unfit> {
+    study.data().known(|| decode_known(study, bytes))
+}
+
+fn decode_known<K: Kind>(study: &K, bytes: &[u8]) -> Result<usize, Unfit> {
     let checkpoints = Checkpoints::new(Path::new(""), study.common().1.checkpoint, &study.to_toml());
     let (behind, found) = checkpoints.map_err(|error| Unfit::Damaged(error.to_string()))?.read(bytes)?;
     let mut run = begun(study)?;
@@ -242,6 +259,7 @@ fn end<K: Kind>(
     let (last, left) = stage.output(|stage| leave(&mut run, stage, directory));
     let failure = failure.or(left.err());
     run.tell(&mut summary);
+    summary.warnings.extend(study.data().warnings());
     let note = |summary: &mut Summary<_>, failure: Option<&Error>, stage: &Stage<'_>| {
         summary.note(failure, |error| study.remedy(error));
         summary.seconds = stage.spent(summary.seconds.parts);

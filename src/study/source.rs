@@ -1,8 +1,9 @@
+use super::common::text_of;
 use crate::error::{Diagnostic, Error, Result};
 use serde::de::DeserializeOwned;
 use std::io::Read;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -13,6 +14,8 @@ use toml::de::{DeTable, DeValue};
 #[derive(Debug, Clone)]
 pub struct Source {
     pieces: Vec<Piece>,
+    /// Where files lie that the study names.
+    directory: PathBuf,
 }
 
 #[derive(Debug, Clone)]
@@ -39,8 +42,6 @@ const KINDED: [&str; 7] = [
 const CHOICES: [&str; 3] = ["monitor.strength", "output.frames", "output.checkpoint"];
 /// Characters of a line that are shown.
 const SHOWN: usize = 160;
-/// A study is a page of text; more is some other file.
-const MAX_BYTES: u64 = 1 << 20;
 
 impl Source {
     /// Reads a study file.
@@ -53,7 +54,11 @@ impl Source {
             return Err(unreadable("it is a directory, not a study file".into()));
         }
         let file = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
-        Ok(Self::new(path.display().to_string(), text_of(file).map_err(unreadable)?))
+        let mut source = Self::new(path.display().to_string(), text_of(file).map_err(unreadable)?);
+        // a study that is written again, in its run directory, must find the same files
+        let whole = std::path::absolute(path).unwrap_or_else(|_| path.into());
+        source.directory = whole.parent().map(Path::to_path_buf).unwrap_or_default();
+        Ok(source)
     }
 
     /// Reads a study to its end; `origin` names in messages where it comes from, such as `standard input`.
@@ -72,7 +77,13 @@ impl Source {
     /// A study from text; `origin` is its name in messages.
     pub fn new(origin: impl Into<String>, text: impl Into<String>) -> Self {
         let text = text.into();
-        Self { pieces: vec![Piece { origin: origin.into(), padded: text.clone(), text, begins: 0 }] }
+        let directory = std::env::current_dir().unwrap_or_default();
+        Self { pieces: vec![Piece { origin: origin.into(), padded: text.clone(), text, begins: 0 }], directory }
+    }
+
+    /// The directory in which files lie that the study names: that of its own file, or the current one.
+    pub(super) fn directory(&self) -> &Path {
+        &self.directory
     }
 
     /// Sets one key: `KEY=VALUE`, a dotted key and a TOML value, or a bare word for a string.
@@ -314,20 +325,6 @@ impl Source {
             help,
         }))
     }
-}
-
-/// The text of a study.
-fn text_of(reader: impl Read) -> Result<String, String> {
-    let mut bytes = Vec::new();
-    reader.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(format!("it has more than {MAX_BYTES} bytes, which no study has"));
-    }
-    String::from_utf8(bytes).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
-        let line = error.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
-        format!("it is not UTF-8 text (byte {at}, line {line}); save it as UTF-8")
-    })
 }
 
 /// A control character, a tab too, would move what is printed after it.

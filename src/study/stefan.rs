@@ -2,6 +2,7 @@
 
 use super::LaplacianTable;
 use super::common::{Header, Output};
+use super::data::DataTables;
 use super::mapped::Ends;
 use crate::physics::{Condition, Conditions};
 use crate::setting::{Auto, fixed, pair};
@@ -16,6 +17,9 @@ use std::fmt;
 pub struct StefanStudy {
     /// Name and kind of the study.
     pub study: Header,
+    /// Tables of values from files, which every formula may call as functions by their names.
+    #[serde(default, skip_serializing_if = "DataTables::is_empty")]
+    pub data: DataTables,
     /// The box with its two walls, and the front at the start.
     pub domain: FrontDomain,
     /// The number of cells, and how close their rows lie near the front.
