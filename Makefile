@@ -49,6 +49,7 @@ bench: $(VENV)/ready
 	$(VENV)/bin/python benches/mesh_solve.py
 	$(VENV)/bin/python benches/stencils.py
 	$(VENV)/bin/python benches/schwarz_line.py
+	$(VENV)/bin/python benches/lines.py
 	$(VENV)/bin/python -m pip install --quiet .
 	$(VENV)/bin/python benches/mesh_steps.py
 

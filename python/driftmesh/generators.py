@@ -41,8 +41,8 @@ class MeshGenerator:
         monitor: :class:`RootGradient` (the default, with nothing to set), :class:`Arclength` or :class:`Given`; or the
             density itself, an array of the shape of the mesh; or a function of mesh and u that returns it. ``a | b``
             is the larger of two monitors (:class:`Largest`). A density is positive, and only its ratios matter.
-        method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`. Meshes of lines
-            take :class:`Whole` and :class:`Fixed`.
+        method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`. Subdomains of a
+            line are one number.
         relaxation: τ, the time that the mesh takes to follow the density. ``"auto"`` chooses it from how the mesh
             moves. ``{"steps": 25}`` gives it in time steps; ``{"steps": 40, "prediction": 0.2}`` also starts each step
             from where the nodes would be if they went on, with a velocity that learns a fifth of each correction.
@@ -252,7 +252,8 @@ class MeshGenerator:
     def _begin(self) -> None:
         mesh = {"generator": self._method._table(), "relaxation": self._relaxation, "form": self._form}
         tables = {"monitor": self._wanted()._table(), "mesh": mesh, "safety": self._safety}
-        self._native = _driftmesh.Generator(_toml.document(tables), self._threads)
+        lines = isinstance(self._method, (Schwarz, Stochastic)) and len(self._method._along()) == 1
+        self._native = _driftmesh.Generator(_toml.document(tables), self._threads, lines)
         self._made_for = self._wanted()
         self._told = "{}"
 

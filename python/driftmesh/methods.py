@@ -36,12 +36,17 @@ class Fixed(Kind):
     kind = "fixed"
 
 
+def _each(subdomains: Any) -> tuple[Any, ...]:
+    """Numbers of subdomains, one for each axis."""
+    return tuple(subdomains) if isinstance(subdomains, (tuple, list)) else (subdomains,)
+
+
 @dataclass(frozen=True)
 class Schwarz(Kind):
     """Overlapping subdomains, solved in parallel and iterated until they agree, or a given number of times.
 
     Args:
-        subdomains: Number of subdomains along each axis.
+        subdomains: Number of subdomains along each axis; one number for meshes of lines.
         overlap: Cells that neighbours share.
         method: What neighbours exchange: positions of nodes (``"classical"``) or Robin's conditions (``"optimized"``),
             which take fewer iterations.
@@ -59,12 +64,18 @@ class Schwarz(Kind):
     """
 
     kind = "schwarz"
-    subdomains: tuple[int, int] = (2, 2)
+    subdomains: int | tuple[int] | tuple[int, int] = (2, 2)
     overlap: int = 2
     method: Literal["classical", "optimized"] = "classical"
     robin: float | Literal["auto"] = "auto"
     tolerance: float | None = None
     iterations: int | None = None
+
+    def _along(self) -> tuple[Any, ...]:
+        return _each(self.subdomains)
+
+    def _table(self) -> dict[str, Any]:
+        return super()._table() | {"subdomains": list(self._along())}
 
 
 @dataclass(frozen=True)
@@ -176,7 +187,7 @@ class Stochastic(Kind):
     """Random walks or strips give the nodes between the subdomains; then each subdomain is solved by itself.
 
     Args:
-        subdomains: Number of subdomains along each axis.
+        subdomains: Number of subdomains along each axis; one number for meshes of lines.
         estimator: How the nodes of the interfaces are found: :class:`ResidualWalk`, :class:`Strip`,
             :class:`GridWalk` or :class:`MonteCarlo`.
         seed: Seed of all random numbers.
@@ -191,7 +202,7 @@ class Stochastic(Kind):
     """
 
     kind = "stochastic"
-    subdomains: tuple[int, int] = (2, 2)
+    subdomains: int | tuple[int] | tuple[int, int] = (2, 2)
     estimator: ResidualWalk | Strip | GridWalk | MonteCarlo = ResidualWalk()
     seed: int = 0
     interface: Interpolation | None = None
@@ -205,4 +216,7 @@ class Stochastic(Kind):
 
     def _table(self) -> dict[str, Any]:
         sample = None if self.interface is None else vars(self.interface)
-        return super()._table() | {"interface": sample}
+        return super()._table() | {"subdomains": list(self._along()), "interface": sample}
+
+    def _along(self) -> tuple[Any, ...]:
+        return _each(self.subdomains)

@@ -6,7 +6,7 @@ use crate::threads::{BRIEFLY, Ended, Threads, calls, compute, interruptible};
 use driftmesh::Error;
 use driftmesh::density::{NOISE_WORTH_A_WARNING, noise};
 use driftmesh::geometry::{Mesh, check_unfolded};
-use driftmesh::meshing::{Movable, Relaxation};
+use driftmesh::meshing::{LineGeneratorKind, Movable, Relaxation};
 use driftmesh::mover::{self, Ending, Step, steps_to_rest};
 use driftmesh::study::Source;
 use numpy::PyReadonlyArrayDyn;
@@ -49,11 +49,19 @@ pub struct Generator {
 #[pymethods]
 impl Generator {
     #[new]
-    #[pyo3(signature = (settings, threads))]
-    fn new(py: Python<'_>, settings: &str, threads: Threads) -> PyResult<Self> {
-        let settings: Settings = Source::new("settings", settings).parse().map_err(|error| plain(py, error))?;
-        let chooses = settings.mesh.relaxation == Relaxation::Auto;
-        let movers = Movers::new(settings).map_err(|error| plain(py, error))?;
+    #[pyo3(signature = (settings, threads, lines))]
+    fn new(py: Python<'_>, settings: &str, threads: Threads, lines: bool) -> PyResult<Self> {
+        let source = Source::new("settings", settings);
+        let made = if lines {
+            source.parse().and_then(|settings: Settings<LineGeneratorKind>| {
+                Ok((settings.mesh.relaxation, Movers::of_lines(settings)?))
+            })
+        } else {
+            let of_plane = |settings: Settings| Ok((settings.mesh.relaxation, Movers::of_plane(settings)?));
+            source.parse().and_then(of_plane)
+        };
+        let (relaxation, movers) = made.map_err(|error| plain(py, error))?;
+        let chooses = relaxation == Relaxation::Auto;
         Ok(Self { chooses, threads, warned: Default::default(), movers: Arc::new(Mutex::new(movers)) })
     }
 

@@ -13,9 +13,10 @@ use std::sync::TryLockError;
 /// The tables of a study that move a mesh.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settings {
+#[serde(bound = "G: Default + Deserialize<'de>")]
+pub struct Settings<G: Default = GeneratorKind> {
     pub monitor: MonitorKind,
-    pub mesh: MeshTable,
+    pub mesh: MeshTable<G>,
     #[serde(default)]
     pub safety: Safety,
 }
@@ -52,7 +53,42 @@ impl AsMut<Parts<2>> for Movers {
 }
 
 impl Movers {
-    pub fn new(Settings { monitor, mesh, safety }: Settings) -> driftmesh::Result<Self> {
+    /// Movers whose subdomains, if there are any, are those of the plane.
+    pub fn of_plane(settings: Settings) -> driftmesh::Result<Self> {
+        let kind = settings.mesh.generator.clone();
+        let (on_lines, divides) = match &kind {
+            GeneratorKind::Whole(_) => (LineGeneratorKind::default(), false),
+            GeneratorKind::Fixed(_) => (LineGeneratorKind::Fixed(Fixed {}), false),
+            // refused before any step
+            GeneratorKind::Stochastic(_) | GeneratorKind::Schwarz(_) => (LineGeneratorKind::default(), true),
+        };
+        let rule = "a mesh of a line needs one number of subdomains, such as subdomains=4";
+        let refused = move |_: &Lattice<1>| match divides {
+            true => Err(Error::invalid("method", "one with subdomains along two axes", rule)),
+            false => Ok(()),
+        };
+        let check = move |lattice: &Lattice<2>| kind.check(lattice).map_err(|error| error.within("mesh.generator"));
+        let in_plane = settings.mesh.generator.clone().into_generator();
+        Self::new(&settings, (on_lines.into_generator(), Box::new(refused)), (in_plane, Box::new(check)))
+    }
+
+    /// Movers with subdomains of a line.
+    pub fn of_lines(settings: Settings<LineGeneratorKind>) -> driftmesh::Result<Self> {
+        let kind = settings.mesh.generator.clone();
+        let rule = "a mesh in the plane needs a number of subdomains for each axis, such as subdomains=(4, 4)";
+        let refused =
+            move |_: &Lattice<2>| Err(Error::invalid("method", "one with subdomains along a single axis", rule));
+        let check = move |lattice: &Lattice<1>| kind.check(lattice).map_err(|error| error.within("mesh.generator"));
+        let on_lines = settings.mesh.generator.clone().into_generator();
+        let unused = GeneratorKind::default().into_generator();
+        Self::new(&settings, (on_lines, Box::new(check)), (unused, Box::new(refused)))
+    }
+
+    fn new<G: Default>(
+        Settings { monitor, mesh, safety }: &Settings<G>,
+        (on_lines, check_line): (Box<dyn MeshGenerator<1>>, Check<1>),
+        (in_plane, check_plane): (Box<dyn MeshGenerator<2>>, Check<2>),
+    ) -> driftmesh::Result<Self> {
         monitor.check().map_err(|error| error.within("monitor"))?;
         safety.check().map_err(|error| error.within("safety"))?;
         let form = match mesh.form {
@@ -62,19 +98,10 @@ impl Movers {
         let equation = Mmpde { relaxation: mesh.relaxation, form };
         equation.check().map_err(|error| error.within("mesh"))?;
         let care = Care { substeps: safety.substeps, smoothing: safety.smoothing };
-        let (on_lines, divides) = match &mesh.generator {
-            GeneratorKind::Whole(_) => (LineGeneratorKind::default(), false),
-            GeneratorKind::Fixed(_) => (LineGeneratorKind::Fixed(Fixed {}), false),
-            // refused before any step
-            GeneratorKind::Stochastic(_) | GeneratorKind::Schwarz(_) => (LineGeneratorKind::default(), true),
-        };
-        let (in_plane, kind) = (mesh.generator.clone().into_generator(), mesh.generator);
-        let line = Parts::new(monitor.clone(), on_lines.into_generator(), equation, care, move |_| match divides {
-            true => Err(Error::invalid("method", "one with subdomains", "needs a mesh in the plane; use Whole()")),
-            false => Ok(()),
-        })?;
-        let check = move |lattice: &Lattice<2>| kind.check(lattice).map_err(|error| error.within("mesh.generator"));
-        Ok(Self { line, plane: Parts::new(monitor, in_plane, equation, care, check)? })
+        Ok(Self {
+            line: Parts::new(monitor.clone(), on_lines, equation, care, check_line)?,
+            plane: Parts::new(monitor.clone(), in_plane, equation, care, check_plane)?,
+        })
     }
 }
 
@@ -87,10 +114,10 @@ where
         generator: Box<dyn MeshGenerator<D>>,
         equation: Mmpde,
         care: Care,
-        check: impl Fn(&Lattice<D>) -> driftmesh::Result<()> + Send + 'static,
+        check: Check<D>,
     ) -> driftmesh::Result<Self> {
         let mover = Mover { generator, equation, care };
-        Ok(Self { monitor: monitor.into_monitor(&[])?, mover, check: Box::new(check), last: None })
+        Ok(Self { monitor: monitor.into_monitor(&[])?, mover, check, last: None })
     }
 
     pub fn step(&mut self, mesh: &Mesh<D>, u: &[f64], dt: f64) -> Result<Step<D>, Failure> {

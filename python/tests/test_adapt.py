@@ -153,7 +153,11 @@ def folded():
         (lambda g, m: driftmesh.run({}, threads=-1), "`threads` is -1"),
         (
             lambda g, m: MeshGenerator(method=Schwarz()).step(Mesh.uniform(cells=8), np.zeros(9), 0.1),
-            "needs a mesh in the plane; use Whole",
+            "a mesh of a line needs one number of subdomains",
+        ),
+        (
+            lambda g, m: MeshGenerator(method=Schwarz(subdomains=2)).step(m, m.x, 0.1),
+            "a mesh in the plane needs a number of subdomains for each axis",
         ),
     ],
 )

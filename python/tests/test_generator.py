@@ -101,6 +101,33 @@ def test_subdomains_give_the_mesh_of_the_whole_domain(method):
     assert mesh == follow(again, steps=1, dt=1e-3)
 
 
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize(
+    "method",
+    [
+        Schwarz(subdomains=4),
+        Schwarz(subdomains=(3,), method="optimized", tolerance=1e-10),
+        Stochastic(subdomains=4, seed=3),
+        Stochastic(subdomains=2, estimator=Strip(width=4)),
+        Stochastic(subdomains=4, estimator=GridWalk(walks=400, increment=True)),
+        Stochastic(subdomains=4, estimator=MonteCarlo(paths=4000, substeps=20, control_variate=True)),
+    ],
+)
+def test_subdomains_of_a_line_give_the_mesh_of_the_whole(method, periodic):
+    """Within six standard errors, and the bias of paths or what strips leave."""
+    start = Mesh.uniform(cells=48, periodic=periodic)
+    u = np.exp(np.cos(2 * np.pi * (start.x - 0.4)) * 4)
+    step = lambda method: MeshGenerator(Arclength(), method, 1.0).step(start, u, 1e-3)
+    divided = MeshGenerator(Arclength(), method, 1.0)
+    mesh = divided.step(start, u, 1e-3)
+    allowed = 6 * (divided.last["interface"]["standard_error"] or 0) + 0.01 / 48
+    assert divided.last["interface"]["points"] > 0
+    assert 0 < np.abs(mesh.x - start.x).max() and np.abs(mesh.x - step(Whole()).x).max() < allowed
+    assert mesh == step(method) == pickle.loads(pickle.dumps(MeshGenerator(Arclength(), method, 1.0))).step(
+        start, u, 1e-3
+    )
+
+
 def test_a_mesh_may_stay():
     assert follow(MeshGenerator(method=Fixed())) == Mesh.uniform(cells=(24, 24))
 

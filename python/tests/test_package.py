@@ -117,7 +117,7 @@ def notebook_code(name):
     return "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
 
 
-@pytest.mark.parametrize("name", ["own-solver", "schwarz"])
+@pytest.mark.parametrize("name", ["own-solver", "schwarz", "solve-bvp"])
 def test_notebooks_run(name, tmp_path):
     import nbformat
     from nbclient import NotebookClient

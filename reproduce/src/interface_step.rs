@@ -82,7 +82,7 @@ impl InterfaceStep {
         move_sides(&equation, &mesh, &rho, dt, &mut new, &mut Robust::default())?;
         let exact = Whole::default().step(&equation, &mesh, &rho, dt)?.mesh.x().to_vec();
         let decomposition = Decomposition::new(&lattice, subdomains)
-            .map_err(|_| Failure::Subdomains { subdomains, cells: lattice.cells() })?;
+            .map_err(|_| Failure::Subdomains { subdomains: subdomains.into(), cells: lattice.cells().into() })?;
         let points = decomposition.points();
         Ok(Self { equation, mesh, rho, dt, operator, new, exact, decomposition, points })
     }

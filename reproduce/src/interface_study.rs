@@ -196,7 +196,7 @@ impl MeshGenerator for SweepsAlone {
         let mut x = mesh.x().to_vec();
         move_sides(equation, mesh, rho, dt, &mut x, &mut Robust::default())?;
         let problem = Problem::new(equation, &operator, mesh, rho, dt, &x, 0, 0);
-        let guess = self.walk.estimate(&problem, &[], &mut Strips::new(&self.decomposition))?.guess;
+        let guess = self.walk.estimate(&problem, &[], &mut Strips::<2, 5>::new(&self.decomposition))?.guess;
         x.copy_from_slice(&guess);
         let zero = [[0.0; 2]; 2];
         for patch in self.decomposition.patches() {

@@ -19,9 +19,7 @@ use crate::geometry::{Lattice, check_length};
 pub fn smooth<const D: usize>(lattice: &Lattice<D>, values: &mut [f64], passes: usize) -> Result<(), Failure> {
     check_length(lattice, "what is smoothed", values.len())?;
     for axis in 0..D {
-        along(lattice.nodes(), axis, values, |lines| {
-            (0..passes).for_each(|_| pass(lines, lattice.periodic()[axis], 1.0));
-        });
+        along(lattice.nodes(), axis, values, Passes { wraps: lattice.periodic()[axis], passes });
     }
     Ok(())
 }
@@ -40,7 +38,7 @@ pub(super) fn smooth_widely<const D: usize>(
     passes: [f64; D],
 ) {
     for axis in 0..D {
-        along(size, axis, values, |lines| spread(lines, periodic[axis], passes[axis]));
+        along(size, axis, values, Spread { wraps: periodic[axis], passes: passes[axis] });
     }
 }
 
@@ -55,20 +53,61 @@ const LANES: usize = 32;
 /// Number of values of a line that are read at once where they are neighbours in memory: those that one fetch brings.
 const PIECE: usize = 8;
 
-/// The values at one place of some lines.
-type Row = [f64; LANES];
+/// The values at one place of L lines.
+type Row<const L: usize> = [f64; L];
 
-/// Filters all lines along an axis of a grid, [`LANES`] at a time.
-fn along<const D: usize>(size: [usize; D], axis: usize, values: &mut [f64], mut filter: impl FnMut(&mut [Row])) {
+/// What is done to L lines side by side.
+trait Filter {
+    fn filter<const L: usize>(&self, lines: &mut [Row<L>]);
+}
+
+/// Passes of the filter (1 2 1)/4.
+struct Passes {
+    wraps: bool,
+    passes: usize,
+}
+
+impl Filter for Passes {
+    fn filter<const L: usize>(&self, lines: &mut [Row<L>]) {
+        (0..self.passes).for_each(|_| pass(lines, self.wraps, 1.0));
+    }
+}
+
+/// The wide filter.
+struct Spread {
+    wraps: bool,
+    passes: f64,
+}
+
+impl Filter for Spread {
+    fn filter<const L: usize>(&self, lines: &mut [Row<L>]) {
+        spread(lines, self.wraps, self.passes);
+    }
+}
+
+/// Filters all lines along an axis of a grid, [`LANES`] at a time, or the only one there is.
+fn along<const D: usize>(size: [usize; D], axis: usize, values: &mut [f64], filter: impl Filter) {
+    match values.len() == size[axis] {
+        true => side_by_side::<D, 1>(size, axis, values, filter),
+        false => side_by_side::<D, LANES>(size, axis, values, filter),
+    }
+}
+
+fn side_by_side<const D: usize, const L: usize>(
+    size: [usize; D],
+    axis: usize,
+    values: &mut [f64],
+    filter: impl Filter,
+) {
     let n = size[axis];
     let stride: usize = size[axis + 1..].iter().product();
     // lines that are runs in memory are read and written in pieces, others across
     let piece = if stride == 1 { PIECE } else { 1 };
     let count = values.len() / n;
-    let mut lines = vec![[0.0; LANES]; n];
-    for first in (0..count).step_by(LANES) {
-        let lanes = LANES.min(count - first);
-        let starts: [usize; LANES] = std::array::from_fn(|lane| {
+    let mut lines = vec![[0.0; L]; n];
+    for first in (0..count).step_by(L) {
+        let lanes = L.min(count - first);
+        let starts: [usize; L] = std::array::from_fn(|lane| {
             let line = first + lane;
             line / stride * stride * n + line % stride
         });
@@ -80,7 +119,7 @@ fn along<const D: usize>(size: [usize; D], axis: usize, values: &mut [f64], mut 
                 }
             }
         }
-        filter(&mut lines);
+        filter.filter(&mut lines);
         for (p, rows) in lines.chunks(piece).enumerate() {
             for (lane, start) in starts.iter().enumerate() {
                 for (i, row) in rows.iter().enumerate() {
@@ -92,7 +131,7 @@ fn along<const D: usize>(size: [usize; D], axis: usize, values: &mut [f64], mut 
 }
 
 /// One pass (1 2 1)/4, or one with this share of its variance.
-fn pass(lines: &mut [Row], wraps: bool, share: f64) {
+fn pass<const L: usize>(lines: &mut [Row<L>], wraps: bool, share: f64) {
     let (own, beside) = (4.0 / share - 2.0, 0.25 * share);
     let (first, last) = (lines[0], lines[lines.len() - 1]);
     let mut below = if wraps { last } else { first };
@@ -104,7 +143,7 @@ fn pass(lines: &mut [Row], wraps: bool, share: f64) {
     }
 }
 
-fn spread(lines: &mut [Row], wraps: bool, passes: f64) {
+fn spread<const L: usize>(lines: &mut [Row<L>], wraps: bool, passes: f64) {
     let n = lines.len();
     if passes < MOST_PASSES || n < FEWEST_HALVED {
         // after 4 n² passes nothing but the mean is left along the axis
@@ -116,7 +155,7 @@ fn spread(lines: &mut [Row], wraps: bool, passes: f64) {
         return;
     }
     pass(lines, wraps, 1.0);
-    let mut coarse = vec![[0.0; LANES]; n.div_ceil(2)];
+    let mut coarse = vec![[0.0; L]; n.div_ceil(2)];
     let ratio = n as f64 / coarse.len() as f64;
     average(lines, &mut coarse);
     // two passes here, and the means of `ratio` cells twice, each of variance (ratio² − 1)/12
@@ -126,12 +165,12 @@ fn spread(lines: &mut [Row], wraps: bool, passes: f64) {
 }
 
 /// The mean over each cell of another grid along the same lines, values being constant in cells.
-fn average(from: &[Row], to: &mut [Row]) {
+fn average<const L: usize>(from: &[Row<L>], to: &mut [Row<L>]) {
     let (n, m) = (from.len(), to.len());
     // in units of 1/(n m) of the axis, cell i is [i m, (i + 1) m] and cell j is [j n, (j + 1) n]
     let mut i = 0;
     for (j, to) in to.iter_mut().enumerate() {
-        *to = [0.0; LANES];
+        *to = [0.0; L];
         let (begin, end) = (j * n, (j + 1) * n);
         loop {
             let shared = ((i + 1) * m).min(end) - (i * m).max(begin);

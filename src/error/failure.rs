@@ -166,9 +166,9 @@ pub enum Failure {
     #[error("{subdomains:?} subdomains do not fit {cells:?} cells")]
     Subdomains {
         /// Asked for along each axis.
-        subdomains: [usize; 2],
+        subdomains: Vec<usize>,
         /// Cells along each axis.
-        cells: [usize; 2],
+        cells: Vec<usize>,
     },
     /// The density of a line is not finite and positive, or its derivative not finite.
     #[error("{what} is {value:e} at x = {x}, t = {t}; {}", line_rule(what, *value))]

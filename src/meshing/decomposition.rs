@@ -1,7 +1,7 @@
 use crate::error::{Error, Result};
-use crate::geometry::{Lattice, Patch};
+use crate::geometry::{Lattice, Patch, strides};
 
-/// A division of the lattice into S_ξ × S_η subdomains
+/// A division of the lattice into S_ξ × S_η subdomains, on a line into S of them
 ///
 /// Cuts are lines of nodes, spaced as evenly as the cells allow: at s·cells/S, rounded. On a bounded axis S subdomains
 /// have S − 1 cuts between them. On a periodic axis they have S cuts, the first of them at node 0; a single subdomain
@@ -17,10 +17,10 @@ use crate::geometry::{Lattice, Patch};
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Decomposition {
-    lattice: Lattice<2>,
+pub struct Decomposition<const D: usize = 2> {
+    lattice: Lattice<D>,
     /// The first and the last node of the subdomains along each axis.
-    spans: [Vec<[usize; 2]>; 2],
+    spans: [Vec<[usize; 2]>; D],
 }
 
 /// A line of nodes between subdomains.
@@ -32,18 +32,18 @@ pub struct Cut {
     pub nodes: Vec<usize>,
 }
 
-impl Decomposition {
+impl<const D: usize> Decomposition<D> {
     /// Divides a lattice.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless every axis has at least one subdomain and no more than cells.
-    pub fn new(lattice: &Lattice<2>, subdomains: [usize; 2]) -> Result<Self> {
+    pub fn new(lattice: &Lattice<D>, subdomains: [usize; D]) -> Result<Self> {
         let cells = lattice.cells();
-        if (0..2).any(|d| !(1..=cells[d]).contains(&subdomains[d])) {
+        if (0..D).any(|d| !(1..=cells[d]).contains(&subdomains[d])) {
             let rule = format!("every axis needs at least 1 subdomain and at most one a cell, here {cells:?}");
             return Err(Error::invalid("subdomains", format!("{subdomains:?}"), rule));
         }
-        let spans = [0, 1].map(|d| {
+        let spans = std::array::from_fn(|d| {
             let (n, s) = (cells[d], subdomains[d]);
             let end = |k: usize| (2 * k * n + s) / (2 * s);
             (0..s).map(|k| [end(k), end(k + 1)]).collect()
@@ -52,7 +52,7 @@ impl Decomposition {
     }
 
     /// The lattice that is divided.
-    pub fn lattice(&self) -> &Lattice<2> {
+    pub fn lattice(&self) -> &Lattice<D> {
         &self.lattice
     }
 
@@ -79,6 +79,61 @@ impl Decomposition {
         self.spans[d].iter().skip(first).map(|span| span[0])
     }
 
+    /// All nodes on cuts in ascending order, without those on bounded sides.
+    pub fn points(&self) -> Vec<usize> {
+        let cuts: [Vec<usize>; D] = std::array::from_fn(|d| self.cuts(d).collect());
+        let on_cut = |k: &usize| self.lattice.node(*k).iter().zip(&cuts).any(|(i, cuts)| cuts.contains(i));
+        (0..self.lattice.len()).filter(|k| on_cut(k) && !self.on_side(*k)).collect()
+    }
+
+    /// Whether a node stands on a bounded side.
+    pub fn on_side(&self, index: usize) -> bool {
+        let (node, nodes, periodic) = (self.lattice.node(index), self.lattice.nodes(), self.lattice.periodic());
+        (0..D).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d]))
+    }
+
+    /// The unknowns of all subdomains; a subdomain of a single cell has none and is left out.
+    pub fn patches(&self) -> Vec<Patch<D>> {
+        self.extended([0, 0]).into_iter().map(|(patch, _)| patch).collect()
+    }
+
+    /// All subdomains, enlarged along each axis by `more[0]` cells downwards and `more[1]` upwards as far as there are
+    /// nodes. Each comes with the nodes that it owns: those above its lower cut up to its upper one.
+    pub fn extended(&self, more: [usize; 2]) -> Vec<(Patch<D>, Vec<usize>)> {
+        let spans = boxes(std::array::from_fn(|d| self.spans[d].len()));
+        let all = spans.map(|number: [usize; D]| self.one(std::array::from_fn(|d| self.spans[d][number[d]]), more));
+        all.filter(|(patch, _)| patch.len() > 0).collect()
+    }
+
+    /// The subdomain with the given first and last nodes, enlarged, and the nodes that it owns.
+    fn one(&self, spans: [[usize; 2]; D], more: [usize; 2]) -> (Patch<D>, Vec<usize>) {
+        let (cells, nodes, periodic) = (self.lattice.cells(), self.lattice.nodes(), self.lattice.periodic());
+        let wraps = std::array::from_fn(|d| self.wraps(d));
+        let mut patch = Patch { origin: [0; D], size: cells, wraps };
+        let mut own: [Vec<usize>; D] = std::array::from_fn(|d| (0..nodes[d]).collect());
+        for (d, [low, high]) in spans.into_iter().enumerate().filter(|&(d, _)| !wraps[d]) {
+            let n = cells[d];
+            let (from, to) = if periodic[d] {
+                // on a short periodic axis both rings may be the same node, but a patch never overlaps itself, and it
+                // holds its upper cut
+                let spare = n - (high - low);
+                let down = more[0].min(spare / 2);
+                (low + n - down, high + n + more[1].min(spare - down))
+            } else {
+                (low.saturating_sub(more[0]), (high + more[1]).min(n))
+            };
+            patch.size[d] = to - from - 1;
+            patch.origin[d] = (from + 1) % n;
+            let last = if periodic[d] || high < n { high } else { n - 1 };
+            own[d] = (low + 1..=last).map(|i| i % nodes[d]).collect();
+        }
+        let node = |i: [usize; D]| self.lattice.index(std::array::from_fn(|d| own[d][i[d]]));
+        let nodes = boxes(std::array::from_fn(|d| own[d].len())).map(node).collect();
+        (patch, nodes)
+    }
+}
+
+impl Decomposition {
     /// All cuts, those across ξ first.
     pub fn lines(&self) -> Vec<Cut> {
         let nodes = self.lattice.nodes();
@@ -93,15 +148,6 @@ impl Decomposition {
         lines
     }
 
-    /// All nodes on cuts in ascending order, without those on bounded sides.
-    pub fn points(&self) -> Vec<usize> {
-        let inner = |k: &usize| !self.on_side(*k);
-        let mut points: Vec<usize> = self.lines().into_iter().flat_map(|cut| cut.nodes).filter(inner).collect();
-        points.sort_unstable();
-        points.dedup();
-        points
-    }
-
     /// The number of the subdomain that each cell lies in, in lattice order. Subdomains are numbered with the second
     /// axis fastest.
     pub fn of_cells(&self) -> Vec<usize> {
@@ -113,51 +159,10 @@ impl Decomposition {
             .map(|(i, b)| number(0, i) * self.spans[1].len() + b)
             .collect()
     }
+}
 
-    /// Whether a node stands on a bounded side.
-    pub fn on_side(&self, index: usize) -> bool {
-        let (node, nodes, periodic) = (self.lattice.node(index), self.lattice.nodes(), self.lattice.periodic());
-        (0..2).any(|d| !periodic[d] && (node[d] == 0 || node[d] + 1 == nodes[d]))
-    }
-
-    /// The unknowns of all subdomains; a subdomain of a single cell has none and is left out.
-    pub fn patches(&self) -> Vec<Patch<2>> {
-        self.extended([0, 0]).into_iter().map(|(patch, _)| patch).collect()
-    }
-
-    /// All subdomains, enlarged along each axis by `more[0]` cells downwards and `more[1]` upwards as far as there are
-    /// nodes. Each comes with the nodes that it owns: those above its lower cut up to its upper one.
-    pub fn extended(&self, more: [usize; 2]) -> Vec<(Patch<2>, Vec<usize>)> {
-        let (cells, nodes, periodic) = (self.lattice.cells(), self.lattice.nodes(), self.lattice.periodic());
-        let mut all = Vec::new();
-        for &a in &self.spans[0] {
-            for &b in &self.spans[1] {
-                let mut patch = Patch { origin: [0; 2], size: cells, wraps: [0, 1].map(|d| self.wraps(d)) };
-                let mut own: [Vec<usize>; 2] = [0, 1].map(|d| (0..nodes[d]).collect());
-                for (d, [low, high]) in [a, b].into_iter().enumerate().filter(|&(d, _)| !self.wraps(d)) {
-                    let n = cells[d];
-                    let (from, to) = if periodic[d] {
-                        // on a short periodic axis both rings may be the same node, but a patch never overlaps itself,
-                        // and it holds its upper cut
-                        let spare = n - (high - low);
-                        let down = more[0].min(spare / 2);
-                        (low + n - down, high + n + more[1].min(spare - down))
-                    } else {
-                        (low.saturating_sub(more[0]), (high + more[1]).min(n))
-                    };
-                    patch.size[d] = to - from - 1;
-                    patch.origin[d] = (from + 1) % n;
-                    let last = if periodic[d] || high < n { high } else { n - 1 };
-                    own[d] = (low + 1..=last).map(|i| i % nodes[d]).collect();
-                }
-                if patch.len() > 0 {
-                    let [rows, columns] = own;
-                    let place = |i: usize, j: usize| self.lattice.index([i, j]);
-                    let own = rows.iter().flat_map(|&i| columns.iter().map(move |&j| place(i, j))).collect();
-                    all.push((patch, own));
-                }
-            }
-        }
-        all
-    }
+/// All places in a box of so many, with the last axis fastest.
+pub(super) fn boxes<const D: usize>(size: [usize; D]) -> impl Iterator<Item = [usize; D]> {
+    let strides = strides(size);
+    (0..size.iter().product()).map(move |k| std::array::from_fn(|d| k / strides[d] % size[d]))
 }

@@ -160,10 +160,20 @@ kinds! {
 /// [`Whole`] on a line.
 pub type LineWhole = Whole<1>;
 
+/// [`Stochastic`] on a line, where subdomains meet in single nodes.
+pub type LineStochastic = Stochastic<EstimatorKind, 1, 3>;
+
+/// [`Schwarz`] on a line.
+pub type LineSchwarz = Schwarz<1, 3>;
+
 kinds! {
     /// `mesh.generator` of a study in one dimension.
     LineGeneratorKind {
         "whole" = LineWhole: "one implicit solve of the mesh equation on the whole line",
+        "stochastic" = LineStochastic: "walks or strips give the nodes between subdomains, then each is solved by \
+                                        itself",
+        "schwarz" = LineSchwarz: "overlapping subdomains, solved in parallel and iterated to a tolerance or so many \
+                                  times",
         "fixed" = Fixed: "the mesh does not move",
     }
 }
@@ -175,10 +185,33 @@ impl Default for LineGeneratorKind {
 }
 
 impl LineGeneratorKind {
+    /// Refuses settings out of range for a lattice.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid).
+    pub fn check(&self, lattice: &Lattice<1>) -> Result<()> {
+        match self {
+            Self::LineWhole(_) | Self::Fixed(_) => Ok(()),
+            Self::LineStochastic(stochastic) => stochastic.check(lattice),
+            Self::LineSchwarz(schwarz) => schwarz.check(lattice),
+        }
+    }
+
+    /// Number of subdomains.
+    pub fn subdomains(&self) -> usize {
+        match self {
+            Self::LineWhole(_) | Self::Fixed(_) => 1,
+            Self::LineStochastic(stochastic) => stochastic.subdomains[0],
+            Self::LineSchwarz(schwarz) => schwarz.subdomains[0],
+        }
+    }
+
     /// The generator, ready to step.
     pub fn into_generator(self) -> Box<dyn MeshGenerator<1>> {
         match self {
             Self::LineWhole(whole) => Box::new(whole),
+            Self::LineStochastic(stochastic) => Box::new(stochastic),
+            Self::LineSchwarz(schwarz) => Box::new(schwarz),
             Self::Fixed(fixed) => Box::new(fixed),
         }
     }
@@ -207,8 +240,8 @@ impl GeneratorKind {
     pub fn subdomains(&self) -> [usize; 2] {
         match self {
             Self::Whole(_) | Self::Fixed(_) => [1, 1],
-            Self::Stochastic(stochastic) => stochastic.subdomains,
-            Self::Schwarz(schwarz) => schwarz.subdomains,
+            Self::Stochastic(stochastic) => *stochastic.subdomains,
+            Self::Schwarz(schwarz) => *schwarz.subdomains,
         }
     }
 

@@ -7,7 +7,7 @@ use crate::geometry::{Density, Lattice, Mesh};
 use crate::numerics::larger;
 use crate::numerics::linear::Robust;
 use crate::parallel;
-use crate::setting::{Auto, pair};
+use crate::setting::{Auto, Axes};
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,10 +40,11 @@ use std::time::Instant;
 /// # Source
 /// Gander, *Schwarz methods over the course of time* (2008); Gander and Haynes (2012) for mesh equations.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(from = "Written")]
-pub struct Schwarz {
+#[serde(from = "Written<D>")]
+#[schemars(rename = "Schwarz")]
+pub struct Schwarz<const D: usize = 2, const S: usize = 5> {
     /// Number of subdomains along each axis.
-    pub subdomains: [usize; 2],
+    pub subdomains: Axes<usize, D>,
     /// Cells that neighbouring subdomains share.
     pub overlap: usize,
     /// What neighbours exchange: positions (`"classical"`) or Robin's conditions (`"optimized"`).
@@ -59,7 +60,7 @@ pub struct Schwarz {
     #[serde(skip)]
     line: Robust<1>,
     #[serde(skip)]
-    parts: Parts,
+    parts: Parts<D, S>,
 }
 
 /// What neighbouring subdomains exchange.
@@ -77,10 +78,10 @@ pub enum Transmission {
 /// A [`Schwarz`] as a study writes it.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Written {
+#[schemars(rename = "Schwarz_{D}")]
+struct Written<const D: usize> {
     /// Number of subdomains along each axis.
-    #[serde(deserialize_with = "pair")]
-    subdomains: [usize; 2],
+    subdomains: Axes<usize, D>,
     /// Cells that neighbouring subdomains share; 2 by default.
     overlap: Option<usize>,
     /// What neighbours exchange: positions (`"classical"`) or Robin's conditions (`"optimized"`).
@@ -97,8 +98,8 @@ struct Written {
     iterations: Option<usize>,
 }
 
-impl From<Written> for Schwarz {
-    fn from(written: Written) -> Self {
+impl<const D: usize, const S: usize> From<Written<D>> for Schwarz<D, S> {
+    fn from(written: Written<D>) -> Self {
         let Written { subdomains, overlap, method, robin, tolerance, iterations } = written;
         let tolerance = if iterations.is_none() { tolerance.or(Some(TOLERANCE)) } else { tolerance };
         Self {
@@ -106,7 +107,7 @@ impl From<Written> for Schwarz {
             robin,
             tolerance,
             iterations: iterations.unwrap_or(ITERATIONS),
-            ..Self::new(subdomains, overlap.unwrap_or(OVERLAP))
+            ..Self::new(*subdomains, overlap.unwrap_or(OVERLAP))
         }
     }
 }
@@ -119,23 +120,23 @@ const ITERATIONS: usize = 1000;
 
 /// The subdomains of a lattice with the memory of their solvers.
 #[derive(Debug, Clone, Default)]
-struct Parts {
-    lattice: Option<Lattice<2>>,
-    parts: Vec<Part>,
+struct Parts<const D: usize, const S: usize> {
+    lattice: Option<Lattice<D>>,
+    parts: Vec<Part<D, S>>,
     /// For each part its nodes on the ring, for Robin's conditions.
     traces: Vec<Vec<Trace>>,
     /// The right-hand sides of a step, without the contributions of Robin's conditions.
-    right: Vec<Vec<[f64; 2]>>,
+    right: Vec<Vec<[f64; D]>>,
     /// Nodes that lie on the ring of some subdomain, without those on bounded sides.
     rings: Vec<usize>,
     point: Vec<Robust<1>>,
 }
 
-impl Schwarz {
+impl<const D: usize, const S: usize> Schwarz<D, S> {
     /// Overlapping subdomains with the default tolerance.
-    pub fn new(subdomains: [usize; 2], overlap: usize) -> Self {
+    pub fn new(subdomains: [usize; D], overlap: usize) -> Self {
         Self {
-            subdomains,
+            subdomains: subdomains.into(),
             overlap,
             method: Transmission::Classical,
             robin: Auto::Auto,
@@ -150,8 +151,8 @@ impl Schwarz {
     ///
     /// # Errors
     /// [`Error::Invalid`].
-    pub fn check(&self, lattice: &Lattice<2>) -> Result<()> {
-        Decomposition::new(lattice, self.subdomains)?;
+    pub fn check(&self, lattice: &Lattice<D>) -> Result<()> {
+        Decomposition::new(lattice, *self.subdomains)?;
         if self.overlap == 0 {
             return Err(Error::invalid(
                 "overlap",
@@ -179,17 +180,18 @@ impl Schwarz {
     }
 
     /// β across each axis.
-    fn reflection(&self, equation: &Mmpde, lattice: &Lattice<2>, dt: f64) -> [f64; 2] {
+    fn reflection(&self, equation: &Mmpde, lattice: &Lattice<D>, dt: f64) -> [f64; D] {
         let a = equation.stiffness(lattice, dt);
-        [0, 1].map(|d| {
+        std::array::from_fn(|d| {
             if let Auto::Value(p) = self.robin {
                 return 1.0 / (1.0 + p * lattice.spacing()[d]);
             }
+            let decay = |along: f64| (-(1.0 + (1.0 + along) / (2.0 * a[d])).acosh()).exp();
+            let Some(e) = (0..D).find(|&e| e != d) else { return decay(0.0) };
             let waves = (1..=WAVES).map(|m| std::f64::consts::PI * m as f64 / WAVES as f64);
-            let slow = std::f64::consts::PI / lattice.cells()[1 - d] as f64;
-            let z: Vec<f64> = (std::iter::once(slow).chain(waves))
-                .map(|phi| (-(1.0 + (1.0 + 2.0 * a[1 - d] * (1.0 - phi.cos())) / (2.0 * a[d])).acosh()).exp())
-                .collect();
+            let slow = std::f64::consts::PI / lattice.cells()[e] as f64;
+            let z: Vec<f64> =
+                (std::iter::once(slow).chain(waves)).map(|phi| decay(2.0 * a[e] * (1.0 - phi.cos()))).collect();
             let largest = |beta: f64| {
                 let left = z.iter().map(|z| ((beta - z) / (1.0 - beta * z)).abs() * z.powi(self.overlap as i32 - 1));
                 left.fold(0.0, f64::max)
@@ -204,19 +206,19 @@ impl Schwarz {
 const WAVES: usize = 64;
 const TRIALS: usize = 200;
 
-impl Parts {
-    fn prepare(&mut self, lattice: &Lattice<2>, subdomains: [usize; 2], overlap: usize) -> Result<(), Failure> {
+impl<const D: usize, const S: usize> Parts<D, S> {
+    fn prepare(&mut self, lattice: &Lattice<D>, subdomains: [usize; D], overlap: usize) -> Result<(), Failure> {
         if self.lattice == Some(*lattice) {
             return Ok(());
         }
         let decomposition = Decomposition::new(lattice, subdomains)
-            .map_err(|_| Failure::Subdomains { subdomains, cells: lattice.cells() })?;
+            .map_err(|_| Failure::Subdomains { subdomains: subdomains.into(), cells: lattice.cells().into() })?;
         let extended = decomposition.extended([overlap / 2, overlap - overlap / 2]);
         let mut on_ring = vec![false; lattice.len()];
         for (patch, _) in &extended {
-            ring(patch, lattice).for_each(|(k, ..)| on_ring[k] = true);
+            ring(patch, lattice).for_each(|bound| on_ring[bound.node] = true);
         }
-        let parts: Vec<Part> = extended.into_iter().map(|(patch, own)| Part::new(lattice, patch, own)).collect();
+        let parts: Vec<Part<D, S>> = extended.into_iter().map(|(patch, own)| Part::new(lattice, patch, own)).collect();
         let mut owner = vec![usize::MAX; lattice.len()];
         for (number, part) in parts.iter().enumerate() {
             part.own.iter().for_each(|&(node, _)| owner[node] = number);
@@ -233,14 +235,14 @@ impl Parts {
     }
 
     /// The bound on the contraction of an iteration.
-    fn predict(&mut self, operator: &MeshOperator<2>, mesh: &Mesh<2>) -> Result<(f64, Work), Failure> {
+    fn predict(&mut self, operator: &MeshOperator<D>, mesh: &Mesh<D>) -> Result<(f64, Work), Failure> {
         let lattice = mesh.lattice();
         let mut side = vec![[1.0]; lattice.len()];
         lattice.sides().for_each(|k| side[k] = [0.0]);
         let zero = vec![[0.0]; lattice.len()];
-        let mut all: Vec<(&Part, &mut Robust<1>)> = self.parts.iter().zip(&mut self.point).collect();
+        let mut all: Vec<(&Part<D, S>, &mut Robust<1>)> = self.parts.iter().zip(&mut self.point).collect();
         let solved = parallel::map_mut(&mut all, |(part, solver)| {
-            operator.solve::<5, 1>(part.patch, &zero, &side, [[0.0]; 2], *solver, [1.0])
+            operator.solve::<S, 1>(part.patch, &zero, &side, [[0.0]; D], *solver, [1.0])
         });
         let mut bound = zero.clone();
         let mut work = Work::default();
@@ -254,11 +256,11 @@ impl Parts {
 
     /// Sets up the systems of a step. Robin's condition c_g = β c_i + given is eliminated: its unknown part goes to the
     /// matrix.
-    fn set(&mut self, operator: &MeshOperator<2>, residual: &[[f64; 2]], beta: [f64; 2]) {
+    fn set(&mut self, operator: &MeshOperator<D>, residual: &[[f64; D]], beta: [f64; D]) {
         for (part, traces) in self.parts.iter_mut().zip(&mut self.traces) {
             part.prepare(operator, residual);
             part.correction.clear();
-            for trace in traces.iter_mut().filter(|_| beta != [0.0; 2]) {
+            for trace in traces.iter_mut().filter(|_| beta != [0.0; D]) {
                 let (row, ring) = (&mut part.matrix.rows[trace.row], 1 + 2 * trace.axis + usize::from(trace.upper));
                 trace.weight = -std::mem::take(&mut row[ring]);
                 row[0] -= beta[trace.axis] * trace.weight;
@@ -269,13 +271,13 @@ impl Parts {
 
     /// One iteration, from corrections `c` at all nodes; returns the largest change. `beta` is that of Robin's
     /// conditions, and 0 for classical ones.
-    fn iterate(&mut self, c: &mut [[f64; 2]], beta: [f64; 2], size: [f64; 2]) -> Result<(f64, Work), Failure> {
+    fn iterate(&mut self, c: &mut [[f64; D]], beta: [f64; D], size: [f64; D]) -> Result<(f64, Work), Failure> {
         let lattice = self.lattice.as_ref().expect("parts are prepared first");
-        let robin = beta != [0.0; 2];
-        let before: Vec<Vec<[f64; 2]>> =
+        let robin = beta != [0.0; D];
+        let before: Vec<Vec<[f64; D]>> =
             if robin { self.parts.iter().map(|part| part.correction.clone()).collect() } else { Vec::new() };
         let (newest, own) = (&*c, &self.right);
-        let mut all: Vec<(usize, &mut Part, &[Trace])> = (self.parts.iter_mut().zip(&self.traces).enumerate())
+        let mut all: Vec<(usize, &mut Part<D, S>, &[Trace])> = (self.parts.iter_mut().zip(&self.traces).enumerate())
             .map(|(number, (part, traces))| (number, part, traces.as_slice()))
             .collect();
         let solved = parallel::map_mut(&mut all, |(number, part, traces)| {
@@ -286,16 +288,16 @@ impl Parts {
             part.right.copy_from_slice(&own[*number]);
             for trace in *traces {
                 // a part that has not been solved yet has no corrections
-                let at = |place: usize| before[trace.other].get(place).copied().unwrap_or([0.0; 2]);
+                let at = |place: usize| before[trace.other].get(place).copied().unwrap_or([0.0; D]);
                 let (ring, inner) = (at(trace.other_ring), at(trace.other_inner));
-                let given = [0, 1].map(|c| ring[c] - beta[trace.axis] * inner[c]);
-                (0..2).for_each(|c| part.right[trace.row][c] += trace.weight * given[c]);
+                let given: [f64; D] = std::array::from_fn(|c| ring[c] - beta[trace.axis] * inner[c]);
+                (0..D).for_each(|c| part.right[trace.row][c] += trace.weight * given[c]);
                 part.correction[trace.ring] = given;
             }
             let work = part.correct(Local::Solve { share: 0.0 }, size)?;
             for trace in *traces {
                 let inner = part.correction[trace.inner];
-                (0..2).for_each(|c| part.correction[trace.ring][c] += beta[trace.axis] * inner[c]);
+                (0..D).for_each(|c| part.correction[trace.ring][c] += beta[trace.axis] * inner[c]);
             }
             Ok(work)
         });
@@ -304,7 +306,7 @@ impl Parts {
             work += solved?;
             for &(node, place) in &part.own {
                 let new = part.correction[place];
-                change = (0..2).map(|k| new[k] - c[node][k]).fold(change, larger);
+                change = (0..D).map(|k| new[k] - c[node][k]).fold(change, larger);
                 c[node] = new;
             }
         }
@@ -312,10 +314,11 @@ impl Parts {
     }
 }
 
-impl MeshGenerator for Schwarz {
-    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &Density, dt: f64) -> Result<Moved, Failure> {
+impl<const D: usize, const S: usize> Schwarz<D, S> {
+    /// One step.
+    fn advance(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &Density, dt: f64) -> Result<Moved<D>, Failure> {
         let lattice = mesh.lattice();
-        self.parts.prepare(lattice, self.subdomains, self.overlap)?;
+        self.parts.prepare(lattice, *self.subdomains, self.overlap)?;
         self.check(lattice).map_err(Failure::refusing)?;
         let operator = equation.operator(lattice, rho, dt)?;
         let mut x = mesh.x().to_vec();
@@ -326,15 +329,16 @@ impl MeshGenerator for Schwarz {
         } else {
             let (predicted, cost) = self.parts.predict(&operator, mesh)?;
             work += cost;
-            ([0.0; 2], Some(predicted))
+            ([0.0; D], Some(predicted))
         };
         let seconds = started.elapsed().as_secs_f64();
 
         let residual = residual(&operator, mesh.x(), &x, mesh.jump());
         self.parts.set(&operator, &residual, beta);
         let size = size(mesh);
-        let tolerance = self.tolerance.map(|tolerance| tolerance * size[0].max(size[1]));
-        let mut c = vec![[0.0; 2]; lattice.len()];
+        let tolerance =
+            self.tolerance.map(|tolerance| size.iter().fold(0.0, |most: f64, size| most.max(*size)) * tolerance);
+        let mut c = vec![[0.0; D]; lattice.len()];
         let mut changes: Vec<f64> = Vec::new();
         loop {
             let (change, cost) = self.parts.iterate(&mut c, beta, size)?;
@@ -354,7 +358,7 @@ impl MeshGenerator for Schwarz {
                 }
             }
         }
-        x.iter_mut().zip(&c).for_each(|(x, c)| (0..2).for_each(|k| x[k] += c[k]));
+        x.iter_mut().zip(&c).for_each(|(x, c)| (0..D).for_each(|k| x[k] += c[k]));
         let contraction = Some(Contraction { iterations: changes.len(), predicted, observed: observed(&changes) });
         let interface = Interface {
             points: self.parts.rings.len(),
@@ -365,6 +369,18 @@ impl MeshGenerator for Schwarz {
             ..Interface::default()
         };
         Ok(Moved { mesh: mesh.moved(x)?, work, interface: Some(interface) })
+    }
+}
+
+impl MeshGenerator<1> for Schwarz<1, 3> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<1>, rho: &Density, dt: f64) -> Result<Moved<1>, Failure> {
+        self.advance(equation, mesh, rho, dt)
+    }
+}
+
+impl MeshGenerator for Schwarz {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<2>, rho: &Density, dt: f64) -> Result<Moved, Failure> {
+        self.advance(equation, mesh, rho, dt)
     }
 }
 

@@ -3,15 +3,15 @@ use super::{MeshGenerator, Mmpde, Moved, move_sides};
 use crate::error::{Failure, Result, Unfit};
 use crate::geometry::{Cells, Density, Mesh, Patch};
 use crate::kept::{Kept, check_nodal};
-use crate::numerics::linear::{LinearSolver, Pcg, Robust, SparseLu};
+use crate::numerics::linear::{Elimination, Fallback, LinearSolver, Pcg, Robust, SparseLu};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One implicit solve of the mesh equation on the whole domain: the sides first, then all other nodes at once
 ///
-/// For one, two or three dimensions. The gradient form is solved to round-off. The conservative form is solved by
-/// conjugate gradients to a hundredth of the shortest edge or better, starting from the mesh to which the motion of the
-/// last step would lead.
+/// For one, two or three dimensions. On a line, and in the gradient form, it is solved to round-off. The conservative
+/// form is solved by conjugate gradients to a hundredth of the shortest edge or better, starting from the mesh to which
+/// the motion of the last step would lead.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Whole")]
@@ -156,6 +156,19 @@ impl Movable<2> for Mesh<2> {
     }
 }
 
+/// A line is solved by elimination, and nothing is remembered.
+impl MeshGenerator<1> for Whole<1> {
+    fn solve(&mut self, equation: &Mmpde, mesh: &Mesh<1>, rho: &Density, dt: f64) -> Result<Moved<1>, Failure> {
+        let (lattice, jump) = (mesh.lattice(), mesh.jump());
+        let operator = equation.operator(lattice, rho, dt)?;
+        let (patch, mut x) = (Patch::whole(lattice), mesh.x().to_vec());
+        let mut solver = Fallback::<Elimination, SparseLu>::default();
+        let (new, work) = operator.solve::<3, 1>(patch, mesh.x(), mesh.x(), jump, &mut solver, size(mesh))?;
+        patch.scatter(lattice, &new, &mut x, jump);
+        Ok(Moved { mesh: mesh.moved(x)?, work, interface: None })
+    }
+}
+
 /// The implementation for D dimensions, with stars of S = 2D + 1 points: Rust cannot compute S from D.
 macro_rules! generator {
     ($D:literal, $S:literal, $direct:ident) => {
@@ -181,6 +194,5 @@ macro_rules! generator {
     };
 }
 
-generator!(1, 3, inside);
 generator!(2, 5, inside);
 generator!(3, 7, elimination);

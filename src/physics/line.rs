@@ -114,7 +114,7 @@ impl LinePdeKind {
 /// ν > 0 (`viscosity`) sets the width of the front, about 9ν between u = .1 and .9. Initial values and those at the
 /// ends come from the exact solution, or from the formulas `initial` and `boundary`. The scheme is that of
 /// [`Convection::Flux`](super::Convection::Flux) in the plane, with the flux ½ a b between the values a and b at two
-/// nodes.
+/// nodes, limited where cells are too wide for it.
 ///
 /// # Source
 /// Whitham, *Linear and Nonlinear Waves* (1974), 4.3.
@@ -186,6 +186,15 @@ impl Law<1, 1> for LineBurgers {
 
     fn diffusivity(&self, _: &f64, _: &f64) -> Crossing<1> {
         Crossing { value: [self.viscosity], by_below: [[0.0]], by_above: [[0.0]] }
+    }
+
+    /// Layers thinner than the cells, before the mesh has come to them, have no overshoots.
+    fn damped(&self) -> [bool; 1] {
+        [true]
+    }
+
+    fn has_own_flux(&self) -> [bool; 1] {
+        [true]
     }
 
     /// No coupled mass: for u = x/t the errors of the product flux and of A u on growing cells cancel.

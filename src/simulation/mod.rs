@@ -224,7 +224,9 @@ where
         };
         self.pause(state, record, observers, &mut keeper, &clock, &course)?;
         while let Some((t, dt)) = course.pace.next(&self.schedule, state) {
-            let Some(next) = self.advance(state, (t, dt), &mut course, record)? else {
+            let next = self.advance(state, (t, dt), &mut course, record);
+            let next = next.inspect_err(|error| self.warn_of_blow_up(error, state, record));
+            let Some(next) = next? else {
                 if observers.iter().any(|observer| observer.interrupts()) {
                     self.pause(state, record, observers, &mut keeper, &clock, &course)?;
                 }

@@ -3,6 +3,7 @@
 use super::doubts::named;
 use super::forced::Hidden;
 use super::{INTERFACE_NOISE_WORTH_A_WARNING, Record, Simulation, State};
+use crate::error::{Cause, Error, Failure};
 use crate::geometry::Mesh;
 use crate::meshing::{Movable, Relaxation};
 use crate::mover;
@@ -20,6 +21,13 @@ const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
 const WIDE: &str = "changes within cells that are too wide for central fluxes";
 const PASSED: &str = "changes within a step";
+/// An unknown that is this many times as large as in all data when a run ends for its growth blows up.
+const GROWN: f64 = 2.0;
+const MISSED: &str = "the mesh has not come to a layer of it";
+/// Share of the range of an unknown within one cell, and length of that cell over the shortest, from which on the mesh
+/// misses a layer: around a jump, which no mesh resolves, it has its shortest cells.
+const MOST_IN_A_CELL: f64 = 0.4;
+const ELSEWHERE: f64 = 3.0;
 const UNKNOWN: &str = "the standard error of interface values is not known";
 
 impl<const D: usize> Simulation<D>
@@ -34,6 +42,7 @@ where
         self.warn_of_growth(state, record);
         if self.schedule.reports_at(state.t) {
             self.warn_of_wide_cells(state, record);
+            self.warn_of_missed_layers(state, record);
         }
     }
 
@@ -102,6 +111,58 @@ where
                 ));
             }
         }
+    }
+
+    /// Says once of each unknown on a line that the moving mesh has its thinnest cells elsewhere than where most of it
+    /// changes.
+    fn warn_of_missed_layers(&self, state: &State<D>, record: &mut Record) {
+        if D != 1 || !self.mover.generator.moves() {
+            return;
+        }
+        let State { t, mesh, u, .. } = state;
+        let lengths: Vec<f64> = mesh.x().windows(2).map(|x| x[1][0] - x[0][0]).collect();
+        let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);
+        for (c, name) in self.physics.unknowns().iter().enumerate() {
+            let values: Vec<f64> = u.component(c).collect();
+            let [low, high] = ends(values.iter().copied());
+            let step = |k: usize| (values[k + 1] - values[k]).abs() / (high - low);
+            let Some(k) = (0..lengths.len()).max_by(|a, b| step(*a).total_cmp(&step(*b))) else { continue };
+            let said = format!("`{name}`: {MISSED}");
+            if !(step(k) > MOST_IN_A_CELL && lengths[k] > ELSEWHERE * shortest)
+                || high - low <= OF_ROUNDING * high.abs().max(low.abs())
+                || record.warnings.iter().any(|warning| warning.starts_with(&said))
+            {
+                continue;
+            }
+            record.warnings.push(format!(
+                "{said}: at t = {t}, {}, {:.0} % of its range lie within one cell, {:.1} times as wide as the thinnest \
+                 of the mesh; refine `grid.cells`, or let the mesh follow it by `monitor.of`",
+                named(mesh.image(mesh.x()[k])),
+                100.0 * step(k),
+                lengths[k] / shortest,
+            ));
+        }
+    }
+
+    /// Says that an unknown grows beyond all bounds, of a run that ended because no step could follow.
+    pub(super) fn warn_of_blow_up(&self, error: &Error, state: &State<D>, record: &mut Record) {
+        let Error::Failed { failure: Failure::VanishingStep { dt, cause: Cause::BlowUp }, .. } = error else { return };
+        let keeps = self.physics.keeps_range();
+        let names = self.physics.unknowns();
+        let grown = |c: usize| {
+            let (k, size) = state.u.component(c).map(f64::abs).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let before = record.data[c].iter().fold(0.0, |most: f64, data| most.max(data.abs()));
+            Some((c, k, size, before)).filter(|_| size > GROWN * before)
+        };
+        let all = (0..names.len()).filter(|c| !keeps.get(*c).copied().unwrap_or(false)).filter_map(grown);
+        let Some((c, k, size, before)) = all.max_by(|a, b| a.2.total_cmp(&b.2)) else { return };
+        let at = named(state.mesh.image(state.mesh.x()[k]));
+        record.warnings.push(format!(
+            "blow-up: `{}` grows beyond all bounds at t = {}, {at}: from {before:.4} it has come to {size:.4e} there, \
+             and steps that follow it to {dt:.1e}; that time is as exact as the steps and cells before are: compare it \
+             with a run with more `grid.cells`, and with `time.tolerance` = 1e-5",
+            names[c], state.t
+        ));
     }
 
     /// Says once in a run that a front is thinner than cells that are too wide for its flux.

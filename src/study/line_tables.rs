@@ -87,12 +87,12 @@ impl PdeTable<1> for LinePdeKind {
 }
 
 impl GeneratorTable<1> for LineGeneratorKind {
-    fn check(&self, _lattice: &Lattice<1>) -> Result<()> {
-        Ok(())
+    fn check(&self, lattice: &Lattice<1>) -> Result<()> {
+        self.check(lattice)
     }
 
     fn subdomains(&self) -> [usize; 2] {
-        [1, 1]
+        [self.subdomains(), 1]
     }
 
     fn stays(&self) -> bool {

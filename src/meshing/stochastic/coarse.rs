@@ -7,6 +7,7 @@ use crate::geometry::{Density, Lattice, Patch};
 use crate::numerics::linear::{LatticeMatrix, LinearSolver, Robust};
 use crate::parallel;
 use crate::work::Work;
+use std::borrow::Cow;
 
 /// The part of a correction that a coarser lattice can represent
 ///
@@ -23,21 +24,21 @@ use crate::work::Work;
 /// leads to the spacing h of the fine lattice. The right-hand sides of the second lattice follow from those of the
 /// first, so that nothing more needs to be gathered.
 #[derive(Debug, Clone)]
-pub(super) struct Coarse {
-    near: Level,
-    far: Level,
+pub(super) struct Coarse<const D: usize, const S: usize> {
+    near: Level<D, S>,
+    far: Level<D, S>,
     /// q.
     gain: f64,
 }
 
 /// A coarse lattice, with the transfers to and from the next finer one.
 #[derive(Debug, Clone)]
-struct Level {
-    lattice: Lattice<2>,
-    down: Transfer,
-    up: Transfer,
-    matrix: LatticeMatrix<2, 5>,
-    plane: Robust<2>,
+struct Level<const D: usize, const S: usize> {
+    lattice: Lattice<D>,
+    down: Transfer<D>,
+    up: Transfer<D>,
+    matrix: LatticeMatrix<D, S>,
+    plane: Robust<D>,
     /// The density on the next finer lattice, and on this one, once there is a step.
     densities: Option<[Density; 2]>,
 }
@@ -50,13 +51,13 @@ const ENOUGH_CELLS: usize = 16;
 /// larger one, rounding would decide where iterations end: ten times the same density could give another mesh.
 pub(super) const SOLVED: f64 = 1e-7;
 
-impl Coarse {
+impl<const D: usize, const S: usize> Coarse<D, S> {
     /// Two lattices, of which one cell stands for `ratio` and for twice as many cells of the fine lattice along each
     /// axis; none where no axis has that many cells.
-    pub fn new(fine: &Lattice<2>, ratio: usize) -> Option<Self> {
+    pub fn new(fine: &Lattice<D>, ratio: usize) -> Option<Self> {
         let near = Level::new(fine, ratio)?;
         let far = Level::new(&near.lattice, 2)?;
-        let square = |lattice: &Lattice<2>| lattice.spacing().iter().map(|h| h * h).sum::<f64>();
+        let square = |lattice: &Lattice<D>| lattice.spacing().iter().map(|h| h * h).sum::<f64>();
         let [h, near_h, far_h] = [fine, &near.lattice, &far.lattice].map(square);
         let gain = (near_h - h) / (far_h - near_h);
         Some(Self { near, far, gain })
@@ -73,7 +74,7 @@ impl Coarse {
     }
 
     /// Sets up the mesh equation of a step on both lattices.
-    pub fn prepare(&mut self, problem: &Problem<'_>) -> Result<(), Failure> {
+    pub fn prepare(&mut self, problem: &Problem<'_, D>) -> Result<(), Failure> {
         self.near.prepare(problem, problem.rho)?;
         self.far.prepare(problem, &self.near.densities()[1])
     }
@@ -81,7 +82,7 @@ impl Coarse {
     /// The correction at all fine nodes for a residual there, zero on bounded sides; and the root mean square of what
     /// the extrapolation changed, as a share of that of the correction. `size` is the largest coordinate along each
     /// axis.
-    pub fn correction(&mut self, residual: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, f64, Work), Failure> {
+    pub fn correction(&mut self, residual: &[[f64; D]], size: [f64; D]) -> Result<(Vec<[f64; D]>, f64, Work), Failure> {
         let near = self.near.restrict(residual);
         let far = self.far.restrict(&near);
         let (mut c, mut work) = self.near.solve(&near, size)?;
@@ -89,7 +90,7 @@ impl Coarse {
         work += cost;
         let (mut changed, mut all) = (0.0, 0.0);
         for (c, rough) in c.iter_mut().zip(self.far.up.apply(&rough)) {
-            for k in 0..2 {
+            for k in 0..D {
                 let change = self.gain * (c[k] - rough[k]);
                 c[k] += change;
                 (changed, all) = (changed + change * change, all + c[k] * c[k]);
@@ -100,21 +101,21 @@ impl Coarse {
     }
 }
 
-impl Level {
-    fn new(fine: &Lattice<2>, ratio: usize) -> Option<Self> {
+impl<const D: usize, const S: usize> Level<D, S> {
+    fn new(fine: &Lattice<D>, ratio: usize) -> Option<Self> {
         let cells = fine.cells().map(|n| n.div_ceil(ratio).max(FEWEST_CELLS.min(n)));
         if cells == fine.cells() {
             return None;
         }
         let lattice = Lattice::new(cells, fine.periodic()).ok()?;
-        let down = Transfer::new([0, 1].map(|d| hats(fine, &lattice, d)), fine.nodes()[1]);
-        let up = Transfer::new([0, 1].map(|d| cubics(fine, &lattice, d)), lattice.nodes()[1]);
+        let down = Transfer::new(std::array::from_fn(|d| hats(fine, &lattice, d)), fine.nodes()[D - 1]);
+        let up = Transfer::new(std::array::from_fn(|d| cubics(fine, &lattice, d)), lattice.nodes()[D - 1]);
         let matrix = LatticeMatrix::zero(Patch::whole(&lattice));
         Some(Self { lattice, down, up, matrix, plane: Robust::default(), densities: None })
     }
 
     /// Sets up the mesh equation with the mean of a density on the next finer lattice.
-    fn prepare(&mut self, problem: &Problem<'_>, fine: &Density) -> Result<(), Failure> {
+    fn prepare(&mut self, problem: &Problem<'_, D>, fine: &Density) -> Result<(), Failure> {
         let down = |part: &Vec<f64>| self.down.apply(part.as_chunks::<1>().0).into_flattened();
         let [_, rho] = self.densities.insert([fine.clone(), fine.map(down)]);
         let rho = &*rho;
@@ -136,20 +137,20 @@ impl Level {
     }
 
     /// Means of values on the next finer lattice, with the density as weight.
-    fn restrict(&self, values: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    fn restrict(&self, values: &[[f64; D]]) -> Vec<[f64; D]> {
         let [fine, here] = self.densities().each_ref().map(Density::largest);
-        let weighted: Vec<[f64; 2]> = values.iter().zip(fine).map(|(v, rho)| v.map(|v| rho * v)).collect();
+        let weighted: Vec<[f64; D]> = values.iter().zip(fine).map(|(v, rho)| v.map(|v| rho * v)).collect();
         let sums = self.down.apply(&weighted);
         sums.into_iter().zip(here).map(|(sum, rho)| sum.map(|sum| sum / rho)).collect()
     }
 
-    fn solve(&mut self, right: &[[f64; 2]], size: [f64; 2]) -> Result<(Vec<[f64; 2]>, Work), Failure> {
-        let (patch, none) = (self.matrix.patch, [[0.0; 2]; 2]);
-        let right: Vec<[f64; 2]> = patch.nodes(&self.lattice).map(|k| right[k]).collect();
-        let mut c = vec![[0.0; 2]; patch.padded_len()];
+    fn solve(&mut self, right: &[[f64; D]], size: [f64; D]) -> Result<(Vec<[f64; D]>, Work), Failure> {
+        let (patch, none) = (self.matrix.patch, [[0.0; D]; D]);
+        let right: Vec<[f64; D]> = patch.nodes(&self.lattice).map(|k| right[k]).collect();
+        let mut c = vec![[0.0; D]; patch.padded_len()];
         let tolerance = share_of_largest(&right, SOLVED, exactness(&self.matrix, size));
         let work = self.plane.solve(&self.matrix, &right, &mut c, tolerance)?;
-        let mut all = vec![[0.0; 2]; self.lattice.len()];
+        let mut all = vec![[0.0; D]; self.lattice.len()];
         patch.scatter(&self.lattice, &c, &mut all, none);
         Ok((all, work))
     }
@@ -158,31 +159,35 @@ impl Level {
 /// The nodes along an axis, with their weights, that a value is made of.
 type Sources = Vec<(usize, f64)>;
 
-/// A linear map between two lattices that is a product of maps along each axis.
+/// A linear map between two lattices of one or two dimensions that is a product of maps along each axis.
 #[derive(Debug, Clone)]
-struct Transfer {
+struct Transfer<const D: usize> {
     /// For each axis, and each node along it on the lattice of the result.
-    rows: [Vec<Sources>; 2],
-    /// Number of nodes along the second axis of the lattice it maps from.
+    rows: [Vec<Sources>; D],
+    /// Number of nodes along the last axis of the lattice it maps from.
     width: usize,
 }
 
-impl Transfer {
-    fn new(rows: [Vec<Sources>; 2], width: usize) -> Self {
+impl<const D: usize> Transfer<D> {
+    fn new(rows: [Vec<Sources>; D], width: usize) -> Self {
         Self { rows, width }
     }
 
     fn apply<const K: usize>(&self, v: &[[f64; K]]) -> Vec<[f64; K]> {
-        let [across, along] = &self.rows;
-        let mut half = vec![[0.0; K]; across.len() * self.width];
-        parallel::for_each_row(&mut half, self.width, |i, row| {
-            for &(from, weight) in &across[i] {
-                for (sum, v) in row.iter_mut().zip(&v[from * self.width..]) {
-                    (0..K).for_each(|c| sum[c] += weight * v[c]);
+        let along = &self.rows[D - 1];
+        let mut half = Cow::Borrowed(v);
+        if let [across, _] = &self.rows[..] {
+            let mut sums = vec![[0.0; K]; across.len() * self.width];
+            parallel::for_each_row(&mut sums, self.width, |i, row| {
+                for &(from, weight) in &across[i] {
+                    for (sum, v) in row.iter_mut().zip(&v[from * self.width..]) {
+                        (0..K).for_each(|c| sum[c] += weight * v[c]);
+                    }
                 }
-            }
-        });
-        let mut out = vec![[0.0; K]; across.len() * along.len()];
+            });
+            half = Cow::Owned(sums);
+        }
+        let mut out = vec![[0.0; K]; half.len() / self.width * along.len()];
         parallel::for_each_row(&mut out, along.len(), |i, row| {
             let half = &half[i * self.width..][..self.width];
             for (sum, sources) in row.iter_mut().zip(along) {
@@ -196,7 +201,7 @@ impl Transfer {
 }
 
 /// Restriction: for each coarse node, the fine nodes nearer than one coarse cell, with its hat function as weight.
-fn hats(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
+fn hats<const D: usize>(fine: &Lattice<D>, coarse: &Lattice<D>, d: usize) -> Vec<Sources> {
     let (cells, nodes, periodic) = (fine.cells()[d], fine.nodes()[d], fine.periodic()[d]);
     let ratio = cells as f64 / coarse.cells()[d] as f64;
     let reach = ratio.ceil() as isize;
@@ -212,7 +217,7 @@ fn hats(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
 }
 
 /// Interpolation: for each fine node the cubic through the four nearest coarse nodes, or through as many as there are.
-fn cubics(fine: &Lattice<2>, coarse: &Lattice<2>, d: usize) -> Vec<Sources> {
+fn cubics<const D: usize>(fine: &Lattice<D>, coarse: &Lattice<D>, d: usize) -> Vec<Sources> {
     let (nodes, periodic) = (coarse.nodes()[d], coarse.periodic()[d]);
     let ratio = fine.cells()[d] as f64 / coarse.cells()[d] as f64;
     let count = nodes.min(4) as isize;

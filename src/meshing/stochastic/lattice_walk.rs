@@ -51,48 +51,53 @@ impl GridWalk {
 }
 
 /// Refuses walks that would take hours.
-fn check_jumps(problem: &Problem<'_>, walks: usize, points: usize) -> Result<(), Failure> {
+fn check_jumps<const D: usize>(problem: &Problem<'_, D>, walks: usize, points: usize) -> Result<(), Failure> {
     let jumps = mean_jumps(problem);
     if walks as f64 * points as f64 * jumps <= MAX_JUMPS {
         return Ok(());
     }
-    let [a, b] = problem.stiffness();
-    Err(Failure::LongWalks { stiffness: a.max(b), jumps, walks, points })
+    let stiffness = problem.stiffness().into_iter().fold(0.0, f64::max);
+    Err(Failure::LongWalks { stiffness, jumps, walks, points })
 }
 
 /// Lower end of the spectrum of the step's matrix, divided by its diagonal. The slowest mode has half a wave across a
 /// bounded axis.
-pub(super) fn lowest(problem: &Problem<'_>) -> f64 {
+pub(super) fn lowest<const D: usize>(problem: &Problem<'_, D>) -> f64 {
     let (lattice, a) = (problem.mesh.lattice(), problem.stiffness());
-    let slowest: f64 = (0..2)
+    let slowest: f64 = (0..D)
         .filter(|&d| !lattice.periodic()[d])
         .map(|d| 4.0 * a[d] * (0.5 * std::f64::consts::PI * lattice.spacing()[d]).sin().powi(2))
         .sum();
-    (1.0 + slowest) / (1.0 + 2.0 * a[0] + 2.0 * a[1])
+    (1.0 + slowest) / a.iter().fold(1.0, |sum, a| sum + 2.0 * a)
 }
 
 /// Approximate mean number of jumps of a walk.
-pub(super) fn mean_jumps(problem: &Problem<'_>) -> f64 {
+pub(super) fn mean_jumps<const D: usize>(problem: &Problem<'_, D>) -> f64 {
     1.0 / lowest(problem)
 }
 
-impl Estimator for GridWalk {
-    fn check(&self, _decomposition: &Decomposition) -> Result<()> {
+impl<const D: usize, const S: usize> Estimator<D, S> for GridWalk {
+    fn check(&self, _decomposition: &Decomposition<D>) -> Result<()> {
         self.check()
     }
 
-    fn estimate(&self, problem: &Problem<'_>, points: &[usize], _strips: &mut Strips) -> Result<Estimates, Failure> {
+    fn estimate(
+        &self,
+        problem: &Problem<'_, D>,
+        points: &[usize],
+        _strips: &mut Strips<D, S>,
+    ) -> Result<Estimates<D>, Failure> {
         let (mesh, jump) = (problem.mesh, problem.mesh.jump());
         let walks = Walks::new(problem, self.walks, points.len())?;
-        let paid = |p: usize, Stop { node, turns }: Stop| -> [f64; 2] {
+        let paid = |p: usize, Stop { node, turns }: Stop<D>| -> [f64; D] {
             if self.increment {
                 return motion(problem, node, jump);
             }
-            [0, 1].map(|c| problem.new[node][c] + f64::from(turns[c]) * jump[c][c] - mesh.x()[points[p]][c])
+            std::array::from_fn(|c| problem.new[node][c] + f64::from(turns[c]) * jump[c][c] - mesh.x()[points[p]][c])
         };
         let (mut estimates, path_steps) = walks.mean(points, self.walks, paid);
         for (estimate, &k) in estimates.iter_mut().zip(points) {
-            estimate.x = [0, 1].map(|c| mesh.x()[k][c] + estimate.x[c]);
+            estimate.x = std::array::from_fn(|c| mesh.x()[k][c] + estimate.x[c]);
         }
         if self.increment {
             forget_certainty(&mut estimates);
@@ -103,10 +108,10 @@ impl Estimator for GridWalk {
 }
 
 /// The residual xⁿ − M x at a node, for the old mesh between the new sides; zero on them.
-fn motion(problem: &Problem<'_>, node: usize, jump: [[f64; 2]; 2]) -> [f64; 2] {
-    let mut sum = [0.0; 2];
+fn motion<const D: usize>(problem: &Problem<'_, D>, node: usize, jump: [[f64; D]; D]) -> [f64; D] {
+    let mut sum = [0.0; D];
     for_each_neighbour(problem, node, |neighbour, turns, weight| {
-        for c in 0..2 {
+        for c in 0..D {
             sum[c] += weight * (problem.new[neighbour][c] + turns[c] * jump[c][c] - problem.new[node][c]);
         }
     });
@@ -115,16 +120,20 @@ fn motion(problem: &Problem<'_>, node: usize, jump: [[f64; 2]; 2]) -> [f64; 2] {
 
 /// Calls `f(neighbour, turns around periodic axes on the way, weight)` for the neighbours of a node. For a node on a
 /// bounded side it does nothing.
-pub(super) fn for_each_neighbour(problem: &Problem<'_>, node: usize, mut f: impl FnMut(usize, [f64; 2], f64)) {
+pub(super) fn for_each_neighbour<const D: usize>(
+    problem: &Problem<'_, D>,
+    node: usize,
+    mut f: impl FnMut(usize, [f64; D], f64),
+) {
     let lattice = problem.mesh.lattice();
     if lattice.on_side(node) {
         return;
     }
     let (at, nodes, strides) = (lattice.node(node), lattice.nodes(), lattice.strides());
-    for d in 0..2 {
+    for d in 0..D {
         let (step, back) = (strides[d], strides[d] * (nodes[d] - 1));
         let [below, above] = problem.operator.weights()[node][d];
-        let turn = |turn: f64| if d == 0 { [turn, 0.0] } else { [0.0, turn] };
+        let turn = |turn: f64| std::array::from_fn(|e| if d == e { turn } else { 0.0 });
         let down = if at[d] == 0 { (node + back, turn(-1.0)) } else { (node - step, turn(0.0)) };
         let up = if at[d] + 1 == nodes[d] { (node - back, turn(1.0)) } else { (node + step, turn(0.0)) };
         f(down.0, down.1, below);
@@ -133,36 +142,37 @@ pub(super) fn for_each_neighbour(problem: &Problem<'_>, node: usize, mut f: impl
 }
 
 /// Removes the standard error of 0 where no walk met a residual: others might have.
-pub(super) fn forget_certainty(estimates: &mut [Estimate]) {
-    if estimates.iter().all(|estimate| estimate.standard_error == [0.0; 2]) {
-        estimates.iter_mut().for_each(|estimate| estimate.standard_error = [f64::NAN; 2]);
+pub(super) fn forget_certainty<const D: usize>(estimates: &mut [Estimate<D>]) {
+    if estimates.iter().all(|estimate| estimate.standard_error == [0.0; D]) {
+        estimates.iter_mut().for_each(|estimate| estimate.standard_error = [f64::NAN; D]);
     }
 }
 
 /// Random walks on the lattice of a problem.
-pub(super) struct Walks<'a> {
-    problem: &'a Problem<'a>,
-    nodes: [usize; 2],
-    periodic: [bool; 2],
+pub(super) struct Walks<'a, const D: usize> {
+    problem: &'a Problem<'a, D>,
+    nodes: [usize; D],
+    strides: [usize; D],
+    periodic: [bool; D],
 }
 
 /// The node at which a walk stopped.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stop {
+pub(super) struct Stop<const D: usize> {
     pub node: usize,
     /// Turns around each periodic axis on the way there.
-    pub turns: [i32; 2],
+    pub turns: [i32; D],
 }
 
-impl<'a> Walks<'a> {
+impl<'a, const D: usize> Walks<'a, D> {
     /// # Errors
     /// [`Failure::SteepDensity`] where the weights are no probabilities; [`Failure::LongWalks`] where `walks` walks
     /// from each of `points` points would take too long.
-    pub fn new(problem: &'a Problem<'a>, walks: usize, points: usize) -> Result<Self, Failure> {
+    pub fn new(problem: &'a Problem<'a, D>, walks: usize, points: usize) -> Result<Self, Failure> {
         check_jumps(problem, walks, points)?;
         problem.operator.check_weights(problem.mesh)?;
         let lattice = problem.mesh.lattice();
-        Ok(Self { problem, nodes: lattice.nodes(), periodic: lattice.periodic() })
+        Ok(Self { problem, nodes: lattice.nodes(), strides: lattice.strides(), periodic: lattice.periodic() })
     }
 
     /// For each point the mean over its walks of `pay(number of the point, stop)`, and the number of jumps and stops.
@@ -170,8 +180,8 @@ impl<'a> Walks<'a> {
         &self,
         points: &[usize],
         walks: usize,
-        pay: impl Fn(usize, Stop) -> [f64; 2] + Sync + Send,
-    ) -> (Vec<Estimate>, usize) {
+        pay: impl Fn(usize, Stop<D>) -> [f64; D] + Sync + Send,
+    ) -> (Vec<Estimate<D>>, usize) {
         let numbers: Vec<usize> = (0..points.len()).collect();
         let found = parallel::map(&numbers, |&p| {
             let mut samples = Samples::new();
@@ -180,31 +190,36 @@ impl<'a> Walks<'a> {
                 let stop = self.walk(points[p], path, &mut steps);
                 samples.add(pay(p, stop));
             }
-            (samples.estimate([0.0; 2]), steps)
+            (samples.estimate([0.0; D]), steps)
         });
         let steps = found.iter().map(|(_, steps)| steps).sum();
         (found.into_iter().map(|(estimate, _)| estimate).collect(), steps)
     }
 
     /// One walk. A random word of 32 bits selects a neighbour, or a stop, by the cumulated weights.
-    fn walk(&self, start: usize, path: usize, steps: &mut usize) -> Stop {
+    fn walk(&self, start: usize, path: usize, steps: &mut usize) -> Stop<D> {
         const SCALE: f64 = 1.0 / 4_294_967_296.0;
-        let Self { problem, nodes, periodic } = self;
+        let Self { problem, nodes, strides, periodic } = self;
         let mut stream = problem.random.stream(problem.step, start as u32, path as u32);
-        let mut at = [start / nodes[1], start % nodes[1]];
-        let mut turns = [0; 2];
+        let mut at = problem.mesh.lattice().node(start);
+        let mut turns = [0; D];
         loop {
             *steps += 1;
-            let node = at[0] * nodes[1] + at[1];
+            let node = (0..D).map(|d| at[d] * strides[d]).sum::<usize>();
             let word = stream.word();
-            if (0..2).any(|d| !periodic[d] && (at[d] == 0 || at[d] + 1 == nodes[d])) {
+            if (0..D).any(|d| !periodic[d] && (at[d] == 0 || at[d] + 1 == nodes[d])) {
                 return Stop { node, turns };
             }
-            let [[below, above], [left, right]] = problem.operator.weights()[node];
-            let sums = [below, below + above, below + above + left, below + above + left + right];
-            let place = f64::from(word) * SCALE * (1.0 + sums[3]);
-            let exit = sums.iter().map(|&sum| usize::from(place >= sum)).sum::<usize>();
-            if exit == 4 {
+            let mut sum = 0.0;
+            let sums = problem.operator.weights()[node].map(|pair| {
+                pair.map(|weight| {
+                    sum += weight;
+                    sum
+                })
+            });
+            let place = f64::from(word) * SCALE * (1.0 + sum);
+            let exit = sums.iter().flatten().map(|&sum| usize::from(place >= sum)).sum::<usize>();
+            if exit == 2 * D {
                 return Stop { node, turns };
             }
             let (d, up) = (exit / 2, exit % 2 == 1);
@@ -224,19 +239,19 @@ impl<'a> Walks<'a> {
 
 /// Running sums of small samples, for mean and variance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Samples {
+pub(super) struct Samples<const D: usize> {
     count: f64,
-    sums: [f64; 2],
-    squares: [f64; 2],
+    sums: [f64; D],
+    squares: [f64; D],
 }
 
-impl Samples {
+impl<const D: usize> Samples<D> {
     pub fn new() -> Self {
-        Self { count: 0.0, sums: [0.0; 2], squares: [0.0; 2] }
+        Self { count: 0.0, sums: [0.0; D], squares: [0.0; D] }
     }
 
     #[inline(always)]
-    pub fn add(&mut self, sample: [f64; 2]) {
+    pub fn add(&mut self, sample: [f64; D]) {
         self.count += 1.0;
         for (c, sample) in sample.into_iter().enumerate() {
             self.sums[c] += sample;
@@ -245,14 +260,15 @@ impl Samples {
     }
 
     /// Their mean, added to a base, with its standard error.
-    pub fn estimate(self, base: [f64; 2]) -> Estimate {
+    pub fn estimate(self, base: [f64; D]) -> Estimate<D> {
         let n = self.count;
         let mean = self.sums.map(|sum| sum / n);
-        let variance = [0, 1].map(|c| ((self.squares[c] / n - mean[c] * mean[c]).max(0.0)) / (n - 1.0));
+        let variance: [f64; D] =
+            std::array::from_fn(|c| ((self.squares[c] / n - mean[c] * mean[c]).max(0.0)) / (n - 1.0));
         Estimate {
-            x: [0, 1].map(|c| base[c] + mean[c]),
+            x: std::array::from_fn(|c| base[c] + mean[c]),
             // a single sample has no spread: NaN
-            standard_error: if n > 1.0 { variance.map(f64::sqrt) } else { [f64::NAN; 2] },
+            standard_error: if n > 1.0 { variance.map(f64::sqrt) } else { [f64::NAN; D] },
         }
     }
 }

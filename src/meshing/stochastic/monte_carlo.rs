@@ -1,5 +1,6 @@
 use super::lattice_walk::Samples;
 use super::paths::{Domain, LANES, Lanes};
+use super::segment::Segment;
 use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
 use crate::meshing::Decomposition;
@@ -100,19 +101,55 @@ impl Estimator for MonteCarlo {
 
     fn estimate(&self, problem: &Problem<'_>, points: &[usize], _strips: &mut Strips) -> Result<Estimates, Failure> {
         let domain = Domain::new(problem, self);
+        self.sampled(problem, points, |from, increments, count, words| domain.walk(from, increments, count, words))
+    }
+}
+
+impl Estimator<1, 3> for MonteCarlo {
+    fn check(&self, _decomposition: &Decomposition<1>) -> Result<()> {
+        self.check()
+    }
+
+    fn estimate(
+        &self,
+        problem: &Problem<'_, 1>,
+        points: &[usize],
+        _strips: &mut Strips<1, 3>,
+    ) -> Result<Estimates<1>, Failure> {
+        let domain = Segment::new(problem, self);
+        self.sampled(problem, points, |from, increments, count, words| domain.walk(from, increments, count, words))
+    }
+}
+
+/// Random words of a step and side that decide the exits of paths.
+type Words<'a> = &'a dyn Fn(u32) -> [[u32; LANES]; 4];
+
+impl MonteCarlo {
+    /// Estimates from walks of [`LANES`] paths at once: `walk` gives the sums that they collect and the steps that they
+    /// take.
+    fn sampled<const D: usize>(
+        &self,
+        problem: &Problem<'_, D>,
+        points: &[usize],
+        walk: impl Fn([f64; D], &[[Lanes; 2]], usize, Words<'_>) -> ([Lanes; D], usize) + Sync,
+    ) -> Result<Estimates<D>, Failure> {
         let bridge = Bridge::new(self.substeps);
-        let found = parallel::map(points, |&k| self.point(problem, &domain, &bridge, k));
+        let found = parallel::map(points, |&k| self.point(problem, &walk, &bridge, k));
         let path_steps = found.iter().map(|(_, steps)| steps).sum();
         let estimates = found.into_iter().map(|(estimate, _)| estimate).collect();
         let work = Work { path_steps, ..Work::default() };
         Ok(Estimates { work, ..Estimates::sampled(estimates, problem.new.to_vec(), self.paths) })
     }
-}
 
-impl MonteCarlo {
     /// The estimate at one node, and the number of path steps that it took.
     #[inline(always)]
-    fn point(&self, problem: &Problem<'_>, domain: &Domain, bridge: &Bridge, k: usize) -> (Estimate, usize) {
+    fn point<const D: usize>(
+        &self,
+        problem: &Problem<'_, D>,
+        walk: &impl Fn([f64; D], &[[Lanes; 2]], usize, Words<'_>) -> ([Lanes; D], usize),
+        bridge: &Bridge,
+        k: usize,
+    ) -> (Estimate<D>, usize) {
         let node = if self.common { u32::MAX } else { k as u32 };
         let base = problem.mesh.x()[k];
         let from = problem.mesh.lattice().node(k).map(|i| i as f64);
@@ -122,7 +159,7 @@ impl MonteCarlo {
         let mut increments = vec![[[0.0; LANES]; 2]; self.substeps];
         let chunks = self.paths.div_ceil(LANES);
         let groups = if self.sobol { SCRAMBLINGS.min(chunks) } else { 1 };
-        let mut samples = vec![Samples::new(); groups];
+        let mut samples = vec![Samples::<D>::new(); groups];
         let mut steps = 0;
         for first in (0..self.paths).step_by(LANES) {
             let paths = std::array::from_fn(|l| first as u32 + l as u32);
@@ -134,9 +171,9 @@ impl MonteCarlo {
                 self.increments(words, paths, &mut increments);
             }
             let count = LANES.min(self.paths - first);
-            let (paid, taken) = domain.walk(from, &increments, count, |exit| words(EXITS | exit, paths));
+            let (paid, taken) = walk(from, &increments, count, &|exit| words(EXITS | exit, paths));
             steps += taken;
-            let mut sample = [0, 1].map(|c| paid[c].map(|x| x - base[c]));
+            let mut sample: [Lanes; D] = std::array::from_fn(|c| paid[c].map(|x| x - base[c]));
             let mut size = 1;
             if self.antithetic {
                 size = 2;
@@ -144,13 +181,13 @@ impl MonteCarlo {
                     (0..count).step_by(2).for_each(|l| c[l] = 0.5 * (c[l] + c[l + 1]));
                 }
             }
-            (0..count).step_by(size).for_each(|l| samples[group].add([sample[0][l], sample[1][l]]));
+            (0..count).step_by(size).for_each(|l| samples[group].add(std::array::from_fn(|c| sample[c][l])));
         }
         let estimate = match samples.as_slice() {
             [all] => all.estimate(base),
             groups => {
-                let mut means = Samples::new();
-                groups.iter().for_each(|group| means.add(group.estimate([0.0; 2]).x));
+                let mut means = Samples::<D>::new();
+                groups.iter().for_each(|group| means.add(group.estimate([0.0; D]).x));
                 means.estimate(base)
             }
         };

@@ -89,7 +89,7 @@ impl Domain {
         from: [f64; 2],
         increments: &[[Lanes; 2]],
         count: usize,
-        words: impl Fn(u32) -> [[u32; LANES]; 4],
+        words: &dyn Fn(u32) -> [[u32; LANES]; 4],
     ) -> ([Lanes; 2], usize) {
         let mut paths = Paths {
             at: from.map(|x| [x; LANES]),

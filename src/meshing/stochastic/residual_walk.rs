@@ -65,7 +65,11 @@ impl ResidualWalk {
     }
 
     /// The strips, how they are corrected, and the number of exchanges.
-    fn strips(&self, problem: &Problem<'_>, strips: &Strips) -> (Reach, Local, Option<usize>) {
+    fn strips<const D: usize, const S: usize>(
+        &self,
+        problem: &Problem<'_, D>,
+        strips: &Strips<D, S>,
+    ) -> (Reach, Local, Option<usize>) {
         match self.sweeps {
             Auto::Auto => (Reach::of(problem, strips.decomposition()), Local::Solve { share: SOLVED }, None),
             Auto::Value(sweeps) => {
@@ -77,12 +81,17 @@ impl ResidualWalk {
     }
 }
 
-impl Estimator for ResidualWalk {
-    fn check(&self, _decomposition: &Decomposition) -> Result<()> {
+impl<const D: usize, const S: usize> Estimator<D, S> for ResidualWalk {
+    fn check(&self, _decomposition: &Decomposition<D>) -> Result<()> {
         self.check()
     }
 
-    fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure> {
+    fn estimate(
+        &self,
+        problem: &Problem<'_, D>,
+        points: &[usize],
+        strips: &mut Strips<D, S>,
+    ) -> Result<Estimates<D>, Failure> {
         let alone = self.sweeps == Auto::Auto && mean_jumps(problem) > WORTH_WALKING;
         // walks that would take too long are refused before anything is computed
         let walks = (!alone).then(|| Walks::new(problem, self.walks, points.len())).transpose()?;
@@ -100,14 +109,14 @@ impl Estimator for ResidualWalk {
 }
 
 /// Adds to estimates the mean residual that walks from the points collect.
-fn pay_residual(
-    problem: &Problem<'_>,
-    walks: &Walks<'_>,
+fn pay_residual<const D: usize, const S: usize>(
+    problem: &Problem<'_, D>,
+    walks: &Walks<'_, D>,
     count: usize,
     points: &[usize],
-    strips: &Strips,
-    found: &Corrected,
-    estimates: &mut Estimates,
+    strips: &Strips<D, S>,
+    found: &Corrected<D>,
+    estimates: &mut Estimates<D>,
 ) {
     let owners: Vec<Option<usize>> = points.iter().map(|&k| strips.owner(k)).collect();
     let handed_on = AtomicUsize::new(0);
@@ -121,7 +130,7 @@ fn pay_residual(
     });
     forget_certainty(&mut paid);
     for (estimate, paid) in estimates.points.iter_mut().zip(paid) {
-        let x = [0, 1].map(|c| estimate.x[c] + paid.x[c]);
+        let x = std::array::from_fn(|c| estimate.x[c] + paid.x[c]);
         *estimate = Estimate { x, standard_error: paid.standard_error };
     }
     estimates.walks = count;
@@ -130,12 +139,17 @@ fn pay_residual(
 }
 
 /// The residual that a correction leaves at a node, r − M c as r_i − c_i + Σ w_e (c_e − c_i); zero on bounded sides.
-fn left(problem: &Problem<'_>, found: &Corrected, node: usize, correction: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+fn left<const D: usize>(
+    problem: &Problem<'_, D>,
+    found: &Corrected<D>,
+    node: usize,
+    correction: impl Fn(usize) -> [f64; D],
+) -> [f64; D] {
     let c = correction(node);
-    let mut left = [0, 1].map(|k| found.residual[node][k] - c[k]);
+    let mut left: [f64; D] = std::array::from_fn(|k| found.residual[node][k] - c[k]);
     for_each_neighbour(problem, node, |neighbour, _, weight| {
         let e = correction(neighbour);
-        (0..2).for_each(|k| left[k] += weight * (e[k] - c[k]));
+        (0..D).for_each(|k| left[k] += weight * (e[k] - c[k]));
     });
     left
 }

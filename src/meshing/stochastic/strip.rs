@@ -45,9 +45,9 @@ impl Strip {
     ///
     /// # Errors
     /// [`Error::Invalid`].
-    pub fn check(&self, decomposition: &Decomposition) -> Result<()> {
+    pub fn check<const D: usize>(&self, decomposition: &Decomposition<D>) -> Result<()> {
         let (narrowest, cells) = (decomposition.narrowest(), decomposition.lattice().cells());
-        let coarsest = cells[0].max(cells[1]) / FEWEST_CELLS;
+        let coarsest = cells.into_iter().max().unwrap_or(0) / FEWEST_CELLS;
         match *self {
             Self { width: Auto::Value(0), .. } => Err(Error::invalid(
                 "width",
@@ -79,7 +79,7 @@ impl Strip {
     }
 
     /// The settings that are given, with the others chosen for the step.
-    fn reach(&self, problem: &Problem<'_>, decomposition: &Decomposition) -> Reach {
+    fn reach<const D: usize>(&self, problem: &Problem<'_, D>, decomposition: &Decomposition<D>) -> Reach {
         let by_itself = Reach::of(problem, decomposition);
         let width = match (self.width, self.coarse) {
             (Auto::Value(width), _) => width,
@@ -96,12 +96,17 @@ impl Strip {
     }
 }
 
-impl Estimator for Strip {
-    fn check(&self, decomposition: &Decomposition) -> Result<()> {
+impl<const D: usize, const S: usize> Estimator<D, S> for Strip {
+    fn check(&self, decomposition: &Decomposition<D>) -> Result<()> {
         self.check(decomposition)
     }
 
-    fn estimate(&self, problem: &Problem<'_>, points: &[usize], strips: &mut Strips) -> Result<Estimates, Failure> {
+    fn estimate(
+        &self,
+        problem: &Problem<'_, D>,
+        points: &[usize],
+        strips: &mut Strips<D, S>,
+    ) -> Result<Estimates<D>, Failure> {
         let reach = self.reach(problem, strips.decomposition());
         let exchanges = match self.exchanges {
             Auto::Auto => None,

@@ -22,16 +22,16 @@ use crate::work::Work;
 /// which is e^(−d/ℓ) in the limit of small h. For another density a factor of about √(max ρ/min ρ) comes in. What has a
 /// longer range is computed first on a coarse lattice, so that strips need only a few nodes for any ℓ.
 #[derive(Debug, Clone)]
-pub struct Strips {
-    decomposition: Decomposition,
+pub struct Strips<const D: usize = 2, const S: usize = 5> {
+    decomposition: Decomposition<D>,
     reach: Reach,
-    parts: Vec<Part>,
+    parts: Vec<Part<D, S>>,
     /// For each node the number of the part that owns it; a number larger than any part on bounded sides.
     owner: Vec<u32>,
-    coarse: Option<Coarse>,
+    coarse: Option<Coarse<D, S>>,
     /// The whole lattice as one part, for long steps on periodic axes, where neither strips nor coarse lattices hold
     /// the mesh.
-    whole: Option<Part>,
+    whole: Option<Part<D, S>>,
 }
 
 /// The width of strips, and what they start from.
@@ -45,13 +45,13 @@ pub(super) struct Reach {
 }
 
 /// The state before an exchange, and its result.
-pub(super) struct Corrected {
+pub(super) struct Corrected<const D: usize> {
     /// Positions of all nodes before the exchange.
-    pub base: Vec<[f64; 2]>,
+    pub base: Vec<[f64; D]>,
     /// The residual xⁿ − M x of these positions.
-    pub residual: Vec<[f64; 2]>,
+    pub residual: Vec<[f64; D]>,
     /// The correction of each node, by the part that owns it.
-    pub correction: Vec<[f64; 2]>,
+    pub correction: Vec<[f64; D]>,
     pub exchanges: usize,
     pub work: Work,
     /// Estimate of the error that is left at interface points.
@@ -73,18 +73,18 @@ const LEFT: f64 = 1e-2;
 const MOST_EXCHANGES: usize = 100;
 
 /// θ along each axis: the influence of a node falls by e^−θ with every node of distance.
-pub(super) fn decay(problem: &Problem<'_>) -> [f64; 2] {
+pub(super) fn decay<const D: usize>(problem: &Problem<'_, D>) -> [f64; D] {
     problem.stiffness().map(|a| (1.0 + 0.5 / a).acosh())
 }
 
 impl Reach {
     /// Strips so wide that nodes beyond have at most the influence [`BEYOND`], or else narrow ones and a coarse
     /// lattice.
-    pub fn of(problem: &Problem<'_>, decomposition: &Decomposition) -> Self {
+    pub fn of<const D: usize>(problem: &Problem<'_, D>, decomposition: &Decomposition<D>) -> Self {
         let width = Self::alone(problem, decomposition);
         let lattice = decomposition.lattice();
         let time = problem.dt / problem.equation.relaxation.over(problem.dt);
-        if lattice.periodic() == [true; 2] && time >= 1.0 {
+        if lattice.periodic() == [true; D] && time >= 1.0 {
             // On periodic axes a mesh is held only by the term in xⁿ, of relative size 1/(1 + ℓ²). Any error that
             // varies slowly shifts it, and neither strips nor coarse lattices see such an error.
             return Self { width: 1, coarse: 0 };
@@ -93,24 +93,24 @@ impl Reach {
     }
 
     /// Width of a strip beyond which nodes have at most the influence [`BEYOND`].
-    pub fn alone(problem: &Problem<'_>, decomposition: &Decomposition) -> usize {
+    pub fn alone<const D: usize>(problem: &Problem<'_, D>, decomposition: &Decomposition<D>) -> usize {
         let decay = decay(problem);
-        let divided = (0..2).filter(|&d| decomposition.is_divided(d));
+        let divided = (0..D).filter(|&d| decomposition.is_divided(d));
         // casts of large floats saturate
         divided.map(|d| (-BEYOND.ln() / decay[d]).ceil() as usize).fold(1, usize::max)
     }
 }
 
-impl Strips {
+impl<const D: usize, const S: usize> Strips<D, S> {
     /// Strips around the cuts of a decomposition.
-    pub fn new(decomposition: &Decomposition) -> Self {
+    pub fn new(decomposition: &Decomposition<D>) -> Self {
         let reach = Reach { width: 0, coarse: 1 };
         let (decomposition, owner) = (decomposition.clone(), Vec::new());
         Self { decomposition, reach, parts: Vec::new(), owner, coarse: None, whole: None }
     }
 
     /// The division into subdomains.
-    pub(super) fn decomposition(&self) -> &Decomposition {
+    pub(super) fn decomposition(&self) -> &Decomposition<D> {
         &self.decomposition
     }
 
@@ -149,18 +149,18 @@ impl Strips {
     /// suggests that more than a hundredth of the shortest edge may be left.
     pub(super) fn correct(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &Problem<'_, D>,
         reach: Reach,
         local: Local,
         exchanges: Option<usize>,
-    ) -> Result<Corrected, Failure> {
+    ) -> Result<Corrected<D>, Failure> {
         self.prepare(reach);
         if let Some(coarse) = &mut self.coarse {
             coarse.prepare(problem)?;
         }
         let mesh = problem.mesh;
         let limit = LEFT * mesh.shortest_edge();
-        let none = vec![[0.0; 2]; mesh.x().len()];
+        let none = vec![[0.0; D]; mesh.x().len()];
         let mut found = Corrected {
             base: problem.new.to_vec(),
             residual: none.clone(),
@@ -196,9 +196,9 @@ impl Strips {
     }
 
     /// Estimate of the influence of nodes beyond the strips.
-    fn beyond(&self, problem: &Problem<'_>) -> f64 {
+    fn beyond(&self, problem: &Problem<'_, D>) -> f64 {
         let decay = decay(problem);
-        let divided = (0..2).filter(|&d| self.decomposition.is_divided(d));
+        let divided = (0..D).filter(|&d| self.decomposition.is_divided(d));
         divided.map(|d| (-decay[d] * self.reach.width as f64).exp()).fold(0.0, f64::max)
     }
 
@@ -211,10 +211,10 @@ impl Strips {
         (30.0 * s * s).clamp(if doubtful { LEFT_IN_DOUBT } else { 0.0 }, 1.0)
     }
 
-    fn exchange(&mut self, problem: &Problem<'_>, local: Local, found: &mut Corrected) -> Result<(), Failure> {
+    fn exchange(&mut self, problem: &Problem<'_, D>, local: Local, found: &mut Corrected<D>) -> Result<(), Failure> {
         let lattice = problem.mesh.lattice();
         let size = size(problem.mesh);
-        let mut guess = vec![[0.0; 2]; lattice.len()];
+        let mut guess = vec![[0.0; D]; lattice.len()];
         let mut changed = None;
         if let Some(coarse) = &mut self.coarse {
             let (smooth, share, cost) = coarse.correction(&found.residual, size)?;
@@ -254,13 +254,13 @@ impl Strips {
 
     /// The correction of a node as a part computed it; none outside the part and the nearer half of its strip, beyond
     /// which the strip sees too little.
-    pub(super) fn seen(&self, part: usize, node: usize) -> Option<[f64; 2]> {
+    pub(super) fn seen(&self, part: usize, node: usize) -> Option<[f64; D]> {
         let part = &self.parts[part];
         let margin = self.reach.width - 1 - self.reach.width / 2;
         part.correction.get(place(&part.patch, self.decomposition.lattice(), node, margin)?).copied()
     }
 }
 
-fn add(x: &mut [[f64; 2]], c: &[[f64; 2]]) {
-    x.iter_mut().zip(c).for_each(|(x, c)| (0..2).for_each(|k| x[k] += c[k]));
+fn add<const D: usize>(x: &mut [[f64; D]], c: &[[f64; D]]) {
+    x.iter_mut().zip(c).for_each(|(x, c)| (0..D).for_each(|k| x[k] += c[k]));
 }

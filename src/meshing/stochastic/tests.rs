@@ -1,4 +1,4 @@
-use super::super::{Form, Relaxation, Whole};
+use super::super::{Form, MeshOperator, Relaxation, Whole};
 use super::*;
 use crate::numerics::difference::Gradient;
 use crate::numerics::larger;
@@ -49,7 +49,7 @@ impl Step {
     }
 
     fn estimate(&self, estimator: &dyn Estimator) -> (Estimates, Strips) {
-        let mut strips = Strips::new(&self.decomposition);
+        let mut strips = Strips::<2, 5>::new(&self.decomposition);
         let found = estimator.estimate(&self.problem(1), &self.decomposition.points(), &mut strips).unwrap();
         (found, strips)
     }
@@ -200,7 +200,7 @@ fn walks_take_the_bias_of_strips_away() {
     for periodic in [[false, false], [true, true]] {
         let step = Step::new(Mmpde::published(), mesh([24, 20], periodic), 8.0, 2e-3, [3, 2]);
         let points: Vec<usize> = step.decomposition.points().into_iter().step_by(7).collect();
-        let mut strips = Strips::new(&step.decomposition);
+        let mut strips = Strips::<2, 5>::new(&step.decomposition);
         let walk = ResidualWalk::default();
         let runs: Vec<Estimates> =
             (0..400).map(|seed| walk.estimate(&step.problem(seed), &points, &mut strips).unwrap()).collect();

@@ -195,7 +195,7 @@ fn nonsense_is_refused_by_key() {
     assert_eq!(strip(Strip { coarse: Auto::Value(0), ..Strip::default() }), "estimator.coarse");
     assert_eq!(strip(Strip { coarse: Auto::Value(3), ..Strip::default() }), "estimator.coarse");
     assert_eq!(strip(Strip { exchanges: Auto::Value(0), ..Strip::default() }), "estimator.exchanges");
-    assert_eq!(key(Schwarz::new([2, 2], 0).check(&lattice)), "overlap");
+    assert_eq!(key(<Schwarz>::new([2, 2], 0).check(&lattice)), "overlap");
     let schwarz = |make: fn([usize; 2], usize) -> Schwarz, edit: fn(&mut Schwarz)| {
         key(with(make([2, 2], 2), edit).check(&lattice))
     };
