@@ -54,10 +54,10 @@ impl PoissonStudy {
         let mut sides: [[OnSide; 2]; 2] = [const { [const { OnSide::Value(None) }; 2] }; 2];
         let closed = self.closed();
         self.check_conditions(closed)?;
-        for axis in 0..2 {
-            for end in 0..2 {
-                sides[axis][end] = self.side((axis, end))?;
-                let unknown = matches!(sides[axis][end], OnSide::Value(None) | OnSide::Flux(None));
+        for (axis, ends) in sides.iter_mut().enumerate() {
+            for (end, side) in ends.iter_mut().enumerate() {
+                *side = self.side((axis, end))?;
+                let unknown = matches!(side, OnSide::Value(None) | OnSide::Flux(None));
                 if unknown && exact.is_none() && !closed[axis] {
                     return Err(missing(if self.is_neumann((axis, end)) { "flux" } else { "boundary" }));
                 }
