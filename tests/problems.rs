@@ -115,8 +115,8 @@ fn an_american_put_is_that_of_a_binomial_tree() {
     assert!(off[0] < 5e-3 && off[0] < 1.001 * off[1], "{off:?}");
 }
 
-/// A uniform scheme of second order for gas of γ = 1.4 in equal cells: van Leer's limited slopes of density, velocity and
-/// pressure, fluxes of Harten, Lax and van Leer, Heun's steps. Returns the density in the cells.
+/// A uniform scheme of second order for gas of γ = 1.4 in equal cells: van Leer's limited slopes of density, velocity
+/// and pressure, fluxes of Harten, Lax and van Leer, Heun's steps. Returns the density in the cells.
 fn van_leer(cells: usize, length: f64, end: f64, left: [f64; 3], right: [f64; 3]) -> Vec<f64> {
     let pressure = |u: [f64; 3]| 0.4 * (u[2] - 0.5 * u[1] * u[1] / u[0]);
     let conserved = |w: [f64; 3]| [w[0], w[0] * w[1], w[2] / 0.4 + 0.5 * w[0] * w[1] * w[1]];

@@ -152,8 +152,8 @@ impl PoissonStudy {
         }
         let value = "a flux on all sides";
         let rule = format!(
-            "{inflow:.6e} flows in and the integral of the source is {source:.6e}, a defect of {:.1e}: nothing is steady \
-             then; change equation.source or a flux, or give u on a side",
+            "{inflow:.6e} flows in and the integral of the source is {source:.6e}, a defect of {:.1e}: nothing is \
+             steady then; change equation.source or a flux, or give u on a side",
             inflow - source
         );
         Err(Error::invalid("equation.boundary", value, rule))
