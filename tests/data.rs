@@ -42,7 +42,7 @@ fn monotone_cubics_are_those_of_scipy() {
 #[test]
 fn derivatives_go_through_tables() {
     let table = table(&[0.0, 1.0, 3.0], &[0.0, 2.0, 0.0], Interpolation::Linear);
-    with_tables(&[table.clone()], || {
+    with_tables(std::slice::from_ref(&table), || {
         let f = Formula::parse("u^2*bed(2*x)", &["x", "u"]).unwrap();
         let [by_x, by_u] = [0, 1].map(|variable| f.derivative(variable).unwrap());
         assert_eq!([f.eval(&[0.25, 3.0]), by_x.eval(&[0.25, 3.0]), by_u.eval(&[0.25, 3.0])], [9.0, 36.0, 6.0]);
@@ -131,9 +131,11 @@ fn result(directory: &Path, text: &str) -> Vec<f64> {
     let mut numbers = Vec::new();
     if let Ok(file) = File::open(out.join("final.npz")) {
         let mut npz = NpzReader::new(file).unwrap();
-        for name in ["x", "u"] {
-            let array = npz.by_name::<ndarray::OwnedRepr<f64>, ndarray::IxDyn>(name).unwrap();
-            numbers.extend(array);
+        for name in npz.names().unwrap() {
+            // what is no number of the solution is of another type
+            if let Ok(array) = npz.by_name::<ndarray::OwnedRepr<f64>, ndarray::IxDyn>(&name) {
+                numbers.extend(array);
+            }
         }
     } else {
         let summary: serde_json::Value =

@@ -2,7 +2,7 @@
 
 use super::graph::{Binary, Comparison, Graph, Id, Node, Unary};
 use super::table::{Table, all_named, named};
-use super::tokens::{COMPARISONS, Token, is_letter, is_start, shortened, tokens};
+use super::tokens::{ABSENT, COMPARISONS, Token, is_letter, is_start, shortened, tokens};
 use super::{MAX_DEPTH, MAX_LENGTH, Mistake};
 use std::ops::Range;
 use std::sync::Arc;
@@ -39,33 +39,6 @@ const FUNCTIONS: [(&str, Function); 20] = [
     ("max", Function::Binary(Binary::Max)),
     ("mod", Function::Binary(Binary::Modulo)),
     ("if", Function::If),
-];
-
-/// Names from other languages for which the nearest name here would mislead, with what to write instead.
-const ABSENT: [(&str, &str); 23] = [
-    ("ln", "the natural logarithm is log(…)"),
-    ("log10", "write log(…)/log(10)"),
-    ("log2", "write log(…)/log(2)"),
-    ("lg", "write log(…)/log(10)"),
-    ("pow", "write ^ for powers"),
-    ("cbrt", "write (…)^(1/3)"),
-    ("erfc", "write 1 - erf(…)"),
-    ("ceil", "write -floor(-(…))"),
-    ("round", "write floor(… + 0.5)"),
-    ("sign", "write if(x < 0, -1, 1)"),
-    ("sgn", "write if(x < 0, -1, 1)"),
-    ("heaviside", "write if(x < 0, 0, 1)"),
-    ("arcsin", "write asin(…)"),
-    ("arccos", "write acos(…)"),
-    ("arctan", "write atan(…)"),
-    ("arctan2", "write atan2(…, …)"),
-    ("cot", "write 1/tan(…)"),
-    ("sec", "write 1/cos(…)"),
-    ("csc", "write 1/sin(…)"),
-    ("sech", "write 1/cosh(…)"),
-    ("coth", "write 1/tanh(…)"),
-    ("and", "put one if(…) into another"),
-    ("or", "put one if(…) into another"),
 ];
 
 /// Parses a formula into a graph, and returns the node of its value as well.

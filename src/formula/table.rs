@@ -202,7 +202,7 @@ impl Table {
         if x.is_nan() {
             return None;
         }
-        let beyond = if x < low { Some((0, low - x)) } else { (x > high).then(|| (1, x - high)) };
+        let beyond = if x < low { Some((0, low - x)) } else { (x > high).then_some((1, x - high)) };
         if let Some((end, by)) = beyond {
             // bits of numbers from 0 on have the order of the numbers
             self.outside[axis][end].fetch_max(by.to_bits(), Ordering::Relaxed);

@@ -36,6 +36,33 @@ const FOREIGN: [(&str, &str); 17] = [
     ("π", "write pi"),
 ];
 
+/// Names from other languages for which the nearest name here would mislead, with what to write instead.
+pub(super) const ABSENT: [(&str, &str); 23] = [
+    ("ln", "the natural logarithm is log(…)"),
+    ("log10", "write log(…)/log(10)"),
+    ("log2", "write log(…)/log(2)"),
+    ("lg", "write log(…)/log(10)"),
+    ("pow", "write ^ for powers"),
+    ("cbrt", "write (…)^(1/3)"),
+    ("erfc", "write 1 - erf(…)"),
+    ("ceil", "write -floor(-(…))"),
+    ("round", "write floor(… + 0.5)"),
+    ("sign", "write if(x < 0, -1, 1)"),
+    ("sgn", "write if(x < 0, -1, 1)"),
+    ("heaviside", "write if(x < 0, 0, 1)"),
+    ("arcsin", "write asin(…)"),
+    ("arccos", "write acos(…)"),
+    ("arctan", "write atan(…)"),
+    ("arctan2", "write atan2(…, …)"),
+    ("cot", "write 1/tan(…)"),
+    ("sec", "write 1/cos(…)"),
+    ("csc", "write 1/sin(…)"),
+    ("sech", "write 1/cosh(…)"),
+    ("coth", "write 1/tanh(…)"),
+    ("and", "put one if(…) into another"),
+    ("or", "put one if(…) into another"),
+];
+
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Token {
     Number(f64),

@@ -31,8 +31,8 @@ const NE: usize = 8;
 ///
 /// Since Σ a_j d_j d_jᵀ is twice the unit matrix, D_j ≈ D + ∇D·d_j/2 makes D Δu + ∇D·∇u of it. With
 /// [`Laplacian::Mapped`] the edge is that of a face, and all that flows through the face has its D_j, which is
-/// conservative: of second order also where D jumps along lines of the mesh, or across them. The other kinds have weights on
-/// the diagonals, and are of the first order at such jumps.
+/// conservative: of second order on smooth meshes, also where D jumps along lines of the mesh. The other kinds have
+/// weights on the diagonals, and are of the first order at such jumps.
 ///
 /// # Errors
 /// [`Failure::NotPositive`] where D is not above 0; [`Error::Invalid`] for the 25 points of [`Laplacian::Compact25`].

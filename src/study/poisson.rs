@@ -36,8 +36,8 @@ pub struct PoissonStudy {
     /// The sides on which the normal derivative is given.
     #[serde(default)]
     pub sides: Sides,
-    /// The discrete Laplacian, whose weights follow from the positions of the neighbours of a node; where nothing is said
-    /// "optimised", and "mapped" with a diffusivity.
+    /// The discrete Laplacian, whose weights follow from the positions of the neighbours of a node; where nothing is
+    /// said "optimised", and "mapped" with a diffusivity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laplacian: Option<LaplacianTable>,
     /// How the linear system is solved.

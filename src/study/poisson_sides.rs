@@ -54,10 +54,10 @@ impl PoissonStudy {
         let mut sides: [[OnSide; 2]; 2] = [const { [const { OnSide::Value(None) }; 2] }; 2];
         let closed = self.closed();
         self.check_conditions(closed)?;
-        for axis in 0..2 {
-            for end in 0..2 {
-                sides[axis][end] = self.side((axis, end))?;
-                let unknown = matches!(sides[axis][end], OnSide::Value(None) | OnSide::Flux(None));
+        for (axis, ends) in sides.iter_mut().enumerate() {
+            for (end, side) in ends.iter_mut().enumerate() {
+                *side = self.side((axis, end))?;
+                let unknown = matches!(side, OnSide::Value(None) | OnSide::Flux(None));
                 if unknown && exact.is_none() && !closed[axis] {
                     return Err(missing(if self.is_neumann((axis, end)) { "flux" } else { "boundary" }));
                 }
@@ -152,8 +152,8 @@ impl PoissonStudy {
         }
         let value = "a flux on all sides";
         let rule = format!(
-            "{inflow:.6e} flows in and the integral of the source is {source:.6e}, a defect of {:.1e}: nothing is steady \
-             then; change equation.source or a flux, or give u on a side",
+            "{inflow:.6e} flows in and the integral of the source is {source:.6e}, a defect of {:.1e}: nothing is \
+             steady then; change equation.source or a flux, or give u on a side",
             inflow - source
         );
         Err(Error::invalid("equation.boundary", value, rule))

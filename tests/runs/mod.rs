@@ -1,5 +1,7 @@
 //! Runs of moving meshes from the text of a study without its `[study]`.
 
+#![allow(dead_code)] // each test takes what it needs
+
 use driftmesh::study::{Kind, MovingLine, MovingMesh, MovingRun, Source};
 
 pub const HEAD: &str = "[study]\nname = \"test\"\nkind = \"moving-mesh\"\n";

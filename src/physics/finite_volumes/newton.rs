@@ -180,6 +180,8 @@ struct Scale<const B: usize> {
     size: f64,
     /// The largest residual at the start, in units of `sizes`.
     at_first: f64,
+    /// Unknowns that are 0 and have no residual at the start, such as what a reaction makes of others.
+    blank: [bool; B],
     /// The largest coefficient of the matrix: where the flux through a cell in a step is large, round-off alone leaves
     /// residuals above the tolerance.
     stiffest: f64,
@@ -189,7 +191,7 @@ impl<const B: usize> Scale<B> {
     fn of(u: &[[f64; B]]) -> Self {
         let sizes = largest_of(u);
         let size = sizes.into_iter().fold(f64::MIN_POSITIVE, larger);
-        Self { sizes, size, at_first: f64::INFINITY, stiffest: 1.0 }
+        Self { sizes, size, at_first: f64::INFINITY, blank: [false; B], stiffest: 1.0 }
     }
 
     fn overall(&self, largest: [f64; B]) -> f64 {
@@ -206,8 +208,16 @@ impl<const B: usize> Scale<B> {
     fn wanted(&mut self, iterations: usize, largest: [f64; B], tolerance: f64) -> [f64; B] {
         if iterations == 0 {
             self.size = largest.into_iter().fold(self.size, larger);
-            self.sizes = std::array::from_fn(|c| larger(self.sizes[c], largest[c]).max(f64::EPSILON * self.size));
+            let floor = f64::EPSILON * self.size;
+            self.sizes = std::array::from_fn(|c| larger(self.sizes[c], largest[c]).max(floor));
+            self.blank = self.sizes.map(|size| size <= floor);
             self.at_first = self.overall(largest);
+        }
+        for c in (0..B).filter(|&c| iterations > 0 && largest[c].is_finite()) {
+            // its first change gives it a size
+            if std::mem::take(&mut self.blank[c]) {
+                self.sizes[c] = self.sizes[c].max(largest[c]);
+            }
         }
         let share = if iterations == 0 { 0.0 } else { tolerance };
         std::array::from_fn(|c| (share * self.sizes[c]).max(self.rounding() * self.size).max(f64::MIN_POSITIVE))

@@ -15,8 +15,8 @@ pub(super) struct Kinds<const B: usize> {
     pub has_own_flux: [bool; B],
     /// Unknowns whose diffusivity is 0 wherever some unknown has a certain value.
     pub vanishes: [bool; B],
-    /// Values of each unknown at which its own diffusivity is 0; empty for unknowns with terms that take gradients, or
-    /// with a storage.
+    /// Values of each unknown at which its own diffusivity is 0, whatever gradients that takes; empty for unknowns with
+    /// other terms that take gradients, or with a storage.
     pub vanishing: [Vec<f64>; B],
     /// Unknowns whose mass neighbours share where cells grow: those with implicit fluxes, without a storage, and with a
     /// diffusivity that is the same in all directions and vanishes at no value, unless the source is nonlinear. None in
@@ -47,8 +47,24 @@ impl<const B: usize> Kinds<B> {
         // derivatives by unknowns follow all quantities themselves, unknown by unknown
         let by_unknown = |c: usize, e: usize| &nodal[((D + 2) * (1 + e) + D + 1) * B + c];
         let bends = |c: usize| (0..B).any(|e| by_unknown(c, c).depends_on(D + e));
-        let vanishing = |c: usize, e: usize| zeros(&nodal[D * B + c], D + e);
-        let vanishes: [bool; B] = std::array::from_fn(|c| diffuses(c) && (0..B).any(|e| !vanishing(c, e).is_empty()));
+        // what diffuses by a diffusivity that takes gradients, along each axis
+        let steep = |c: usize| match terms.fluxes.get(c) {
+            Some(Some(along)) if !diffuses(c) => {
+                (0..D).all(|d| along[d].depends_on(D + B + c * D + d)).then_some(&along[..])
+            }
+            _ => None,
+        };
+        let vanishing = |c: usize, e: usize| match steep(c) {
+            None => zeros(&nodal[D * B + c], D + e),
+            Some(along) => {
+                let mut values = zeros(&along[0], D + e);
+                values.retain(|value| along.iter().all(|flux| zeros(flux, D + e).contains(value)));
+                values
+            }
+        };
+        let spreads = |c: usize| diffuses(c) || steep(c).is_some();
+        let vanishes: [bool; B] = std::array::from_fn(|c| spreads(c) && (0..B).any(|e| !vanishing(c, e).is_empty()));
+        let only_spreads = |c: usize| steep(c).is_some() && !terms.has_source(c) && !terms.has_storage(c);
         let limited: [bool; B] = std::array::from_fn(|c| match scheme {
             None => !diffuses(c) && !terms.has_flux(c) && !terms.has_storage(c),
             Some(scheme) => *scheme == Scheme::Limited,
@@ -87,7 +103,9 @@ impl<const B: usize> Kinds<B> {
             damped: limited.map(|limited| !limited && scheme.is_none()),
             has_own_flux: std::array::from_fn(flux_is_own),
             vanishes,
-            vanishing: std::array::from_fn(|c| if is_plain(c) { vanishing(c, c) } else { Vec::new() }),
+            vanishing: std::array::from_fn(
+                |c| if is_plain(c) || only_spreads(c) { vanishing(c, c) } else { Vec::new() },
+            ),
             shares: std::array::from_fn(shares),
             bends: std::array::from_fn(bends),
             reacts_alike: std::array::from_fn(reacts_alike),
