@@ -148,7 +148,7 @@ fn changes(act: Act, key: &str, now: &Table) -> Vec<String> {
         Act::Number(_) => vec!["1e-3".into()],
         Act::LeaveOut(_) | Act::Say(_) => Vec::new(),
         Act::Change(_, setting) => vec![match (setting, key) {
-            (Setting::Followed, _) => "\"x + y\"".into(),
+            (Setting::Followed, _) => "\"exp(x)\"".into(),
             (Setting::End, "time.end") => {
                 let start = at(now, "time.start").and_then(Value::as_float).unwrap_or(0.0);
                 let end = at(now, key).and_then(|v| v.as_float().or(v.as_integer().map(|v| v as f64))).unwrap();

@@ -1,5 +1,5 @@
-//! The `driftmesh` program: a thin door to the library. Its own binary calls it, and the command that the Python package
-//! installs.
+//! The `driftmesh` program: a thin door to the library. Its own binary calls it, and the command that the Python
+//! package installs.
 
 mod check;
 mod interrupts;

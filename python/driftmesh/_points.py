@@ -154,7 +154,7 @@ class Points:
         array([0.15, 0.5 ])
         """
         mesh = cast("Mesh", self)
-        return interpolate(mesh, u, mesh._coordinates(x, y), order)
+        return interpolate(mesh, u, coordinates(mesh.dimensions, x, y), order)
 
     def sample(self, u: ArrayLike, shape: int | Sequence[int], *, order: int = 1) -> Floats:
         """Values of nodal fields on the regular grid of a number of points along each axis of the box.
@@ -176,3 +176,11 @@ class Points:
                [1. , 1. ]])
         """
         return sample(cast("Mesh", self), u, shape, order)
+
+
+def coordinates(dimensions: int, x: ArrayLike, y: ArrayLike | None) -> list[ArrayLike]:
+    """As many coordinates of points as there are dimensions."""
+    if (y is None) != (dimensions == 1):
+        rule = "is missing: this mesh lies in the plane" if y is None else "is given, but this mesh is a line"
+        raise ValueError(f"`y` {rule}")
+    return [x] if y is None else [x, y]

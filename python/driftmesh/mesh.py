@@ -291,7 +291,7 @@ class Mesh(_points.Points):
         """
         if self._chart is not None:
             return self.mapped(x, y, closed=self.closed)
-        given = zip("xy", self._coordinates(x, y))
+        given = zip("xy", _points.coordinates(self.dimensions, x, y))
         nodes = np.stack([finite(name, values, self.shape) for name, values in given], axis=-1)
         _boxes.close(nodes, self._lower, self._upper, self._periodic)
         return self._of(nodes, self)
@@ -323,8 +323,7 @@ class Mesh(_points.Points):
             ImportError: meshio is not there.
 
         >>> from driftmesh import Mesh
-        >>> mesh = Mesh.uniform(cells=(4, 4))
-        >>> mesh.to_meshio(u=mesh.x).cells_dict["quad"].shape
+        >>> Mesh.uniform(cells=(4, 4)).to_meshio().cells_dict["quad"].shape
         (16, 4)
         """
         return _exchange.to_meshio(self, fields)
@@ -337,8 +336,7 @@ class Mesh(_points.Points):
             ImportError: pyvista is not there.
 
         >>> from driftmesh import Mesh
-        >>> mesh = Mesh.uniform(cells=(4, 4))
-        >>> mesh.to_pyvista(u=mesh.x).n_cells
+        >>> Mesh.uniform(cells=(4, 4)).to_pyvista().n_cells
         16
         """
         return _exchange.to_pyvista(self, fields)
@@ -372,13 +370,6 @@ class Mesh(_points.Points):
         from . import plot
 
         return plot.mesh(self, None if u is None else finite("u", u, self.shape), ax)
-
-    def _coordinates(self, x: ArrayLike, y: ArrayLike | None) -> list[ArrayLike]:
-        """As many as there are dimensions."""
-        if (y is None) != (self.dimensions == 1):
-            rule = "is missing: this mesh lies in the plane" if y is None else "is given, but this mesh is a line"
-            raise ValueError(f"`y` {rule}")
-        return [x] if y is None else [x, y]
 
     def _given(self) -> tuple[Floats, _boxes.Corner, _boxes.Corner, _boxes.Flags, _driftmesh.Chart | None]:
         """The mesh in its box, or the places of its nodes in the unit square with the domain that is its image."""

@@ -95,7 +95,7 @@ struct Parts<const D: usize, const S: usize> {
 /// struct Oracle;
 ///
 /// impl Estimator for Oracle {
-///     fn estimate(&self, problem: &Problem<'_, D>, points: &[usize], _: &mut Strips) -> Result<Estimates, Failure> {
+///     fn estimate(&self, problem: &Problem<'_>, points: &[usize], _: &mut Strips) -> Result<Estimates, Failure> {
 ///         let moved = Whole::to(1e-9).step(problem.equation, problem.mesh, problem.rho, problem.dt)?;
 ///         let at = |&k: &usize| Estimate { x: moved.mesh.x()[k], standard_error: [f64::NAN; 2] };
 ///         let guess = moved.mesh.x().to_vec();
