@@ -2,7 +2,7 @@
 
 use super::State;
 use crate::density::{Need, largest_step};
-use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
+use crate::geometry::{Cells, DualCells, Field, Mesh, Patch, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
@@ -40,11 +40,12 @@ const INTERPOLATION: f64 = 0.2;
 /// min(0.003, E₀/4) Δt/T + c n U Δt + max(E − E₀, 0)
 /// ```
 ///
-/// E₀ and E are the errors with which equal cells and this mesh interpolate the unknown, so that over a run the error
-/// stays below a quarter of the one of equal cells. U is what the solution changes by itself in a unit of time, of
+/// E₀ and E are the errors with which equal cells and this mesh interpolate the unknown, estimated from its largest
+/// change over a cell, so that over a run the error stays below a quarter of the one of equal cells. U is what the solution changes by itself in a unit of time, of
 /// which a mesh that follows may add the share c, from 0.2 to 0.5; n is the [`Need`], which is 0 where equal cells
 /// resolve all unknowns. The last term is for the way back to equal cells, where these have become better than this
-/// mesh.
+/// mesh; there E and E₀ from second differences along the lattice count, too, which see wide cells at the crest of a
+/// wave.
 pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
 where
     Mesh<D>: Cells<D>,
@@ -91,13 +92,37 @@ where
         let unresolved = ((jump - UNRESOLVED[0]) / (UNRESOLVED[1] - UNRESOLVED[0])).clamp(0.0, 1.0);
         let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
-        let excess = (INTERPOLATION * jump * jump - uniform).max(0.0);
+        let [here, equal] = of_bends(places, &patch, &u, h);
+        let excess = (INTERPOLATION * jump * jump - uniform).max((here - equal) / range).max(0.0);
         let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + of_change * hurry * state.own_change * dt + excess;
         if harm > budget {
             share = share.min(budget / harm);
         }
     }
     share
+}
+
+/// The largest errors h² |u''|/8 of linear interpolation along the lattice, from padded values: with the longer of the
+/// two edges beside a node, and with equal cells of size `h` along each axis.
+fn of_bends<const D: usize>(mesh: &Mesh<D>, patch: &Patch<D>, u: &[f64], h: [f64; D]) -> [f64; 2]
+where
+    Mesh<D>: Cells<D>,
+{
+    let x = padded(mesh.lattice(), mesh.x(), mesh.jump());
+    let [mut here, mut equal] = [0.0; 2];
+    for k in patch.places() {
+        for (d, s) in patch.padded_strides().into_iter().enumerate() {
+            let [below, above] =
+                [k - s, k + s].map(|n| length(std::array::from_fn::<f64, D, _>(|c| x[n][c] - x[k][c])));
+            // beyond a side there is no edge
+            if below > 0.0 && above > 0.0 {
+                let bend = (2.0 * ((u[k + s] - u[k]) / above - (u[k] - u[k - s]) / below) / (above + below)).abs();
+                here = larger(here, below.max(above).powi(2) * bend / 8.0);
+                equal = larger(equal, h[d] * h[d] * bend / 8.0);
+            }
+        }
+    }
+    [here, equal]
 }
 
 /// The largest change of an unknown at a fixed place in a step, as a share of its range, over the length of the step.
