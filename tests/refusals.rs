@@ -183,10 +183,10 @@ fn what_does_not_fit_is_refused() {
     let mut x = mesh.x().to_vec();
     x[7] = [0.5, f64::NAN];
     match mesh.moved(x).unwrap_err() {
-        Failure::NonFinite { what: "the mesh", at, value } if at.node == [1, 2] => assert!(value.is_nan()),
+        Failure::NonFinite { what: "the mesh", at, value } if *at.node == [1, 2] => assert!(value.is_nan()),
         other => panic!("{other}"),
     }
     let line = Mesh::uniform(Lattice::bounded([2]).unwrap(), [0.0], [1.0]).unwrap();
     let failure = line.moved(vec![[0.0], [f64::INFINITY], [1.0]]).unwrap_err();
-    assert!(matches!(failure, Failure::NonFinite { ref at, .. } if at.node == [1] && at.x.len() == 1), "{failure}");
+    assert!(matches!(failure, Failure::NonFinite { ref at, .. } if *at.node == [1] && at.x.len() == 1), "{failure}");
 }

@@ -121,7 +121,7 @@ fn only_the_uniform_mesh_will_do() {
     let u = physics.initial(0.0, &uniform);
     for (old, new) in [(&uniform, &bent), (&bent, &uniform), (&bent, &bent)] {
         let failure = physics.step(Motion { t: 0.0, dt: 0.1, old, new }, &u).unwrap_err();
-        assert!(matches!(failure, Failure::NotUniform { axis: 1, ref at, .. } if at.node == [4, 4]), "{failure}");
+        assert!(matches!(failure, Failure::NotUniform { axis: 1, ref at, .. } if *at.node == [4, 4]), "{failure}");
     }
     let mut bare = UniformBurgers::new(burgers(0.1).from("x", None).unwrap(), 2).unwrap();
     let failure = bare.step(Motion { t: 0.0, dt: 0.1, old: &uniform, new: &uniform }, &u).unwrap_err();

@@ -5,14 +5,14 @@ use std::fmt;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NodePlace {
     /// Its indices, one for each axis.
-    pub node: Vec<usize>,
+    pub node: Box<[usize]>,
     /// Its coordinates, one for each axis.
-    pub x: Vec<f64>,
+    pub x: Box<[f64]>,
 }
 
 impl NodePlace {
     /// A node by its indices and coordinates.
-    pub fn new(node: impl Into<Vec<usize>>, x: impl Into<Vec<f64>>) -> Self {
+    pub fn new(node: impl Into<Box<[usize]>>, x: impl Into<Box<[f64]>>) -> Self {
         Self { node: node.into(), x: x.into() }
     }
 }

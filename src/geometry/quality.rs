@@ -319,7 +319,7 @@ mod tests {
         );
         x[12] = [f64::NAN, 0.5];
         let error = mesh.moved(x).unwrap_err();
-        assert!(matches!(error, Failure::NonFinite { ref at, .. } if at.node == [2, 2]), "{error}");
+        assert!(matches!(error, Failure::NonFinite { ref at, .. } if *at.node == [2, 2]), "{error}");
         assert!(check_unfolded(&mesh).is_ok());
     }
 }

@@ -52,7 +52,7 @@ pub trait MeshGenerator<const D: usize = 2>: Send {
     /// use driftmesh::{Failure, meshing::{MeshGenerator, Mmpde, Whole}};
     /// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0; 2], [1.0; 2])?;
     /// let refused = Whole::default().step(&Mmpde::default(), &mesh, &vec![0.0; 25].into(), 1e-3);
-    /// assert!(matches!(refused, Err(Failure::NotPositive { at, .. }) if at.node == [0, 0]));
+    /// assert!(matches!(refused, Err(Failure::NotPositive { at, .. }) if *at.node == [0, 0]));
     /// # Ok::<(), driftmesh::Error>(())
     /// ```
     fn step(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &Density, dt: f64) -> Result<Moved<D>, Failure> {

@@ -49,7 +49,7 @@ impl Segment {
             Form::Conservative => Gradient::Log,
         };
         let of_nodes = |values: Vec<[f64; 1]>, scale: f64| -> Vec<f64> {
-            lattice.closed(&values).into_iter().map(|[value]| scale * value).collect()
+            lattice.closed(&values).iter().map(|[value]| scale * value).collect()
         };
         let weigh = settings.antithetic || settings.sobol || settings.control_variate;
         Self {
