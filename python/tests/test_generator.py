@@ -114,18 +114,18 @@ def test_subdomains_give_the_mesh_of_the_whole_domain(method):
     ],
 )
 def test_subdomains_of_a_line_give_the_mesh_of_the_whole(method, periodic):
-    """Within six standard errors, and the bias of paths or what strips leave."""
+    """Within six standard errors, and what strips leave, in a step so short that paths, which follow the mesh equation
+    exactly in time, and an implicit Euler step agree."""
     start = Mesh.uniform(cells=48, periodic=periodic)
     u = np.exp(np.cos(2 * np.pi * (start.x - 0.4)) * 4)
-    step = lambda method: MeshGenerator(Arclength(), method, 1.0).step(start, u, 1e-3)
+    step = lambda method: MeshGenerator(Arclength(), method, 1.0).step(start, u, 1e-4)
     divided = MeshGenerator(Arclength(), method, 1.0)
-    mesh = divided.step(start, u, 1e-3)
+    mesh = divided.step(start, u, 1e-4)
     allowed = 6 * (divided.last["interface"]["standard_error"] or 0) + 0.01 / 48
     assert divided.last["interface"]["points"] > 0
     assert 0 < np.abs(mesh.x - start.x).max() and np.abs(mesh.x - step(Whole()).x).max() < allowed
-    assert mesh == step(method) == pickle.loads(pickle.dumps(MeshGenerator(Arclength(), method, 1.0))).step(
-        start, u, 1e-3
-    )
+    copied = pickle.loads(pickle.dumps(MeshGenerator(Arclength(), method, 1.0)))
+    assert mesh == step(method) == copied.step(start, u, 1e-4)
 
 
 def test_a_mesh_may_stay():

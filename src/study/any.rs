@@ -75,11 +75,19 @@ impl Study {
     /// The JSON Schema of a study file, for editors.
     pub fn schema() -> serde_json::Value {
         let mut generator = SchemaSettings::draft2020_12().for_deserialize().into_generator();
+        let moving = json!({
+            "if": {
+                "properties": { "grid": { "properties": { "cells": { "maxItems": 1 } }, "required": ["cells"] } },
+                "required": ["grid"],
+            },
+            "then": generator.subschema_for::<MovingLine>(),
+            "else": generator.subschema_for::<MovingMesh>(),
+        });
         let kinds = [
-            (StudyKind::MovingMesh, generator.subschema_for::<MovingMesh>()),
-            (StudyKind::Poisson, generator.subschema_for::<PoissonStudy>()),
-            (StudyKind::Stefan, generator.subschema_for::<StefanStudy>()),
-            (StudyKind::Equidistribution, generator.subschema_for::<EquidistributionStudy>()),
+            (StudyKind::MovingMesh, moving),
+            (StudyKind::Poisson, json!(generator.subschema_for::<PoissonStudy>())),
+            (StudyKind::Stefan, json!(generator.subschema_for::<StefanStudy>())),
+            (StudyKind::Equidistribution, json!(generator.subschema_for::<EquidistributionStudy>())),
         ];
         // the kind decides, so that an editor complains of what is wrong in it and not of four kinds
         let each = kinds.map(|(kind, schema)| {
