@@ -2,23 +2,19 @@
 //! `published/references.py` makes with NumPy and SciPy. The layers of Burgers' equation that form and merge are in
 //! `moving_line.rs`.
 
+mod runs;
+
 use driftmesh::error::Error;
 use driftmesh::study::{Kind, MovingLine, MovingRun, Source};
+use runs::{HEAD, line as run};
 use std::path::Path;
 
 /// How a run ended, and its failure.
 type Ended = (MovingRun<1>, Option<Error>);
 
-/// A study of a line: tables without `[study]`.
+/// A study of a line, which may fail: tables without `[study]`.
 fn ended(text: &str) -> Ended {
-    let head = "[study]\nname = \"published\"\nkind = \"moving-mesh\"\n";
-    MovingLine::from_source(&Source::new("published.toml", format!("{head}{text}"))).unwrap().compute().unwrap()
-}
-
-fn run(text: &str) -> MovingRun<1> {
-    let (run, failure) = ended(text);
-    assert!(failure.is_none(), "{failure:?}");
-    run
+    MovingLine::from_source(&Source::new("published.toml", format!("{HEAD}{text}"))).unwrap().compute().unwrap()
 }
 
 /// A file of `studies/` on so many cells.

@@ -7,7 +7,6 @@ use driftmesh::study::{Kind, MovingLine, MovingMesh, MovingRun, Source};
 pub const HEAD: &str = "[study]\nname = \"test\"\nkind = \"moving-mesh\"\n";
 
 /// On a line; it has to complete.
-#[allow(dead_code, reason = "not every test has a line")]
 pub fn line(text: &str) -> MovingRun<1> {
     let study = MovingLine::from_source(&Source::new("line.toml", format!("{HEAD}{text}"))).unwrap();
     let (run, failure) = study.compute().unwrap();
