@@ -25,7 +25,26 @@ use crate::parallel;
 /// w, from 0 to 1, is that of [`wide`]. u₋ is the [limited](super::reconstruction::increments) value at the face on the
 /// side from where the flow comes; it is what passes where D is 0. Where the flow comes from both sides the larger θ
 /// counts.
-pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[f64; B]; D]>);
+pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[Kappa; B]; D]>);
+
+/// κ at a face for one unknown.
+#[derive(Debug, Clone, Copy, Default)]
+struct Kappa {
+    value: f64,
+    /// κ with θ = 1, of an upwind flux; or κ itself where that is larger.
+    upwind: f64,
+}
+
+/// How a flux with damping is differentiated by u.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Derivative {
+    /// With κ as it is: exact where κ stays.
+    Frozen,
+    /// With the κ of an upwind flux in place of κ, so that the matrix has no positive entry beside its diagonal. With it
+    /// an iteration in which κ follows u converges, while one with κ itself does not where the flow crosses more than
+    /// two cells in a step: defect correction.
+    Upwind,
+}
 
 /// a is limited to this multiple of the largest speed of the flow itself along the axis: else a mesh that moves at the
 /// start, however short the step is, would smear what rests.
@@ -108,7 +127,7 @@ impl<const D: usize> Half<'_, D> {
         };
         let (lattice, sides) = (self.mesh.lattice(), sides(law, self.t, self.mesh));
         let steps = Places { lattice, patch, x: self.x, sides: &sides, wanted }.increments(u);
-        let mut damping = vec![[[0.0; B]; D]; u.len()];
+        let mut damping = vec![[[Kappa::default(); B]; D]; u.len()];
         parallel::for_each_row(&mut damping, row, |q, damping| {
             if patch.pencil_in_row(q).is_none() {
                 return;
@@ -184,10 +203,11 @@ impl<const D: usize> Half<'_, D> {
 
 impl Speed {
     /// κ from a/2 − D, a, and (u₋ − u_i)/(u_k − u_i) and (u_k − u₊)/(u_k − u_i).
-    fn damping(&self, excess: f64, a: f64, towards: [f64; 2]) -> f64 {
+    fn damping(&self, excess: f64, a: f64, towards: [f64; 2]) -> Kappa {
         let theta = |end: usize| if self.from[end] { 1.0 - 2.0 * towards[end] } else { LEAST };
         let steepening = (-self.own).max(0.0) * (2.0 * excess / a).min(1.0);
-        steepening + excess * theta(0).max(theta(1)).clamp(LEAST, 1.0)
+        let value = steepening + excess * theta(0).max(theta(1)).clamp(LEAST, 1.0);
+        Kappa { value, upwind: value.max(excess) }
     }
 }
 
@@ -196,17 +216,46 @@ impl<const B: usize, const D: usize> Damping<B, D> {
         Self(Vec::new())
     }
 
+    /// Each κ goes the share `share` of the way to that of `other`; from nothing all of it.
+    pub fn go_towards(&mut self, other: Self, share: f64) {
+        if self.0.is_empty() || share == 1.0 {
+            *self = other;
+            return;
+        }
+        for (kappa, other) in
+            self.0.as_flattened_mut().as_flattened_mut().iter_mut().zip(other.0.as_flattened().as_flattened())
+        {
+            kappa.value += share * (other.value - kappa.value);
+            kappa.upwind = kappa.upwind.max(other.upwind);
+        }
+    }
+
     /// Adds the diffusion to the fluxes of values at all places.
     pub fn add_to<N>(&self, view: &mut View<N, B, D>, patch: &Patch<D>, u: &[[f64; B]]) {
         let strides = patch.padded_strides();
-        for (k, (faces, damping)) in view.faces.iter_mut().zip(&self.0).enumerate() {
+        self.for_each(view, |crossing, (k, axis, c), kappa| {
             // behind the last node of all nothing is asked for
-            for (axis, stride) in strides.into_iter().enumerate().filter(|(_, stride)| k + stride < u.len()) {
-                let Crossing { value, by_below, by_above } = &mut faces[axis].crossing;
-                for (c, damping) in damping[axis].iter().enumerate().filter(|(_, damping)| **damping != 0.0) {
-                    value[c] -= damping * (u[k + stride][c] - u[k][c]);
-                    by_below[c][c] += damping;
-                    by_above[c][c] -= damping;
+            if let Some(above) = u.get(k + strides[axis]) {
+                crossing.value[c] -= kappa.value * (above[c] - u[k][c]);
+            }
+        });
+    }
+
+    /// Adds the derivative of the diffusion to those of the fluxes.
+    pub fn add_derivative<N>(&self, view: &mut View<N, B, D>, derivative: Derivative) {
+        self.for_each(view, |crossing, (_, _, c), kappa| {
+            let kappa = if derivative == Derivative::Upwind { kappa.upwind } else { kappa.value };
+            crossing.by_below[c][c] += kappa;
+            crossing.by_above[c][c] -= kappa;
+        });
+    }
+
+    /// Calls `f` with what crosses each face that has a κ, the place below it with its axis and unknown, and κ.
+    fn for_each<N>(&self, view: &mut View<N, B, D>, mut f: impl FnMut(&mut Crossing<B>, (usize, usize, usize), Kappa)) {
+        for (k, (faces, damping)) in view.faces.iter_mut().zip(&self.0).enumerate() {
+            for (axis, (face, damping)) in faces.iter_mut().zip(damping).enumerate() {
+                for (c, kappa) in damping.iter().enumerate().filter(|(_, kappa)| kappa.upwind != 0.0) {
+                    f(&mut face.crossing, (k, axis, c), *kappa);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Newton's method for the implicit part of a step.
 
-use super::damping::Damping;
+use super::damping::{Damping, Derivative};
 use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Side};
 use crate::error::Failure;
 use crate::geometry::{Cells, Mesh, Patch};
@@ -9,12 +9,19 @@ use crate::numerics::linear::{BlockMatrix, LinearSolver};
 use crate::work::Work;
 
 /// Number of Newton steps after which a time step is given up.
-const MAX_NEWTON: usize = 20;
+const MAX_NEWTON: usize = 30;
 /// Largest number of halvings of a correction that leads to where a formula has no value, such as a root below 0.
 const RETREATS: usize = 8;
-/// The damping is computed anew up to this number of Newton steps done, and then frozen, so that the iteration
-/// converges. From the values at the start alone the step would be of first order.
-const DAMPED_ANEW: usize = 1;
+/// The damping follows the values up to this number of Newton steps done, and is then frozen, so that the iteration
+/// converges. From the values at the start alone a step would be of the first order, and where the flow crosses more
+/// than two cells in a step a solution would never come to rest.
+const FOLLOWED: usize = 10;
+/// The damping is frozen sooner once residuals are below this share of those at the start: what κ still changes is small
+/// then beside what the step does.
+const FOLLOWED_TO: f64 = 1e-3;
+/// From this number of Newton steps on κ goes half of the way only: it then turns from one to the other of two states
+/// that follow from each other, as at a shock in a cell.
+const HALFWAY: usize = 3;
 /// Newton's method is given up once residuals are larger than this multiple of those at its start.
 const DIVERGED: f64 = 10.0;
 /// Residuals below this number of roundings of the largest terms are made of rounding.
@@ -56,8 +63,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let mut scale = Scale::of(u);
         let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
-        // a damping of the first values would make a step of the first order; later it stays, so that the method ends
-        let (mut work, mut damping) = (Work::default(), Damping::none());
+        let (mut work, mut damping, mut derivative) = (Work::default(), Damping::none(), Derivative::Upwind);
         let loads = half.loads(law, u)?;
         let (mut correction, mut retreats) = (Vec::new(), 0);
         let stalled = loop {
@@ -70,8 +76,9 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                 view => view?,
             };
             retreats = 0;
-            if work.newton_iterations <= DAMPED_ANEW {
-                damping = half.damping(law, &view, u);
+            if derivative == Derivative::Upwind {
+                let share = if work.newton_iterations < HALFWAY { 1.0 } else { 0.5 };
+                damping.go_towards(half.damping(law, &view, u), share);
             }
             damping.add_to(&mut view, &patch, u);
             half.residual(law, excess, &view, [known, &loads], u, &mut residual);
@@ -85,6 +92,10 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             if iterations == MAX_NEWTON || scale.diverges(largest) {
                 break Some(stalled_at(largest, wanted, iterations));
             }
+            if iterations >= FOLLOWED || iterations > 0 && scale.overall(largest) <= FOLLOWED_TO * scale.at_first {
+                derivative = Derivative::Frozen;
+            }
+            damping.add_derivative(&mut view, derivative);
             half.matrix(law, excess, &view, sides, &mut matrix);
             fix(bound, &mut matrix);
             scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
