@@ -116,9 +116,10 @@ where
         }
     }
     let half = 0.5 * stretch.dt;
-    let to_middle = Stretch { t: state.t + half, dt: half, ..stretch };
+    let scale = 0.5 * stretch.scale;
+    let to_middle = Stretch { t: state.t + half, dt: half, scale, ..stretch };
     let (first, took) = divided(simulation, state, to_middle, [parts.saturating_sub(1), done + 1], record)?;
-    let to_end = Stretch { dt: half, ..stretch };
+    let to_end = Stretch { dt: half, scale, ..stretch };
     let (mut second, takes) = divided(simulation, &first.state, to_end, [took, done + 1], record)?;
     second.work += first.work;
     second.state.step = state.step + 1;
