@@ -321,11 +321,8 @@ fn bounds_in_the_wrong_order_are_refused() {
 /// automatic steps and of steps in which the flow crosses twenty cells differ from those of short ones by 1e-6 at most.
 #[test]
 fn a_steady_solution_is_reached_by_steps_of_any_length() {
-    let problems = [
-        ("u", "1", "x^2", "x"),
-        ("(2 - x)*u", "sin(3*x)", "x", "x"),
-        ("u^2/2", "0.3", "1 - 2*x", "1 - 2*x"),
-    ];
+    let problems =
+        [("u", "1", "x^2", "x"), ("(2 - x)*u", "sin(3*x)", "x", "x"), ("u^2/2", "0.3", "1 - 2*x", "1 - 2*x")];
     for (flux, source, initial, sides) in problems {
         let at_end = |step: &str| {
             let run = line(&format!(

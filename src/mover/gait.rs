@@ -68,8 +68,8 @@ const STEPS: [f64; 2] = [15.0, 1e5];
 /// Corrections below this share of the shortest edge are the error of the mesh equation's solver, and change nothing.
 const SOLVED_TO: f64 = 1e-2;
 /// In a step that is longer than this multiple of the last one, nodes go no farther at the learnt velocity than in a
-/// step of this multiple.
-const LONGER: f64 = 1.5;
+/// step of this multiple. A step after one that was done in halves is twice as long as these.
+const LONGER: f64 = 2.5;
 /// Corrections below this share of the shortest edge are too small to do harm, and do not count as turning back.
 const SEEN: f64 = 0.1;
 /// Weight of the past in the running mean of how often the mesh turned back.

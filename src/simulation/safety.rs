@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 /// passes before it moves the mesh. Where that does not help either, or the equation on the mesh fails, the time step
 /// is halved, `halvings` times at most; a step of a fixed length is then done in parts that meet its end exactly. When
 /// all is spent the run ends with what the step failed with. With `mesh.relaxation = "auto"` a step in which the
-/// solution changes at the nodes by more than six hundredths of its range is done in such parts, too: there the mesh
-/// has fallen behind.
+/// solution changes at the nodes by more than three hundredths of its range is done in such parts, too: there the mesh
+/// has fallen behind. τ is a multiple of each part then.
 ///
 /// # Example
 /// ```

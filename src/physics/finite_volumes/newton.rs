@@ -63,7 +63,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
         let mut scale = Scale::of(u);
         let mut matrix = BlockMatrix::<D, S, B>::zero_blocks(patch);
         let mut residual = vec![[0.0; B]; patch.len()];
-        let (mut work, mut damping, mut derivative) = (Work::default(), Damping::none(), Derivative::Upwind);
+        let (mut work, mut damping, mut followed) = (Work::default(), Damping::none(), true);
         let loads = half.loads(law, u)?;
         let (mut correction, mut retreats) = (Vec::new(), 0);
         let stalled = loop {
@@ -76,7 +76,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                 view => view?,
             };
             retreats = 0;
-            if derivative == Derivative::Upwind {
+            if followed {
                 let share = if work.newton_iterations < HALFWAY { 1.0 } else { 0.5 };
                 damping.go_towards(half.damping(law, &view, u), share);
             }
@@ -92,10 +92,11 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             if iterations == MAX_NEWTON || scale.diverges(largest) {
                 break Some(stalled_at(largest, wanted, iterations));
             }
-            if iterations >= FOLLOWED || iterations > 0 && scale.overall(largest) <= FOLLOWED_TO * scale.at_first {
-                derivative = Derivative::Frozen;
-            }
-            damping.add_derivative(&mut view, derivative);
+            let settled = iterations > 0 && scale.overall(largest) <= FOLLOWED_TO * scale.at_first;
+            followed &= !settled && iterations < FOLLOWED;
+            // short steps need no more than one with κ as it is
+            let upwind = followed && iterations > 0;
+            damping.add_derivative(&mut view, if upwind { Derivative::Upwind } else { Derivative::Frozen });
             half.matrix(law, excess, &view, sides, &mut matrix);
             fix(bound, &mut matrix);
             scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));

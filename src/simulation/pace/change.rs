@@ -1,6 +1,6 @@
 //! How much a solution changes in a step.
 
-use super::{CHANGE, OF_ROUNDING, TOO_MUCH};
+use super::{CHANGE, OF_ROUNDING};
 use crate::geometry::{Field, Lattice, Mesh};
 use crate::meshing::{Movable, Relaxation};
 use crate::numerics::larger;
@@ -23,7 +23,7 @@ where
     Some((change_at_nodes(mesh.lattice(), u, &after), after))
 }
 
-/// True where the solution changes by more in a step than any automatic step allows, at the nodes of a mesh whose
+/// True where the solution changes by more in a step than automatic steps aim at, at the nodes of a mesh whose
 /// relaxation is chosen automatically.
 pub(crate) fn rushed<const D: usize>(simulation: &Simulation<D>, before: &State<D>, after: &State<D>) -> bool
 where
@@ -33,7 +33,7 @@ where
     let range = range(&before.u, 0).max(range(&after.u, 0));
     follows
         && !simulation.physics.is_given()
-        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), range) > TOO_MUCH * CHANGE
+        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), range) > CHANGE
 }
 
 /// The largest error of all unknowns, each as a share of its range.
