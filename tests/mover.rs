@@ -446,41 +446,6 @@ fn a_small_step_is_no_worse_than_a_long_one() {
     }
 }
 
-/// Steps of given length, short or long, lead to no larger error than automatic ones: a mesh that rests at the start,
-/// and has yet to learn how a pulse moves, does so in parts of the first steps.
-#[test]
-fn given_steps_are_no_worse_than_automatic_ones() {
-    let error = |step: &str| {
-        let run = plane(&format!(
-            r#"
-            [domain]
-            lower = [0.0, 0.0]
-            upper = [1.0, 1.0]
-            periodic = [true, true]
-            [grid]
-            cells = [40, 40]
-            [time]
-            start = 0.0
-            end = 0.3
-            {step}
-            [pde]
-            kind = "formula"
-            unknowns = ["u"]
-            flux = {{ u = ["u", "u"] }}
-            diffusivity = {{ u = "1e-5" }}
-            initial = {{ u = "exp(-(mod(x + y, 1) - 0.5)^2/0.0016)" }}
-            exact = {{ u = "0.04/sqrt(0.0016 + 8e-5*t)*exp(-(mod(x + y - 2*t, 1) - 0.5)^2/(0.0016 + 8e-5*t))" }}
-            "#
-        ));
-        run.record.reports.last().unwrap().error.unwrap().l2
-    };
-    let automatic = error("");
-    for step in [2e-2, 5e-3, 2e-3] {
-        let given = error(&format!("step = {step}"));
-        assert!(given <= 1.05 * automatic, "{given:e} with steps of {step}, {automatic:e} with automatic ones");
-    }
-}
-
 /// A large mesh starts from a coarser one that has come to rest, so that few of its own steps are left.
 #[test]
 fn a_large_mesh_starts_from_a_coarser_one() {

@@ -18,7 +18,7 @@ const RETREATS: usize = 8;
 const FOLLOWED: usize = 10;
 /// The damping is frozen sooner once residuals are below this share of those at the start: what κ still changes is small
 /// then beside what the step does.
-const FOLLOWED_TO: f64 = 1e-3;
+const FOLLOWED_TO: f64 = 1e-4;
 /// From this number of Newton steps on κ goes half of the way only: it then turns from one to the other of two states
 /// that follow from each other, as at a shock in a cell.
 const HALFWAY: usize = 3;
@@ -94,9 +94,7 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
             }
             let settled = iterations > 0 && scale.overall(largest) <= FOLLOWED_TO * scale.at_first;
             followed &= !settled && iterations < FOLLOWED;
-            // short steps need no more than one with κ as it is
-            let upwind = followed && iterations > 0;
-            damping.add_derivative(&mut view, if upwind { Derivative::Upwind } else { Derivative::Frozen });
+            damping.add_derivative(&mut view, if followed { Derivative::Upwind } else { Derivative::Frozen });
             half.matrix(law, excess, &view, sides, &mut matrix);
             fix(bound, &mut matrix);
             scale.stiffest = matrix.rows.iter().fold(0.0, |m, row| larger(m, row[0][0][0]));
