@@ -2,7 +2,7 @@
 
 use super::reconstruction::{Places, speeds};
 use super::{Block, Crossing, Half, Law, View, sides};
-use crate::geometry::{Patch, length};
+use crate::geometry::{Patch, dot, length};
 use crate::numerics::{ends, larger};
 use crate::parallel;
 
@@ -31,7 +31,7 @@ pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[Kappa; B]; D]>);
 #[derive(Debug, Clone, Copy, Default)]
 struct Kappa {
     value: f64,
-    /// κ with θ = 1, of an upwind flux; or κ itself where that is larger.
+    /// κ with θ = 1, of an upwind flux, or κ itself where that is larger or the flow crosses less than a cell in a step.
     upwind: f64,
 }
 
@@ -40,9 +40,9 @@ struct Kappa {
 pub(super) enum Derivative {
     /// With κ as it is: exact where κ stays.
     Frozen,
-    /// With the κ of an upwind flux in place of κ, so that the matrix has no positive entry beside its diagonal. With it
-    /// an iteration in which κ follows u converges, while one with κ itself does not where the flow crosses more than
-    /// two cells in a step: defect correction.
+    /// With the κ of an upwind flux in place of κ where the flow crosses more than a cell in a step: the matrix has no
+    /// positive entry beside its diagonal there, and an iteration in which κ follows u converges. With κ itself it does
+    /// not from two cells on. Known as defect correction.
     Upwind,
 }
 
@@ -139,7 +139,11 @@ impl<const D: usize> Half<'_, D> {
                         let (excess, a) = excess(k, axis, c, change);
                         if a > 0.0 && excess > 0.0 && change != 0.0 {
                             let towards = [steps[k][axis][1][c], steps[k + stride][axis][0][c]];
-                            damping[axis][c] = speeds[k][axis][c].damping(excess, a, towards.map(|step| step / change));
+                            let value = speeds[k][axis][c].damping(excess, a, towards.map(|step| step / change));
+                            // the flow crosses 2 a/volume cells in a step
+                            let volume = dot(self.way(k, k + stride), self.cells.normals()[k][axis]);
+                            let upwind = if 2.0 * a > volume { value.max(excess) } else { value };
+                            damping[axis][c] = Kappa { value, upwind };
                         }
                     }
                 }
@@ -203,11 +207,10 @@ impl<const D: usize> Half<'_, D> {
 
 impl Speed {
     /// κ from a/2 − D, a, and (u₋ − u_i)/(u_k − u_i) and (u_k − u₊)/(u_k − u_i).
-    fn damping(&self, excess: f64, a: f64, towards: [f64; 2]) -> Kappa {
+    fn damping(&self, excess: f64, a: f64, towards: [f64; 2]) -> f64 {
         let theta = |end: usize| if self.from[end] { 1.0 - 2.0 * towards[end] } else { LEAST };
         let steepening = (-self.own).max(0.0) * (2.0 * excess / a).min(1.0);
-        let value = steepening + excess * theta(0).max(theta(1)).clamp(LEAST, 1.0);
-        Kappa { value, upwind: value.max(excess) }
+        steepening + excess * theta(0).max(theta(1)).clamp(LEAST, 1.0)
     }
 }
 
@@ -254,7 +257,9 @@ impl<const B: usize, const D: usize> Damping<B, D> {
     fn for_each<N>(&self, view: &mut View<N, B, D>, mut f: impl FnMut(&mut Crossing<B>, (usize, usize, usize), Kappa)) {
         for (k, (faces, damping)) in view.faces.iter_mut().zip(&self.0).enumerate() {
             for (axis, (face, damping)) in faces.iter_mut().zip(damping).enumerate() {
-                for (c, kappa) in damping.iter().enumerate().filter(|(_, kappa)| kappa.upwind != 0.0) {
+                for (c, kappa) in
+                    damping.iter().enumerate().filter(|(_, kappa)| kappa.value != 0.0 || kappa.upwind != 0.0)
+                {
                     f(&mut face.crossing, (k, axis, c), *kappa);
                 }
             }

@@ -16,8 +16,8 @@ const RETREATS: usize = 8;
 /// converges. From the values at the start alone a step would be of the first order, and where the flow crosses more
 /// than two cells in a step a solution would never come to rest.
 const FOLLOWED: usize = 10;
-/// The damping is frozen sooner once residuals are below this share of those at the start: what κ still changes is small
-/// then beside what the step does.
+/// The damping is frozen sooner once residuals are below this share of those at the start: what κ still changes is
+/// small then beside what the step does.
 const FOLLOWED_TO: f64 = 1e-4;
 /// From this number of Newton steps on κ goes half of the way only: it then turns from one to the other of two states
 /// that follow from each other, as at a shock in a cell.
