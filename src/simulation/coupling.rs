@@ -291,7 +291,7 @@ mod tests {
             ("advective", false, 0.02, burgers(Convection::Advective)),
             ("flux", false, 0.02, burgers(Convection::Flux)),
             ("formula", true, 0.01, formula(r#""scheme": "central","#)),
-            ("formula, limited", true, 0.01, formula("")),
+            ("formula, limited", true, 0.005, formula("")),
             ("water by flux", true, 0.004, water(WaterForm::Flux)),
             ("water by advection", true, 0.004, water(WaterForm::Advective)),
         ];
