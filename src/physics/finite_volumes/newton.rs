@@ -13,12 +13,13 @@ const MAX_NEWTON: usize = 30;
 /// Largest number of halvings of a correction that leads to where a formula has no value, such as a root below 0.
 const RETREATS: usize = 8;
 /// The damping follows the values up to this number of Newton steps done, and is then frozen, so that the iteration
-/// converges. From the values at the start alone a step would be of the first order, and where the flow crosses more
-/// than two cells in a step a solution would never come to rest.
-const FOLLOWED: usize = 10;
+/// converges. From the values at the start alone a step would be of the first order.
+const FOLLOWED: usize = 1;
+/// The same where the flow crosses more than a cell in a step: there a solution would never come to rest otherwise.
+const FOLLOWED_ACROSS_CELLS: usize = 10;
 /// The damping is frozen sooner once residuals are below this share of those at the start: what κ still changes is
 /// small then beside what the step does.
-const FOLLOWED_TO: f64 = 1e-4;
+const FOLLOWED_TO: f64 = 1e-3;
 /// From this number of Newton steps on κ goes half of the way only: it then turns from one to the other of two states
 /// that follow from each other, as at a shock in a cell.
 const HALFWAY: usize = 3;
@@ -93,7 +94,8 @@ impl<const B: usize, const D: usize, Solver> FiniteVolumes<B, D, Solver> {
                 break Some(stalled_at(largest, wanted, iterations));
             }
             let settled = iterations > 0 && scale.overall(largest) <= FOLLOWED_TO * scale.at_first;
-            followed &= !settled && iterations < FOLLOWED;
+            let most = if damping.crosses_cells() { FOLLOWED_ACROSS_CELLS } else { FOLLOWED };
+            followed &= !settled && iterations < most;
             damping.add_derivative(&mut view, if followed { Derivative::Upwind } else { Derivative::Frozen });
             half.matrix(law, excess, &view, sides, &mut matrix);
             fix(bound, &mut matrix);
