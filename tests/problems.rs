@@ -240,11 +240,13 @@ fn a_dam_breaks_over_a_dry_bed() {
 }
 
 /// Cells that follow what they give off (Keller and Segel), on a disc with more than the mass 8π that draws together in
-/// one point: the density at the centre, seven times that of the start by then, within 1 % of SciPy.
+/// one point: the density at the centre, seven times that of the start by then, within 1 % of SciPy, although the
+/// initial value of what they give off, which has no time derivative, is a guess.
 #[test]
 fn cells_draw_together() {
-    let run = line(
-        r#"
+    for steps in ["", "tolerance = 1e-3"] {
+        let run = line(&format!(
+            r#"
         [domain]
         coordinates = "cylindrical"
         [grid]
@@ -252,24 +254,25 @@ fn cells_draw_together() {
         [time]
         start = 0.0
         end = 0.05
-        tolerance = 1e-3
+        {steps}
         [pde]
         kind = "formula"
         unknowns = ["u", "v"]
-        flux = { u = ["u*v_x"] }
-        diffusivity = { u = "1", v = "1" }
-        source = { v = "u - 10*(1 - exp(-12))" }
-        storage = { v = 0 }
-        initial = { u = "120*exp(-12*x^2)", v = "0" }
-        boundary = { u = "no-flux", v = { left = "no-flux", right = "0" } }
+        flux = {{ u = ["u*v_x"] }}
+        diffusivity = {{ u = "1", v = "1" }}
+        source = {{ v = "u - 10*(1 - exp(-12))" }}
+        storage = {{ v = 0 }}
+        initial = {{ u = "120*exp(-12*x^2)", v = "0" }}
+        boundary = {{ u = "no-flux", v = {{ left = "no-flux", right = "0" }} }}
         [monitor]
         kind = "auto"
         of = "u"
         "#,
-    );
-    let centre = Profile::of(&run, 0).u[0];
-    println!("Keller and Segel: {centre}");
-    assert!((centre / 847.04 - 1.0).abs() < 0.01, "{centre}");
+        ));
+        let centre = Profile::of(&run, 0).u[0];
+        println!("Keller and Segel: {centre}");
+        assert!((centre / 847.04 - 1.0).abs() < 0.01, "{steps}: {centre}");
+    }
 }
 
 /// Halfar's dome of ice with Glen's exponent 3, whose flux takes H⁵|H_x|²: no depth below 0, and less error than equal

@@ -92,6 +92,12 @@ pub trait Physics<const D: usize = 2>: Send {
         Vec::new()
     }
 
+    /// For each unknown, whether it has no time derivative, so that it is at any time what the others make of it; empty
+    /// if all have one.
+    fn instantaneous(&self) -> Vec<bool> {
+        Vec::new()
+    }
+
     /// The unknown, the node below an edge, and the cell Péclet number there, |F′| h/D, of an edge on which central
     /// fluxes outweigh diffusion by much and an unknown changes by much of its range, if there is one: a front there
     /// may be at the wrong place.

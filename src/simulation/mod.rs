@@ -5,6 +5,7 @@ mod benefit;
 mod checkpoint;
 mod clock;
 mod conserved;
+mod consistent;
 mod control;
 mod coupling;
 mod doors;
@@ -205,6 +206,9 @@ where
         course: Option<Course>,
     ) -> Result<()> {
         let clock = Clock::start(course.as_ref(), record);
+        if course.is_none() {
+            self.make_consistent(state);
+        }
         let (event, at_start) = match &course {
             Some(course) => (Event::Resumed, course.at_start.clone()),
             None => (Event::Started, AtStart::of(&*self.physics, &state.mesh, &state.u)),

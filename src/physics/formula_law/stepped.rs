@@ -96,6 +96,10 @@ where
         self.kinds.keeps_range.to_vec()
     }
 
+    fn instantaneous(&self) -> Vec<bool> {
+        self.terms.algebraic().to_vec()
+    }
+
     fn unresolved_flux(&self, t: f64, mesh: &Mesh<D>, u: &Field) -> Option<(usize, usize, f64)> {
         let (lattice, values) = (mesh.lattice(), u.values().as_chunks::<B>().0);
         let nodes = self.nodes(t, &mesh.images(), values);
