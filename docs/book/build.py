@@ -65,7 +65,8 @@ def stage(program, source):
     if "cluster.md" not in pages:  # the chapter on clusters comes by itself
         index = (source / "index.md").read_text("utf-8")
         (source / "index.md").write_text(index.replace("\ncluster\n", "\n"), "utf-8")
-    made = {"keys.md": keys.page(program), "python-api.md": api.page(ROOT / "python/driftmesh"), "studies.md": studies()}
+    package = api.page(ROOT / "python/driftmesh")
+    made = {"keys.md": keys.page(program), "python-api.md": package, "studies.md": studies()}
     for name, text in made.items():
         (source / name).write_text(links.rewritten(text, ROOT / "docs" / name, ROOT), "utf-8")
 
