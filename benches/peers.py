@@ -1,7 +1,7 @@
 """driftmesh beside tools that others wrote, on two problems with exact solutions: `python benches/peers.py`.
 
-1. The boundary layer of FiPy's manual (examples.convection.exponential1D.mesh1D): -u'' + 10 u' = 0 on [0, 10], u(0) = 0,
-   u(10) = 1. FiPy and SciPy's `solve_bvp` solve it at rest; driftmesh steps to rest.
+1. The boundary layer of FiPy's manual (examples.convection.exponential1D.mesh1D): -u'' + 10 u' = 0 on [0, 10] with
+   u(0) = 0, u(10) = 1. FiPy and SciPy's `solve_bvp` solve it at rest; driftmesh steps to rest.
 2. A travelling front, u_t = D u_xx + u (1 - u)(u - 1/4)/D with D = 0.002 to t = 1, no flux through the ends, by py-pde
    and SciPy's `solve_ivp` on equal cells; driftmesh on cells that move. This problem is one of driftmesh's manual.
 
