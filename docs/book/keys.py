@@ -71,7 +71,8 @@ class Page:
         if names == ["array"]:
             length = schema.get("minItems") if schema.get("minItems") == schema.get("maxItems") else None
             inner = self.values(schema.get("items", {}), depth + 1)
-            return f"{length or 'a list'} of ({inner})" if " or " in inner else f"{length or 'a list'} of {inner}"
+            inner = {"number": "numbers", "integer": "integers", "text": "texts"}.get(inner, inner)
+            return f"{length} {inner}" if length and " " not in inner else f"{length or 'a list'} of ({inner})"
         if names == ["object"]:
             return "a table by names"
         return " or ".join({"string": "text", "boolean": "true or false"}.get(name, name) for name in names)
