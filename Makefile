@@ -53,13 +53,15 @@ bench: $(VENV)/ready
 	$(VENV)/bin/python -m pip install --quiet .
 	$(VENV)/bin/python benches/mesh_steps.py
 
-# The library's documentation in target/doc, and the gallery of studies in target/doc/gallery.
-docs:
+# The book in target/doc/book, and what it links to: the library's documentation in target/doc, and a gallery of studies
+# in target/doc/gallery.
+docs: $(VENV)/ready
 	$(CARGO) doc --release --workspace --no-deps
 	$(CARGO) build --release --workspace
-	$(PYTHON) docs/gallery.py target/release/driftmesh target/doc/gallery
+	$(VENV)/bin/python docs/gallery.py target/release/driftmesh target/doc/gallery
+	$(VENV)/bin/python docs/book/build.py target/release/driftmesh target/doc/book --beside
 
-$(VENV)/ready: tests/python/requirements.txt
+$(VENV)/ready: tests/python/requirements.txt docs/requirements.txt
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --requirement tests/python/requirements.txt
 	touch $@

@@ -1,26 +1,17 @@
 """The gallery: a page of studies with their pictures and reports, in the folder given.
 
-Runs each study with the program given; `make docs` calls this.
+Runs each study of `docs/studies.toml` with the program given; `make docs` calls this.
 """
 
 import html
 import json
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-STUDIES = {
-    "burgers": "A shock",
-    "burgers-periodic-auto": "Periodic Burgers",
-    "dam-break-auto": "A dam break",
-    "rings-auto": "Rings",
-    "stefan-slides": "A front between ice and water",
-    "boundary-layer": "A layer in one dimension",
-    "bump-around-ring": "A bump carried around a ring",
-    "bump-channel": "A shock over a bump",
-    "aerofoil": "A ring around an aerofoil",
-}
 PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -52,34 +43,41 @@ its report has the viewer, the figures and the settings.</p>
 """
 ARTICLE = """<article>
 <a href="{name}/report.html" aria-label="Report of {name}"><picture>
-<source srcset="{name}/animation.gif" media="(prefers-reduced-motion: no-preference)">
-<img src="{name}/mesh.png" alt="{title}: the mesh over the solution" loading="lazy"></picture></a>
+{moving}<img src="{name}/mesh.png" alt="{title}: the mesh over the solution" loading="lazy"></picture></a>
 <h2>{title}</h2>
-<p>{words} <a href="{name}/report.html">Report</a>; the run took {seconds:.2g} s.</p>
+<p>{words} <a href="{name}/report.html">Report</a> of <code>{name}</code>; the run took {seconds:.2g} s.</p>
 </article>"""
+MOVING = '<source srcset="{name}/animation.gif" media="(prefers-reduced-motion: no-preference)">\n'
 
 
-def words(study):
-    """The comment at the head of a study file."""
-    lines = study.read_text().splitlines()
-    return " ".join(
-        line.lstrip("# ") for line in lines[: next(k for k, line in enumerate(lines) if not line.startswith("#"))]
-    )
+def studies():
+    """The studies of the gallery, in order."""
+    groups = tomllib.loads((ROOT / "docs/studies.toml").read_text("utf-8"))["group"]
+    return [study for group in groups for study in group["study"]]
 
 
-def article(program, name, title, out):
-    study = ROOT / f"studies/{name}.toml"
-    subprocess.run(
-        [program, "run", study, "--quiet", "--out", out / name, "--set", "output.animation=true"], check=True
-    )
+def as_html(text):
+    """A sentence with names in backquotes."""
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", html.escape(text.replace("\n", " "), quote=False))
+
+
+def article(program, study, out):
+    """Runs a study, and says what its picture and its report show."""
+    name = study["name"]
+    command = [program, "run", ROOT / f"studies/{name}.toml", "--quiet", "--out", out / name]
+    status = subprocess.run([*command, "--set", "output.animation=true"], stderr=subprocess.PIPE, text=True)
+    if status.returncode != study.get("ends", 0):
+        sys.exit(f"error: {name} ended with status {status.returncode}:\n{status.stderr}")
     seconds = json.loads((out / name / "summary.json").read_text())["seconds"]["wall"]
-    return ARTICLE.format(name=name, title=title, words=html.escape(words(study)), seconds=seconds)
+    moving = MOVING.format(name=name) if (out / name / "animation.gif").exists() else ""
+    words, title = as_html(study["teaches"]), html.escape(study["title"])
+    return ARTICLE.format(name=name, title=title, moving=moving, words=words, seconds=seconds)
 
 
 def main():
     program, out = sys.argv[1], Path(sys.argv[2])
     out.mkdir(parents=True, exist_ok=True)
-    articles = "\n".join(article(program, name, title, out) for name, title in STUDIES.items())
+    articles = "\n".join(article(program, study, out) for study in studies())
     (out / "index.html").write_text(PAGE.format(articles=articles))
     print(f"gallery  {out / 'index.html'}")
 

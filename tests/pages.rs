@@ -6,9 +6,11 @@ use std::collections::BTreeSet;
 
 const README: &str = include_str!("../README.md");
 const STUDY: &str = include_str!("../docs/study.md");
+const EQUATION: &str = include_str!("../docs/own-equation.md");
 const SUBDOMAINS: &str = include_str!("../docs/subdomains.md");
 const LINE: &str = include_str!("../docs/one-dimension.md");
-const FRONTS: &str = include_str!("../docs/poisson-stefan.md");
+const LAPLACIAN: &str = include_str!("../docs/laplacian.md");
+const FRONTS: &str = include_str!("../docs/fronts.md");
 const RESUME: &str = include_str!("../docs/resume.md");
 const DOMAINS: &str = include_str!("../docs/domains.md");
 const SAFETY: &str = include_str!("../docs/safety.md");
@@ -20,7 +22,9 @@ fn studies_on_the_pages_are_valid() {
         ("README", README),
         ("study", STUDY),
         ("one-dimension", LINE),
-        ("poisson-stefan", FRONTS),
+        ("own-equation", EQUATION),
+        ("laplacian", LAPLACIAN),
+        ("fronts", FRONTS),
         ("domains", DOMAINS),
     ];
     for (page, text) in pages {
@@ -58,9 +62,9 @@ fn pages_name_every_key() {
     let definitions = schema["$defs"].as_object().unwrap();
     let of_output = [STUDY, RESUME].concat();
     for (kind, page) in [
-        ("MovingMesh", [STUDY, SUBDOMAINS, SAFETY, DOMAINS].concat()),
-        ("PoissonStudy", FRONTS.to_string()),
-        ("StefanStudy", FRONTS.to_string()),
+        ("MovingMesh", [STUDY, EQUATION, SUBDOMAINS, SAFETY, DOMAINS].concat()),
+        ("PoissonStudy", LAPLACIAN.to_string()),
+        ("StefanStudy", [FRONTS, LAPLACIAN].concat()),
         ("EquidistributionStudy", LINE.to_string()),
     ] {
         let mut names = BTreeSet::new();
