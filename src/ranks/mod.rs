@@ -137,30 +137,32 @@ impl Ranks {
         }
     }
 
-    /// The bytes that rank 0 makes, on all ranks. All have to ask; where rank 0 fails, the others wait for the end that
-    /// it brings.
+    /// The bytes that rank 0 makes, or why it cannot, on all ranks. All have to ask.
     ///
     /// # Errors
-    /// What `make` returned, on rank 0.
-    pub fn from_first<E>(self, make: impl FnOnce() -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
-        let made = if self.is_first() { make()? } else { Vec::new() };
+    /// What `make` returned on rank 0.
+    pub fn from_first(self, make: impl FnOnce() -> Result<Vec<u8>, String>) -> Result<Vec<u8>, String> {
         if self.count == 1 {
-            return Ok(made);
+            return make();
         }
         let mut words = Vec::new();
         if self.is_first() {
-            words.push(made.len() as u64);
-            words.extend(made.chunks(WORD).map(|bytes| {
+            let made = make();
+            made.is_ok().put(&mut words);
+            let bytes = made.unwrap_or_else(String::into_bytes);
+            bytes.len().put(&mut words);
+            words.extend(bytes.chunks(WORD).map(|bytes| {
                 let mut word = [0; WORD];
                 word[..bytes.len()].copy_from_slice(bytes);
                 u64::from_le_bytes(word)
             }));
         }
-        let mut told = self.exchange(&words);
-        let words = told.swap_remove(0);
-        let mut bytes: Vec<u8> = words[1..].iter().flat_map(|word| word.to_le_bytes()).collect();
-        bytes.truncate(words[0] as usize);
-        Ok(bytes)
+        let told = self.exchange(&words);
+        let mut words = told[0].as_slice();
+        let (made, length) = <(bool, usize)>::take(&mut words);
+        let mut bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        bytes.truncate(length);
+        if made { Ok(bytes) } else { Err(String::from_utf8_lossy(&bytes).into_owned()) }
     }
 
     /// Refuses ranks of which one has another text than rank 0; `what` names it.
@@ -229,7 +231,8 @@ impl Ranks {
         f: impl Fn(&T) -> R + Sync + Send,
     ) -> Vec<R> {
         let owners: Vec<usize> = (0..items.len()).map(owner).collect();
-        let own: Vec<&T> = items.iter().zip(&owners).filter(|(_, owner)| **owner == self.rank).map(|(t, _)| t).collect();
+        let own: Vec<&T> =
+            items.iter().zip(&owners).filter(|(_, owner)| **owner == self.rank).map(|(t, _)| t).collect();
         let mine = parallel::map(&own, |item| f(item));
         self.gather(mine, owners.into_iter())
     }

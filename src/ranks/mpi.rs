@@ -4,8 +4,16 @@ use crate::error::Result;
 use mpi::Threading;
 use mpi::datatype::PartitionMut;
 use mpi::environment::Universe;
+use mpi::request::scope;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::*;
+use std::time::{Duration, Instant};
+
+/// How long a rank asks again and again for what others send, before it sleeps between questions: where there are more
+/// ranks than cores, one that never sleeps takes the core that another needs.
+const AWAKE: Duration = Duration::from_micros(200);
+/// How long it sleeps.
+const NAP: Duration = Duration::from_micros(20);
 
 /// MPI as long as it is there; dropping it waits for the other ranks.
 pub struct Engine {
@@ -26,7 +34,17 @@ pub fn gather(words: &[u64], lengths: &[u64]) -> Vec<u64> {
     let begins: Vec<i32> = (0..lengths.len()).map(|rank| lengths[..rank].iter().sum()).collect();
     let mut all = vec![0; lengths.iter().map(|&n| n as usize).sum()];
     let mut parts = PartitionMut::new(&mut all[..], lengths, begins);
-    SimpleCommunicator::world().all_gather_varcount_into(words, &mut parts);
+    let world = SimpleCommunicator::world();
+    scope(|scope| {
+        let mut waiting = Err(world.immediate_all_gather_varcount_into(scope, words, &mut parts));
+        let began = Instant::now();
+        while let Err(request) = waiting {
+            if began.elapsed() > AWAKE {
+                std::thread::sleep(NAP);
+            }
+            waiting = request.test();
+        }
+    });
     all
 }
 

@@ -34,7 +34,8 @@ fn told<T: Shared>(value: &T) -> T {
 /// Signed zeros, infinities and NaN come across with their bits, and a failure with its figures.
 #[test]
 fn what_is_told_keeps_its_bits() {
-    let values = vec![[0.1, -0.0], [f64::INFINITY, f64::MIN_POSITIVE / 3.0], [f64::from_bits(0x7ff8_dead_beef_0001), 2.0]];
+    let values =
+        vec![[0.1, -0.0], [f64::INFINITY, f64::MIN_POSITIVE / 3.0], [f64::from_bits(0x7ff8_dead_beef_0001), 2.0]];
     let bits = |values: &[[f64; 2]]| values.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     let (taken, number, yes) = told(&(values.clone(), 7_usize, true));
     assert_eq!((bits(&taken), number, yes), (bits(&values), 7, true));
@@ -64,6 +65,7 @@ fn a_single_rank_receives_nothing() {
     assert_eq!((doubled, items), (vec![2, 4, 6], [2, 4, 6]));
     assert_eq!(here.map(&[5, 6], |_| 0, |item| *item as f64), [5.0, 6.0]);
     assert!(!here.any(false) && here.any(true));
-    assert_eq!(here.from_first(|| Ok::<_, ()>(b"study".to_vec())), Ok(b"study".to_vec()));
+    assert_eq!(here.from_first(|| Ok(b"study".to_vec())), Ok(b"study".to_vec()));
+    assert_eq!(here.from_first(|| Err("it is not there".into())), Err("it is not there".into()));
     assert_eq!((here.count(), here.traffic()), (1, Traffic::default()));
 }

@@ -97,7 +97,8 @@ impl<const D: usize, const S: usize> Estimator<D, S> for GridWalk {
         };
         let ranks = Ranks::here();
         let owner = |p: usize| ranks.owner(p, points.len());
-        let Means { mut estimates, path_steps, .. } = walks.mean(points, self.walks, owner, |p, stop| (paid(p, stop), false));
+        let Means { mut estimates, path_steps, .. } =
+            walks.mean(points, self.walks, owner, |p, stop| (paid(p, stop), false));
         for (estimate, &k) in estimates.iter_mut().zip(points) {
             estimate.x = std::array::from_fn(|c| mesh.x()[k][c] + estimate.x[c]);
         }

@@ -120,12 +120,13 @@ fn pay_residual<const D: usize, const S: usize>(
     let owners: Vec<Option<usize>> = points.iter().map(|&k| strips.owner(k)).collect();
     // what a subdomain sees of a strip is on its own rank
     let rank = |p: usize| owners[p].map_or(0, |part| strips.rank(part));
-    let Means { estimates: mut paid, path_steps, handed_on } = walks.mean(points, count, rank, |p, Stop { node, .. }| {
-        let own = |node: usize| owners[p].and_then(|part| strips.seen(part, node));
-        // a node on a bounded side is owned by no subdomain, and its residual is zero
-        let away = own(node).is_none() && strips.owner(node).is_some_and(|owner| owners[p] != Some(owner));
-        (left(problem, found, node, |node| own(node).unwrap_or(found.correction[node])), away)
-    });
+    let Means { estimates: mut paid, path_steps, handed_on } =
+        walks.mean(points, count, rank, |p, Stop { node, .. }| {
+            let own = |node: usize| owners[p].and_then(|part| strips.seen(part, node));
+            // a node on a bounded side is owned by no subdomain, and its residual is zero
+            let away = own(node).is_none() && strips.owner(node).is_some_and(|owner| owners[p] != Some(owner));
+            (left(problem, found, node, |node| own(node).unwrap_or(found.correction[node])), away)
+        });
     forget_certainty(&mut paid);
     for (estimate, paid) in estimates.points.iter_mut().zip(paid) {
         let x = std::array::from_fn(|c| estimate.x[c] + paid.x[c]);
