@@ -295,8 +295,8 @@ fn bytes_of_a_step_are_those_of_its_nodes() {
     assert_eq!(received(2, [16, 14], strip).1, f64::from(8 * (strips + positions + lengths + question)));
 }
 
-/// A thousand steps, of which checkpoints are taken.
-const LONG: [&str; 3] = ["--set=time.step=4e-5", "--set=output={checkpoint={steps=20},report=false}", "--quiet"];
+/// Some hundred steps, with checkpoints.
+const LONG: [&str; 3] = ["--set=time.step=1e-4", "--set=output={checkpoint={steps=20},report=false}", "--quiet"];
 const WALKS: &str = "--set=mesh.generator={kind=\"stochastic\",subdomains=[2,2]}";
 
 /// Starts a long run on two ranks, and waits for its first checkpoint.

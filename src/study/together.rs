@@ -7,8 +7,8 @@ use crate::simulation::{Event, Observer, Snapshot};
 
 /// Those who watch a run on this rank, as one observer that all ranks have
 ///
-/// Only some ranks may be asked to end, or be asked later than others; so all ranks ask each other after every step, and
-/// end after the same one.
+/// Only some ranks may be told to end, or be told later than others; so all ranks ask each other after every step, and
+/// all end after the same one.
 #[derive(Default)]
 pub(super) struct Together<'a> {
     pub watchers: Vec<&'a mut dyn Observer>,
