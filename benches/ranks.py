@@ -58,7 +58,7 @@ for name, generator in GENERATORS.items():
         runs = [[seconds(ranks, generator, Path(place)) for ranks in (1, 2)] for _ in range(TIMES)]
     one, two = (list(map(min, zip(*(run[k] for run in runs)))) for k in (0, 1))
     print(
-        f"| {name} | {one[0]:.0f} | {two[0]:.0f} | {one[0] / two[0]:.2f} | {one[1]:.0f} | {two[1]:.0f} | {two[2]:.0f} | "
-        f"{two[3] / 1e3:.0f} |",
+        f"| {name} | {one[0]:.0f} | {two[0]:.0f} | {one[0] / two[0]:.2f} | {one[1]:.0f} | {two[1]:.0f} | "
+        f"{two[2]:.0f} | {two[3] / 1e3:.0f} |",
         flush=True,
     )

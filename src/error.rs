@@ -263,7 +263,7 @@ impl Error {
             Self::Formula { help, .. } => help.clone(),
             Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
             Self::SeparateProcesses { .. } => Some(
-                "build it with `cargo build --release -p driftmesh-cli --features mpi`, or start it once, without mpirun"
+                "build it by `cargo build --release -p driftmesh-cli --features mpi`, or start it once, without mpirun"
                     .into(),
             ),
             Self::UnlikeRanks { .. } => Some("start the same program with the same arguments on every rank".into()),

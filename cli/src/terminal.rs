@@ -124,8 +124,8 @@ pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> St
     if error.is_failure() { FAILED } else { WRONG }
 }
 
-/// Makes the pool of threads: where no number is given, all cores, or one thread for each of several ranks. The caller is one of them: handing each small piece
-/// of work to a pool beside it would cost more than the work.
+/// Makes the pool of threads: where no number is given, all cores, or one thread for each of several ranks. The caller
+/// is one of them: handing each small piece of work to a pool beside it would cost more than the work.
 pub fn use_threads(threads: Option<u16>) -> driftmesh::Result<()> {
     let alone = Ranks::here().count() == 1;
     let number = threads.map_or(if alone { 0 } else { 1 }, usize::from);

@@ -91,6 +91,16 @@ struct Found {
     sealed: Vec<u8>,
 }
 
+/// A run that goes on.
+pub(crate) struct Resumed<T> {
+    /// What was taken up.
+    pub taken: T,
+    /// Words on the newer checkpoints that were refused.
+    pub refused: Vec<String>,
+    /// The bytes of the checkpoint behind its checksum, for other ranks.
+    pub sealed: Vec<u8>,
+}
+
 /// What a checkpoint says of the run that is to go on behind it.
 pub(crate) struct Behind {
     /// Steps done.
@@ -206,14 +216,14 @@ impl Checkpoints {
     }
 
     /// Goes on from the newest checkpoint that `take_up` accepts; none where there is no file. What was refused before
-    /// it is told in words; its own bytes come last, for other ranks.
+    /// it is told in words.
     ///
     /// # Errors
     /// [`Error::Checkpoint`] where there are files, but none that will do.
     pub(crate) fn resume<T, C: DeserializeOwned>(
         &mut self,
         mut take_up: impl FnMut(C, &Behind) -> Result<T, Unfit>,
-    ) -> Result<Option<(T, Vec<String>, Vec<u8>)>> {
+    ) -> Result<Option<Resumed<T>>> {
         let mut refused = Vec::new();
         let mut found = Vec::new();
         for name in Self::NAMES.into_iter().chain([Self::LAST]) {
@@ -232,7 +242,8 @@ impl Checkpoints {
                     let words = |(path, unfit): (PathBuf, Unfit)| {
                         format!("{} was left out: {unfit}; the run went on from {name}", path.display())
                     };
-                    return Ok(Some((taken, refused.into_iter().map(words).collect(), sealed)));
+                    let refused = refused.into_iter().map(words).collect();
+                    return Ok(Some(Resumed { taken, refused, sealed }));
                 }
                 Err(unfit) => refused.push((self.directory.join(name), unfit)),
             }
@@ -253,8 +264,8 @@ impl Checkpoints {
         }
     }
 
-    /// What a checkpoint of this study is, and its content, from the bytes behind its checksum; the last one may be of a
-    /// study with another end.
+    /// What a checkpoint of this study is, and its content, from the bytes behind its checksum; the last one may be of
+    /// a study with another end.
     pub(crate) fn read<C: DeserializeOwned>(&self, bytes: &[u8], last: bool) -> Result<(Behind, C), Unfit> {
         let (behind, content) = meant(bytes, &self.study, last)?;
         Ok((behind, decoded(&content)?))

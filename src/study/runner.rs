@@ -4,7 +4,9 @@ use super::kind::{Kind, Running, SpentBy};
 use super::together::Together;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::Kept;
-use crate::output::{Behind, Checkpoints, Frames, RunDirectory, Spent, Summary, draw, final_arrays, structured};
+use crate::output::{
+    Behind, Checkpoints, Frames, Resumed, RunDirectory, Spent, Summary, draw, final_arrays, structured,
+};
 use crate::parallel::join;
 use crate::ranks::Ranks;
 use crate::report;
@@ -222,7 +224,7 @@ fn run_ready<K: Kind>(
     let mut stage = Stage::bare();
     let mut checkpoint = Vec::new();
     match resumed {
-        Some(((resumed, frames, before), refused, sealed)) => {
+        Some(Resumed { taken: (resumed, frames, before), refused, sealed }) => {
             checkpoint = sealed;
             directory.clear_ended()?;
             run = resumed;

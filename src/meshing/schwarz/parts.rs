@@ -77,8 +77,8 @@ impl<const D: usize, const S: usize> Parts<D, S> {
         Ok((bound, work))
     }
 
-    /// Sets up the systems of a step, of the parts that this rank owns. Robin's condition c_g = β c_i + given is eliminated: its unknown part goes to the
-    /// matrix.
+    /// Sets up the systems of a step, of the parts that this rank owns. Robin's condition c_g = β c_i + given is
+    /// eliminated: its unknown part goes to the matrix.
     pub fn set(&mut self, operator: &MeshOperator<D>, residual: &[[f64; D]], beta: [f64; D]) {
         let (ranks, all) = (Ranks::here(), self.parts.len());
         for (number, (part, traces)) in self.parts.iter_mut().zip(&mut self.traces).enumerate() {

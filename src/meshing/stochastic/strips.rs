@@ -260,8 +260,8 @@ impl<const D: usize, const S: usize> Strips<D, S> {
         self.owner.get(node).map(|&part| part as usize).filter(|&part| part < self.parts.len())
     }
 
-    /// The correction of a node as a part of this rank computed it; none outside the part and the nearer half of its strip, beyond
-    /// which the strip sees too little.
+    /// The correction of a node as a part of this rank computed it; none outside the part and the nearer half of its
+    /// strip, beyond which the strip sees too little.
     pub(super) fn seen(&self, part: usize, node: usize) -> Option<[f64; D]> {
         let part = &self.parts[part];
         let margin = self.reach.width - 1 - self.reach.width / 2;
