@@ -1,8 +1,8 @@
 //! Ranks: the processes of one run, which MPI starts side by side.
 //!
 //! Every rank holds the whole state and takes the same steps. What is divided among ranks is work on whole subdomains:
-//! [`Ranks::map_mut`] does on each rank the items that it owns, and then gives all results to all. No result depends
-//! on who computed it, so that every number of ranks has the bits of one.
+//! each rank does the items that it owns, and then all results are given to all. No result depends on who computed it,
+//! so that every number of ranks has the bits of one.
 //!
 //! A library without the feature `mpi`, and a program that was not started by `mpirun`, is one rank, which has nothing
 //! to exchange. Only the thread that called [`begin`] may exchange anything.
