@@ -3,7 +3,7 @@ CARGO ?= cargo
 PYTHON ?= python3
 VENV := .venv
 
-.PHONY: check scripts test slow bench docs python
+.PHONY: check scripts test slow bench docs python mpi ranks
 
 # Formatting, lints and documentation, without a warning.
 check:
@@ -36,6 +36,23 @@ python: $(VENV)/ready
 slow: test
 	$(CARGO) test --release --workspace -- --ignored --nocapture
 	$(VENV)/bin/python tests/python/kills.py
+
+# Open MPI starts ranks as root and more of them than cores only if told so, and pins them to cores unless told not to.
+mpi ranks: export OMPI_ALLOW_RUN_AS_ROOT = 1
+mpi ranks: export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM = 1
+mpi ranks: export OMPI_MCA_rmaps_base_oversubscribe = 1
+mpi ranks: export OMPI_MCA_hwloc_base_binding_policy = none
+mpi ranks: export OMPI_MCA_btl_vader_single_copy_mechanism = none
+
+# Runs on several ranks: lints of what is built for them, and their tests. docs/cluster.md says what it needs.
+mpi:
+	$(CARGO) clippy --release -p driftmesh -p driftmesh-cli --features driftmesh-cli/mpi --all-targets -- -D warnings
+	$(CARGO) test --release -p driftmesh-cli --features mpi --test ranks -- --test-threads 2
+
+# The table of docs/cluster.md.
+ranks:
+	$(CARGO) build --release -p driftmesh-cli --features mpi
+	$(PYTHON) benches/ranks.py
 
 # Speeds, as ratios measured in one run.
 bench: $(VENV)/ready

@@ -105,6 +105,20 @@ pub enum Error {
         /// The directory.
         path: PathBuf,
     },
+    /// Several processes of a program without MPI were started for one run.
+    #[error("{count} processes were started for one run, and this program was built without MPI to share it")]
+    SeparateProcesses {
+        /// How many, as their launcher says.
+        count: usize,
+    },
+    /// Ranks that cannot work together.
+    #[error("rank {rank} has another {what} than rank 0")]
+    UnlikeRanks {
+        /// The first that differs.
+        rank: usize,
+        /// What differs.
+        what: &'static str,
+    },
     /// A directory that holds no run.
     #[error("{} is no run directory: {reason}", path.display())]
     NotARun {
@@ -248,6 +262,11 @@ impl Error {
             Self::Study(diagnostic) => diagnostic.help.clone(),
             Self::Formula { help, .. } => help.clone(),
             Self::Busy { .. } => Some("wait for it to end, or name another directory with --out".into()),
+            Self::SeparateProcesses { .. } => Some(
+                "build it by `cargo build --release -p driftmesh-cli --features mpi`, or start it once, without mpirun"
+                    .into(),
+            ),
+            Self::UnlikeRanks { .. } => Some("start the same program with the same arguments on every rank".into()),
             Self::ForeignDirectory { .. } => Some("name another directory with --out, or empty this one".into()),
             Self::NotARun { .. } => Some("name the directory that `driftmesh run` printed behind `run`".into()),
             Self::Checkpoint { refused } => Some(match refused.first() {

@@ -39,7 +39,7 @@
 //! Whole studies come from TOML files: [`study::Study`] reads one of any kind and runs it into a directory; a
 //! [`study::Kind`] does so with one of its kind, and returns what was found.
 //!
-//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`], [`numerics`], then [`density`],
+//! Modules, lowest floor first: [`error`], [`formula`], [`geometry`] and [`ranks`], [`numerics`], then [`density`],
 //! [`equidistribution`], [`laplacian`], [`meshing`] and [`physics`], then [`mover`] and [`stefan`], then
 //! [`simulation`], [`output`], [`report`] and [`study`].
 
@@ -58,6 +58,7 @@ mod stopwatch;
 mod work;
 
 pub mod geometry;
+pub mod ranks;
 
 pub mod numerics;
 

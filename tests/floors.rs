@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&[&str]; 10] = [
     &["elementary", "error"],
     &["formula", "kept", "kind", "parallel", "random", "setting", "stopwatch", "work"],
-    &["geometry"],
+    &["geometry", "ranks"],
     &["numerics"],
     &["density", "equidistribution", "laplacian", "meshing", "physics"],
     &["mover", "stefan"],

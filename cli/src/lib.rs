@@ -17,6 +17,7 @@ use clap::{Args, Parser, Subcommand};
 use driftmesh::study::{Source, Study};
 use std::ffi::OsString;
 use std::path::PathBuf;
+use terminal::Status;
 
 /// Moving meshes for time-dependent PDEs, solved by domain decomposition.
 #[derive(Parser)]
@@ -100,7 +101,7 @@ pub fn program(words: Vec<OsString>) -> u8 {
         }
     };
     let outcome = match verb {
-        Verb::Run(run) => run.execute(),
+        Verb::Run(run) => return on_ranks(&run),
         Verb::Check(check) => check.execute(),
         Verb::List(list) => list.execute(),
         Verb::Reproduce(reproduce) => reproduce.execute(),
@@ -108,6 +109,22 @@ pub fn program(words: Vec<OsString>) -> u8 {
         Verb::Schema => schema::execute(),
         Verb::Studies(studies) => studies.execute(),
     };
+    told(outcome)
+}
+
+/// Runs a study on all ranks, of which this process is one, and leaves them with its exit status.
+fn on_ranks(run: &run::Run) -> Status {
+    let membership = match driftmesh::ranks::begin() {
+        Ok(membership) => membership,
+        Err(error) => return told(Err(error)),
+    };
+    let status = told(run.execute());
+    membership.end(status, terminal::say_withheld);
+    status
+}
+
+/// The exit status of an outcome; an error is told.
+fn told(outcome: driftmesh::Result<Status>) -> Status {
     terminal::ended(match outcome {
         Ok(status) => status,
         Err(error) => terminal::complain(&error, error.help(), None),

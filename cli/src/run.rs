@@ -4,6 +4,7 @@ use crate::{StudyArgs, progress::Progress, tables::Told};
 use clap::Args;
 use driftmesh::Error;
 use driftmesh::output::{RunDirectory, Standing};
+use driftmesh::ranks::Ranks;
 use driftmesh::simulation::Observer;
 use driftmesh::study::{Begin, Finished, Study};
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ pub struct Run {
     /// Directory for the results; `out/NAME` where nothing is said.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Threads to use; all cores where nothing is said. Results do not depend on it.
+    /// Threads to use; where nothing is said all cores, or one for each rank of several. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Go on from the newest checkpoint in the directory; from the start where there is none.
@@ -32,17 +33,42 @@ impl Run {
             return Err(unrepeated());
         }
         let study = self.study.read()?;
+        Ranks::here().agree("study", &format!("{}resume = {}", study.to_toml(), self.resume))?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(study.name()));
-        RunDirectory::check(&out)?;
-        match (study.standing(&out), self.resume) {
+        // rank 0 looks into the directory, and says what it found
+        let mut looked = None;
+        let complete = Ranks::here().from_first(|| match looked.insert(self.is_complete(&study, &out)) {
+            Ok(complete) => Ok(vec![u8::from(*complete)]),
+            Err(error) => Err(error.to_string()),
+        });
+        looked.transpose()?;
+        match complete.as_deref() {
+            Ok([1]) => return Ok(self.succeeded(&out)),
+            Ok(_) => {}
+            Err(_) => return Ok(terminal::WRONG),
+        }
+        terminal::use_threads(self.threads)?;
+        match &study {
+            Study::MovingMesh(study) => self.watched(study, &out),
+            Study::MovingLine(study) => self.watched(study, &out),
+            Study::Poisson(study) => self.watched(study, &out),
+            Study::Stefan(study) => self.watched(study, &out),
+            Study::Equidistribution(study) => self.watched(study, &out),
+        }
+    }
+
+    /// Whether there is nothing left to do in a directory. What the user should know of it is said.
+    fn is_complete(&self, study: &Study, out: &Path) -> driftmesh::Result<bool> {
+        RunDirectory::check(out)?;
+        match (study.standing(out), self.resume) {
             (Ok(Standing::Complete), true) => {
                 if !self.quiet {
                     terminal::say(format_args!("complete: {} needs nothing more", out.display()));
                 }
                 if self.study.strict {
-                    RunDirectory::warnings(&out).iter().for_each(|warning| terminal::warn(warning));
+                    RunDirectory::warnings(out).iter().for_each(|warning| terminal::warn(warning));
                 }
-                return Ok(self.succeeded(&out));
+                return Ok(true);
             }
             (standing, true) => {
                 if standing? == Standing::Nothing && !self.quiet {
@@ -55,14 +81,7 @@ impl Run {
             )),
             (_, false) => {}
         }
-        terminal::use_threads(self.threads)?;
-        match &study {
-            Study::MovingMesh(study) => self.watched(study, &out),
-            Study::MovingLine(study) => self.watched(study, &out),
-            Study::Poisson(study) => self.watched(study, &out),
-            Study::Stefan(study) => self.watched(study, &out),
-            Study::Equidistribution(study) => self.watched(study, &out),
-        }
+        Ok(false)
     }
 
     /// Runs a study, and says how it went.
@@ -72,7 +91,7 @@ impl Run {
         let mut interrupts = study.has_steps().then(Interrupts::listen);
         let mut watchers: Vec<&mut dyn Observer> = Vec::new();
         interrupts.iter_mut().for_each(|interrupts| watchers.push(interrupts));
-        if !self.quiet {
+        if !self.quiet && Ranks::here().is_first() {
             watchers.push(&mut progress);
         }
         let begin = if self.resume { Begin::Resumed } else { Begin::Anew };
@@ -85,7 +104,7 @@ impl Run {
         summary.warnings.iter().for_each(|warning| terminal::warn(warning));
         if !self.quiet {
             terminal::say(K::table(&summary));
-            // whoever interrupted the run does not wait for more
+            // whoever interrupted the run does not wait for more; all ranks compute it, since it may be another run
             if !matches!(failure.as_ref().map(Error::cause), Some(Error::Interrupted(_)))
                 && let Some(line) = study.more(&summary)?
             {

@@ -1,6 +1,7 @@
-//! Words to the user. A closed pipe is not an error worth a word.
+//! Words to the user, which are those of rank 0. A closed pipe is not an error worth a word.
 
 use driftmesh::Error;
+use driftmesh::ranks::Ranks;
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write, stderr, stdout};
 use std::path::Path;
@@ -21,6 +22,9 @@ static UNSAID: OnceLock<String> = OnceLock::new();
 /// Warnings printed so far.
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
+/// The error of a rank that does not speak.
+static WITHHELD: Mutex<String> = Mutex::new(String::new());
+
 /// The command line.
 static WORDS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
@@ -38,7 +42,8 @@ pub fn words() -> Vec<String> {
 
 /// Prints to standard output.
 pub fn say(text: impl std::fmt::Display) {
-    if let Err(error) = writeln!(stdout(), "{text}")
+    if Ranks::here().is_first()
+        && let Err(error) = writeln!(stdout(), "{text}")
         && error.kind() != ErrorKind::BrokenPipe
     {
         let _ = UNSAID.set(error.to_string());
@@ -69,7 +74,7 @@ pub fn say_files(out: &Path, files: &[(&str, &str)]) {
 /// Prints something that did not stop the program.
 pub fn warn(text: &str) {
     WARNINGS.fetch_add(1, Ordering::Relaxed);
-    let _ = writeln!(stderr(), "warning: {text}");
+    report(&format!("warning: {text}\n"));
 }
 
 /// How the program ends where nothing failed: with `strict`, any warning makes it fail, and one line says so. `what`
@@ -81,13 +86,26 @@ pub fn succeeded(strict: bool, what: &str) -> Status {
         1 => "1 warning, which --strict makes a failure".into(),
         n => format!("{n} warnings, which --strict makes a failure"),
     };
-    let _ = writeln!(stderr(), "error: {count}: {what}");
+    report(&format!("error: {count}: {what}\n"));
     FAILED
 }
 
 /// Prints what the user may not expect.
 pub fn note(text: &str) {
-    let _ = writeln!(stderr(), "note: {text}");
+    report(&format!("note: {text}\n"));
+}
+
+/// Prints to standard error.
+fn report(text: &str) {
+    if Ranks::here().is_first() {
+        let _ = stderr().write_all(text.as_bytes());
+    }
+}
+
+/// Prints the error of this rank although it does not speak: it alone failed.
+pub fn say_withheld() {
+    let text = WITHHELD.lock().unwrap_or_else(PoisonError::into_inner);
+    let _ = stderr().write_all(text.as_bytes());
 }
 
 /// Prints an error with its remedy and a note, and says how the program ends.
@@ -98,14 +116,19 @@ pub fn complain(error: &Error, help: Option<String>, note: Option<String>) -> St
             text.push_str(&format!("  {title}: {words}\n"));
         }
     }
-    let _ = stderr().write_all(text.as_bytes());
+    report(&text);
+    if !Ranks::here().is_first() {
+        let text = format!("rank {}: {text}", Ranks::here().rank());
+        *WITHHELD.lock().unwrap_or_else(PoisonError::into_inner) = text;
+    }
     if error.is_failure() { FAILED } else { WRONG }
 }
 
-/// Makes the pool of threads, all cores where no number is given. The caller is one of them: handing each small piece
-/// of work to a pool beside it would cost more than the work.
+/// Makes the pool of threads: where no number is given, all cores, or one thread for each of several ranks. The caller
+/// is one of them: handing each small piece of work to a pool beside it would cost more than the work.
 pub fn use_threads(threads: Option<u16>) -> driftmesh::Result<()> {
-    let number = threads.map_or(0, usize::from);
+    let alone = Ranks::here().count() == 1;
+    let number = threads.map_or(if alone { 0 } else { 1 }, usize::from);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(number).use_current_thread().build_global();
     pool.map_err(|error| Error::invalid("--threads", number, format!("no such pool can be made: {error}")))
 }

@@ -206,3 +206,20 @@ fn there_is_always_a_list_of_warnings() {
         std::fs::remove_dir_all(sandbox.path("out")).unwrap();
     }
 }
+
+/// Several processes of a program without MPI would write over each other: each refuses, and says what to do.
+#[cfg(not(feature = "mpi"))]
+#[test]
+fn a_program_without_mpi_is_not_started_several_times() {
+    let sandbox = Sandbox::new();
+    for name in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"] {
+        let call = |count: &str| sandbox.shell(&format!("{name}={count} {PROGRAM} run study.toml --out out"));
+        let several = call("4");
+        let said = words(&several);
+        assert_eq!(several.status.code(), Some(2), "{said}");
+        assert!(said.contains("error: 4 processes were started for one run"), "{said}");
+        assert!(said.contains("--features mpi") && !sandbox.path("out").exists(), "{said}");
+        assert!(call("1").status.success());
+        std::fs::remove_dir_all(sandbox.path("out")).unwrap();
+    }
+}

@@ -10,6 +10,7 @@ mod ring;
 mod schwarz;
 mod sides;
 mod stochastic;
+mod told;
 mod whole;
 
 pub use decomposition::{Cut, Decomposition};

@@ -78,6 +78,11 @@ impl<const D: usize, const S: usize> Part<D, S> {
         }
     }
 
+    /// The correction at the nodes that it owns.
+    pub fn own_correction(&self) -> Vec<[f64; D]> {
+        self.own.iter().map(|&(_, place)| self.correction[place]).collect()
+    }
+
     /// Number of nodes that it reads from its neighbours: those of its patch and ring, corners included, that it does
     /// not own. Nodes on bounded sides are not counted, since every subdomain computes them.
     pub fn read(&self, lattice: &Lattice<D>) -> usize {

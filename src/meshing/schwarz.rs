@@ -1,14 +1,14 @@
-use super::overlap::{Local, Part, residual};
-use super::ring::{Trace, ring, traces};
+mod parts;
+
+use super::overlap::residual;
 use super::sides::size;
-use super::{Contraction, Decomposition, Interface, MeshGenerator, MeshOperator, Mmpde, Moved, move_sides};
+use super::{Contraction, Decomposition, Interface, MeshGenerator, Mmpde, Moved, move_sides};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Density, Lattice, Mesh};
-use crate::numerics::larger;
 use crate::numerics::linear::Robust;
-use crate::parallel;
+use crate::ranks::Ranks;
 use crate::setting::{Auto, Axes};
-use crate::work::Work;
+use parts::Parts;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -118,20 +118,6 @@ const OVERLAP: usize = 2;
 const TOLERANCE: f64 = 1e-10;
 const ITERATIONS: usize = 1000;
 
-/// The subdomains of a lattice with the memory of their solvers.
-#[derive(Debug, Clone, Default)]
-struct Parts<const D: usize, const S: usize> {
-    lattice: Option<Lattice<D>>,
-    parts: Vec<Part<D, S>>,
-    /// For each part its nodes on the ring, for Robin's conditions.
-    traces: Vec<Vec<Trace>>,
-    /// The right-hand sides of a step, without the contributions of Robin's conditions.
-    right: Vec<Vec<[f64; D]>>,
-    /// Nodes that lie on the ring of some subdomain, without those on bounded sides.
-    rings: Vec<usize>,
-    point: Vec<Robust<1>>,
-}
-
 impl<const D: usize, const S: usize> Schwarz<D, S> {
     /// Overlapping subdomains with the default tolerance.
     pub fn new(subdomains: [usize; D], overlap: usize) -> Self {
@@ -153,6 +139,7 @@ impl<const D: usize, const S: usize> Schwarz<D, S> {
     /// [`Error::Invalid`].
     pub fn check(&self, lattice: &Lattice<D>) -> Result<()> {
         Decomposition::new(lattice, *self.subdomains)?;
+        Ranks::here().check_subdomains(&*self.subdomains)?;
         if self.overlap == 0 {
             return Err(Error::invalid(
                 "overlap",
@@ -206,114 +193,6 @@ impl<const D: usize, const S: usize> Schwarz<D, S> {
 const WAVES: usize = 64;
 const TRIALS: usize = 200;
 
-impl<const D: usize, const S: usize> Parts<D, S> {
-    fn prepare(&mut self, lattice: &Lattice<D>, subdomains: [usize; D], overlap: usize) -> Result<(), Failure> {
-        if self.lattice == Some(*lattice) {
-            return Ok(());
-        }
-        let decomposition = Decomposition::new(lattice, subdomains)
-            .map_err(|_| Failure::Subdomains { subdomains: subdomains.into(), cells: lattice.cells().into() })?;
-        let extended = decomposition.extended([overlap / 2, overlap - overlap / 2]);
-        let mut on_ring = vec![false; lattice.len()];
-        for (patch, _) in &extended {
-            ring(patch, lattice).for_each(|bound| on_ring[bound.node] = true);
-        }
-        let parts: Vec<Part<D, S>> = extended.into_iter().map(|(patch, own)| Part::new(lattice, patch, own)).collect();
-        let mut owner = vec![usize::MAX; lattice.len()];
-        for (number, part) in parts.iter().enumerate() {
-            part.own.iter().for_each(|&(node, _)| owner[node] = number);
-        }
-        *self = Self {
-            lattice: Some(*lattice),
-            traces: parts.iter().map(|part| traces(part, &parts, &owner, lattice)).collect(),
-            rings: (0..lattice.len()).filter(|&k| on_ring[k] && !decomposition.on_side(k)).collect(),
-            point: vec![Robust::default(); parts.len()],
-            right: Vec::new(),
-            parts,
-        };
-        Ok(())
-    }
-
-    /// The bound on the contraction of an iteration.
-    fn predict(&mut self, operator: &MeshOperator<D>, mesh: &Mesh<D>) -> Result<(f64, Work), Failure> {
-        let lattice = mesh.lattice();
-        let mut side = vec![[1.0]; lattice.len()];
-        lattice.sides().for_each(|k| side[k] = [0.0]);
-        let zero = vec![[0.0]; lattice.len()];
-        let mut all: Vec<(&Part<D, S>, &mut Robust<1>)> = self.parts.iter().zip(&mut self.point).collect();
-        let solved = parallel::map_mut(&mut all, |(part, solver)| {
-            operator.solve::<S, 1>(part.patch, &zero, &side, [[0.0]; D], *solver, [1.0])
-        });
-        let mut bound = zero.clone();
-        let mut work = Work::default();
-        for (part, solved) in self.parts.iter().zip(solved) {
-            let (w, cost) = solved?;
-            work += cost;
-            part.own.iter().for_each(|&(node, place)| bound[node] = w[place]);
-        }
-        Ok((self.rings.iter().map(|&k| bound[k][0]).fold(0.0, larger), work))
-    }
-
-    /// Sets up the systems of a step. Robin's condition c_g = β c_i + given is eliminated: its unknown part goes to the
-    /// matrix.
-    fn set(&mut self, operator: &MeshOperator<D>, residual: &[[f64; D]], beta: [f64; D]) {
-        for (part, traces) in self.parts.iter_mut().zip(&mut self.traces) {
-            part.prepare(operator, residual);
-            part.correction.clear();
-            for trace in traces.iter_mut().filter(|_| beta != [0.0; D]) {
-                let (row, ring) = (&mut part.matrix.rows[trace.row], 1 + 2 * trace.axis + usize::from(trace.upper));
-                trace.weight = -std::mem::take(&mut row[ring]);
-                row[0] -= beta[trace.axis] * trace.weight;
-            }
-        }
-        self.right = self.parts.iter().map(|part| part.right.clone()).collect();
-    }
-
-    /// One iteration, from corrections `c` at all nodes; returns the largest change. `beta` is that of Robin's
-    /// conditions, and 0 for classical ones.
-    fn iterate(&mut self, c: &mut [[f64; D]], beta: [f64; D], size: [f64; D]) -> Result<(f64, Work), Failure> {
-        let lattice = self.lattice.as_ref().expect("parts are prepared first");
-        let robin = beta != [0.0; D];
-        let before: Vec<Vec<[f64; D]>> =
-            if robin { self.parts.iter().map(|part| part.correction.clone()).collect() } else { Vec::new() };
-        let (newest, own) = (&*c, &self.right);
-        let mut all: Vec<(usize, &mut Part<D, S>, &[Trace])> = (self.parts.iter_mut().zip(&self.traces).enumerate())
-            .map(|(number, (part, traces))| (number, part, traces.as_slice()))
-            .collect();
-        let solved = parallel::map_mut(&mut all, |(number, part, traces)| {
-            part.start(lattice, newest);
-            if !robin {
-                return part.correct(Local::Solve { share: 0.0 }, size);
-            }
-            part.right.copy_from_slice(&own[*number]);
-            for trace in *traces {
-                // a part that has not been solved yet has no corrections
-                let at = |place: usize| before[trace.other].get(place).copied().unwrap_or([0.0; D]);
-                let (ring, inner) = (at(trace.other_ring), at(trace.other_inner));
-                let given: [f64; D] = std::array::from_fn(|c| ring[c] - beta[trace.axis] * inner[c]);
-                (0..D).for_each(|c| part.right[trace.row][c] += trace.weight * given[c]);
-                part.correction[trace.ring] = given;
-            }
-            let work = part.correct(Local::Solve { share: 0.0 }, size)?;
-            for trace in *traces {
-                let inner = part.correction[trace.inner];
-                (0..D).for_each(|c| part.correction[trace.ring][c] += beta[trace.axis] * inner[c]);
-            }
-            Ok(work)
-        });
-        let (mut change, mut work) = (0.0, Work::default());
-        for (part, solved) in self.parts.iter().zip(solved) {
-            work += solved?;
-            for &(node, place) in &part.own {
-                let new = part.correction[place];
-                change = (0..D).map(|k| new[k] - c[node][k]).fold(change, larger);
-                c[node] = new;
-            }
-        }
-        Ok((change, work))
-    }
-}
-
 impl<const D: usize, const S: usize> Schwarz<D, S> {
     /// One step.
     fn advance(&mut self, equation: &Mmpde, mesh: &Mesh<D>, rho: &Density, dt: f64) -> Result<Moved<D>, Failure> {
@@ -345,7 +224,7 @@ impl<const D: usize, const S: usize> Schwarz<D, S> {
             work += cost;
             changes.push(change);
             let iterations = changes.len();
-            if tolerance.is_some_and(|tolerance| change <= tolerance) || self.parts.rings.is_empty() {
+            if tolerance.is_some_and(|tolerance| change <= tolerance) || self.parts.rings() == 0 {
                 break;
             }
             if iterations == self.iterations || !change.is_finite() {
@@ -358,12 +237,13 @@ impl<const D: usize, const S: usize> Schwarz<D, S> {
                 }
             }
         }
+        self.parts.share(&mut c);
         x.iter_mut().zip(&c).for_each(|(x, c)| (0..D).for_each(|k| x[k] += c[k]));
         let contraction = Some(Contraction { iterations: changes.len(), predicted, observed: observed(&changes) });
         let interface = Interface {
-            points: self.parts.rings.len(),
+            points: self.parts.rings(),
             exchanges: changes.len(),
-            read: self.parts.parts.iter().map(|part| part.read(lattice)).max().unwrap_or(0),
+            read: self.parts.read(),
             contraction,
             seconds,
             ..Interface::default()

@@ -87,6 +87,18 @@ struct Found {
     name: &'static str,
     behind: Behind,
     content: ByteBuf,
+    /// All of it, behind the checksum.
+    sealed: Vec<u8>,
+}
+
+/// A run that goes on.
+pub(crate) struct Resumed<T> {
+    /// What was taken up.
+    pub taken: T,
+    /// Words on the newer checkpoints that were refused.
+    pub refused: Vec<String>,
+    /// The bytes of the checkpoint behind its checksum, for other ranks.
+    pub sealed: Vec<u8>,
 }
 
 /// What a checkpoint says of the run that is to go on behind it.
@@ -211,18 +223,18 @@ impl Checkpoints {
     pub(crate) fn resume<T, C: DeserializeOwned>(
         &mut self,
         mut take_up: impl FnMut(C, &Behind) -> Result<T, Unfit>,
-    ) -> Result<Option<(T, Vec<String>)>> {
+    ) -> Result<Option<Resumed<T>>> {
         let mut refused = Vec::new();
         let mut found = Vec::new();
         for name in Self::NAMES.into_iter().chain([Self::LAST]) {
             match self.found(name) {
                 Ok(None) => {}
-                Ok(Some((behind, content))) => found.push(Found { name, behind, content }),
+                Ok(Some(one)) => found.push(one),
                 Err(unfit) => refused.push((self.directory.join(name), unfit)),
             }
         }
         found.sort_by_key(|found| std::cmp::Reverse(found.behind.step));
-        for Found { name, behind, content } in found {
+        for Found { name, behind, content, sealed } in found {
             match decoded(&content).and_then(|content| take_up(content, &behind)) {
                 Ok(taken) => {
                     self.next = usize::from(name == Self::NAMES[0]);
@@ -230,7 +242,8 @@ impl Checkpoints {
                     let words = |(path, unfit): (PathBuf, Unfit)| {
                         format!("{} was left out: {unfit}; the run went on from {name}", path.display())
                     };
-                    return Ok(Some((taken, refused.into_iter().map(words).collect())));
+                    let refused = refused.into_iter().map(words).collect();
+                    return Ok(Some(Resumed { taken, refused, sealed }));
                 }
                 Err(unfit) => refused.push((self.directory.join(name), unfit)),
             }
@@ -239,17 +252,22 @@ impl Checkpoints {
     }
 
     /// A checkpoint of this study, where there is a file of that name.
-    fn found(&self, name: &str) -> Result<Option<(Behind, ByteBuf)>, Unfit> {
+    fn found(&self, name: &'static str) -> Result<Option<Found>, Unfit> {
         match read(&self.directory.join(name)) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(Unfit::Damaged(error.to_string())),
-            Ok(bytes) => meant(opened(&bytes)?, &self.study, name == Self::LAST).map(Some),
+            Ok(bytes) => {
+                let sealed = opened(&bytes)?;
+                let (behind, content) = meant(sealed, &self.study, name == Self::LAST)?;
+                Ok(Some(Found { name, behind, content, sealed: sealed.to_vec() }))
+            }
         }
     }
 
-    /// What a checkpoint of this study is, and its content, from the bytes behind its checksum.
-    pub(crate) fn read<C: DeserializeOwned>(&self, bytes: &[u8]) -> Result<(Behind, C), Unfit> {
-        let (behind, content) = meant(bytes, &self.study, false)?;
+    /// What a checkpoint of this study is, and its content, from the bytes behind its checksum; the last one may be of
+    /// a study with another end.
+    pub(crate) fn read<C: DeserializeOwned>(&self, bytes: &[u8], last: bool) -> Result<(Behind, C), Unfit> {
+        let (behind, content) = meant(bytes, &self.study, last)?;
         Ok((behind, decoded(&content)?))
     }
 
@@ -269,7 +287,7 @@ impl Checkpoints {
             return Err(of_study(unfit));
         }
         match self.found(Self::LAST) {
-            Ok(Some((behind, _))) => Ok(Some(behind)),
+            Ok(Some(found)) => Ok(Some(found.behind)),
             Ok(None) => Err((Self::LAST, Unfit::Missing)),
             Err(unfit) => Err((Self::LAST, unfit)),
         }

@@ -20,7 +20,7 @@ mod vtu;
 
 pub use arrays::final_arrays;
 pub use checkpoints::CheckpointsAt;
-pub(crate) use checkpoints::{Behind, Checkpoints};
+pub(crate) use checkpoints::{Behind, Checkpoints, Resumed};
 pub use curves::draw_curves;
 pub(crate) use directory::write_file;
 pub use directory::{RunDirectory, Standing};

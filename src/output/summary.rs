@@ -1,4 +1,5 @@
 use crate::error::{Error, Failure};
+use crate::ranks::Ranks;
 use serde::{Deserialize, Serialize};
 
 /// `summary.json`: what runs of all kinds of studies say, and the figures of one kind.
@@ -40,7 +41,7 @@ impl<F: Figures> Summary<F> {
             status: "running",
             ended: None,
             seconds: Spent::default(),
-            parallel: Parallel { ranks: 1, threads: rayon::current_num_threads() },
+            parallel: Parallel::here(),
             figures: F::default(),
             warnings: Vec::new(),
         }
@@ -141,4 +142,15 @@ pub struct Parallel {
     pub ranks: usize,
     /// Threads of each.
     pub threads: usize,
+    /// Messages that rank 0 received from other ranks in a step, in the mean over the steps.
+    pub messages: f64,
+    /// Bytes in them.
+    pub bytes: f64,
+}
+
+impl Parallel {
+    fn here() -> Self {
+        let ranks = Ranks::here().count();
+        Self { ranks, threads: rayon::current_num_threads(), messages: 0.0, bytes: 0.0 }
+    }
 }

@@ -28,7 +28,7 @@ const MANY: usize = 8;
 const SHOWN: usize = 250;
 
 /// Names of the entries of a summary, by the end of their paths, with their meanings where these are not plain.
-const NAMES: [(&str, &str, &str); 60] = [
+const NAMES: [(&str, &str, &str); 62] = [
     ("t", "t", ""),
     ("n", "iteration", ""),
     ("error.linf", "largest error", "over the nodes, against the exact solution"),
@@ -76,6 +76,8 @@ const NAMES: [(&str, &str, &str); 60] = [
     ("rate.observed", "observed", ""),
     ("rate.predicted", "predicted", "by theory, for the error in the end; – where no theory says"),
     ("parallel.ranks", "processes", ""),
+    ("parallel.messages", "messages from other processes a step", ""),
+    ("parallel.bytes", "bytes from other processes a step", ""),
     ("rate.bound", "predicted bound", ""),
     ("front.mean", "mean height of the front", ""),
     ("front.range", "its lowest and highest point", ""),

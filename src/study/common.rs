@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::output::{CheckpointsAt, FramesAt};
+use crate::ranks::Ranks;
 use crate::simulation::Schedule;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -113,13 +114,16 @@ impl Output {
 /// A study is a page of text; more is some other file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The text of a study.
-pub(super) fn text_of(reader: impl Read) -> Result<String, String> {
-    let mut bytes = Vec::new();
-    reader.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(format!("it has more than {MAX_BYTES} bytes, which no study has"));
-    }
+/// The text of a study, which rank 0 reads and sends to the others.
+pub(super) fn text_of<R: Read>(open: impl FnOnce() -> Result<R, String>) -> Result<String, String> {
+    let bytes = Ranks::here().from_first(|| {
+        let mut bytes = Vec::new();
+        open()?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+        match bytes.len() as u64 > MAX_BYTES {
+            true => Err(format!("it has more than {MAX_BYTES} bytes, which no study has")),
+            false => Ok(bytes),
+        }
+    })?;
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let line = error.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::formula::{Interpolation, Table, with_tables};
+use crate::ranks::Ranks;
 use ndarray::{ArrayD, IxDyn, OwnedRepr};
 use ndarray_npy::ReadNpyExt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -268,7 +269,12 @@ impl TableFile {
     }
 }
 
+/// The bytes of a file, which rank 0 reads and sends to the others.
 fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
+    Ranks::here().from_first(|| read(path))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, String> {
     let about = std::fs::metadata(path).map_err(|error| format!("cannot be read: {error}"))?;
     if !about.is_file() {
         return Err("is no file".into());

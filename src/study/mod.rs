@@ -31,6 +31,7 @@ mod runner;
 mod shape;
 mod source;
 mod stefan;
+mod together;
 mod uniform;
 
 pub use crate::output::{GivenMesh, read_mesh};

@@ -1,10 +1,14 @@
 //! The one runner: a study of any kind → run directory.
 
 use super::kind::{Kind, Running, SpentBy};
+use super::together::Together;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::Kept;
-use crate::output::{Behind, Checkpoints, Frames, RunDirectory, Spent, Summary, draw, final_arrays, structured};
+use crate::output::{
+    Behind, Checkpoints, Frames, Resumed, RunDirectory, Spent, Summary, draw, final_arrays, structured,
+};
 use crate::parallel::join;
+use crate::ranks::Ranks;
 use crate::report;
 use crate::simulation::{Event, Observer, Scene, Snapshot};
 use crate::stopwatch::Stopwatch;
@@ -40,7 +44,7 @@ pub struct Stage<'a> {
     /// The event with which the run begins: [`Event::Started`] or [`Event::Resumed`].
     pub(super) begins: Event,
     frames: Option<Frames>,
-    watchers: Vec<&'a mut dyn Observer>,
+    together: Together<'a>,
     checkpoints: Option<Checkpoints>,
     clock: Stopwatch,
     /// Seconds of watching and writing.
@@ -54,11 +58,16 @@ impl<'a> Stage<'a> {
             directory: None,
             begins: Event::Started,
             frames: None,
-            watchers: Vec::new(),
+            together: Together::default(),
             checkpoints: None,
             clock: Stopwatch::start(),
             output: 0.0,
         }
+    }
+
+    /// Lets watchers follow the run.
+    fn watched_by(&mut self, watchers: &'a mut [&mut dyn Observer]) {
+        watchers.iter_mut().for_each(|watcher| self.together.watchers.push(*watcher));
     }
 
     /// Frames and watchers.
@@ -70,7 +79,7 @@ impl<'a> Stage<'a> {
     pub(super) fn parts(&mut self) -> (Vec<&mut dyn Observer>, Option<&mut Checkpoints>) {
         let mut observers: Vec<&mut dyn Observer> = Vec::new();
         self.frames.iter_mut().for_each(|frames| observers.push(frames));
-        self.watchers.iter_mut().for_each(|watcher| observers.push(*watcher));
+        observers.push(&mut self.together);
         (observers, self.checkpoints.as_mut())
     }
 
@@ -134,6 +143,11 @@ impl<'a> Stage<'a> {
         Spent { wall, cpu, parts, output: self.output }
     }
 
+    /// Mean messages and bytes that came from other ranks in a step.
+    fn received(&self) -> (f64, f64) {
+        (self.together.received.messages, self.together.received.bytes)
+    }
+
     /// Seconds by the clock, over all parts of the run.
     pub(super) fn wall(&self) -> f64 {
         self.clock.wall()
@@ -163,7 +177,32 @@ pub(super) fn run<K: Kind>(
     let clock = Stopwatch::start();
     let mut study = study.clone();
     study.ready()?;
-    study.data().known(|| run_ready(&study, path, begin, watchers, clock))
+    study.data().known(|| match Ranks::here().is_first() {
+        true => run_ready(&study, path, begin, watchers, clock),
+        false => follow(&study, watchers),
+    })
+}
+
+/// Runs a study on another rank than the first, which gives the checkpoint to begin at: the same steps, and nothing is
+/// written.
+fn follow<K: Kind>(study: &K, watchers: &mut [&mut dyn Observer]) -> Result<Finished<K::Run>> {
+    let mut run = study.begin()?;
+    let mut stage = Stage::bare();
+    stage.watched_by(watchers);
+    let checkpoint = sent(Vec::new());
+    if !checkpoint.is_empty() {
+        let checkpoints = Checkpoints::new(Path::new(""), study.common().1.checkpoint, &study.to_toml())?;
+        let refused = |unfit| Error::Checkpoint { refused: vec![("the checkpoint of rank 0".into(), unfit)] };
+        let (behind, found) = checkpoints.read(&checkpoint, true).map_err(refused)?;
+        behind.followed_by(run.schedule()).map_err(refused)?;
+        run.resume(found, None).map_err(refused)?;
+        stage.begins = Event::Resumed;
+    }
+    let failure = run.go(&mut stage).err();
+    let mut summary = Summary::running(&study.common().0.name, K::KIND.name());
+    run.tell(&mut summary);
+    summary.note(failure.as_ref(), |_| None);
+    Ok(Finished { summary, run, failure })
 }
 
 /// Runs a study that is resolved, where its formulas may name its tables.
@@ -183,8 +222,10 @@ fn run_ready<K: Kind>(
         Begin::Resumed => checkpoints.resume(|found, behind| take_up(study, path, found, behind))?,
     };
     let mut stage = Stage::bare();
+    let mut checkpoint = Vec::new();
     match resumed {
-        Some(((resumed, frames, before), refused)) => {
+        Some(Resumed { taken: (resumed, frames, before), refused, sealed }) => {
+            checkpoint = sealed;
             directory.clear_ended()?;
             run = resumed;
             run.warn(refused);
@@ -201,12 +242,29 @@ fn run_ready<K: Kind>(
     checkpoints.past = run.schedule().map(|schedule| schedule.past());
     stage.directory = Some(&directory);
     stage.checkpoints = Some(checkpoints);
-    watchers.iter_mut().for_each(|watcher| stage.watchers.push(*watcher));
+    stage.watched_by(watchers);
     let summary = Summary::running(&header.name, K::KIND.name());
     directory.write_summary(&summary)?;
     directory.write("study.toml", study.to_toml().as_bytes())?;
+    run.warn(idle(Ranks::here(), run.frames().1));
+    sent(checkpoint);
     let failure = run.go(&mut stage).err();
     end(study, stage, &directory, Finished { summary, run, failure })
+}
+
+/// The checkpoint from which rank 0 goes on, on all ranks; nothing where the run begins anew.
+fn sent(checkpoint: Vec<u8>) -> Vec<u8> {
+    Ranks::here().from_first(|| Ok(checkpoint)).unwrap_or_default()
+}
+
+/// Says so where ranks have nothing to share.
+fn idle(ranks: Ranks, subdomains: [usize; 2]) -> Vec<String> {
+    let idle = ranks.count() > 1 && subdomains == [1, 1];
+    let warning = format!(
+        "{} ranks compute the same: only meshes by the generators `stochastic` and `schwarz` are shared among ranks",
+        ranks.count()
+    );
+    if idle { vec![warning] } else { Vec::new() }
 }
 
 /// What runs, at a checkpoint, with the frames that were there by then and the seconds that it took.
@@ -240,7 +298,7 @@ pub(super) fn decode<K: Kind>(study: &K, bytes: &[u8]) -> Result<usize, Unfit> {
 
 fn decode_known<K: Kind>(study: &K, bytes: &[u8]) -> Result<usize, Unfit> {
     let checkpoints = Checkpoints::new(Path::new(""), study.common().1.checkpoint, &study.to_toml());
-    let (behind, found) = checkpoints.map_err(|error| Unfit::Damaged(error.to_string()))?.read(bytes)?;
+    let (behind, found) = checkpoints.map_err(|error| Unfit::Damaged(error.to_string()))?.read(bytes, false)?;
     let mut run = begun(study)?;
     behind.followed_by(run.schedule())?;
     run.resume(found, None)?;
@@ -259,6 +317,7 @@ fn end<K: Kind>(
     let (last, left) = stage.output(|stage| leave(&mut run, stage, directory));
     let failure = failure.or(left.err());
     run.tell(&mut summary);
+    (summary.parallel.messages, summary.parallel.bytes) = stage.received();
     summary.warnings.extend(study.data().warnings());
     let note = |summary: &mut Summary<_>, failure: Option<&Error>, stage: &Stage<'_>| {
         summary.note(failure, |error| study.remedy(error));

@@ -50,11 +50,12 @@ impl Source {
     /// [`Error::Unreadable`] where there is no such file or its text is not UTF-8.
     pub fn read(path: &Path) -> Result<Self> {
         let unreadable = |reason: String| Error::Unreadable { path: path.into(), reason };
-        if path.is_dir() {
-            return Err(unreadable("it is a directory, not a study file".into()));
-        }
-        let file = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
-        let mut source = Self::new(path.display().to_string(), text_of(file).map_err(unreadable)?);
+        let open = || match path.is_dir() {
+            true => Err("it is a directory, not a study file".into()),
+            false => std::fs::File::open(path).map_err(|error| error.to_string()),
+        };
+        let text = text_of(open).map_err(unreadable)?;
+        let mut source = Self::new(path.display().to_string(), text);
         // a study that is written again, in its run directory, must find the same files
         let whole = std::path::absolute(path).unwrap_or_else(|_| path.into());
         source.directory = whole.parent().map(Path::to_path_buf).unwrap_or_default();
@@ -67,7 +68,7 @@ impl Source {
     /// [`Error::Unreadable`] where nothing comes, or no UTF-8.
     pub fn from_reader(origin: &str, reader: impl Read) -> Result<Self> {
         let unreadable = |reason: String| Error::Unreadable { path: origin.into(), reason };
-        let text = text_of(reader).map_err(unreadable)?;
+        let text = text_of(|| Ok(reader)).map_err(unreadable)?;
         if text.trim().is_empty() {
             return Err(unreadable("it is empty, where the text of a study must come".into()));
         }

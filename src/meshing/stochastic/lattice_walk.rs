@@ -1,7 +1,7 @@
 use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
 use crate::meshing::Decomposition;
-use crate::parallel;
+use crate::ranks::Ranks;
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -95,7 +95,10 @@ impl<const D: usize, const S: usize> Estimator<D, S> for GridWalk {
             }
             std::array::from_fn(|c| problem.new[node][c] + f64::from(turns[c]) * jump[c][c] - mesh.x()[points[p]][c])
         };
-        let (mut estimates, path_steps) = walks.mean(points, self.walks, paid);
+        let ranks = Ranks::here();
+        let owner = |p: usize| ranks.owner(p, points.len());
+        let Means { mut estimates, path_steps, .. } =
+            walks.mean(points, self.walks, owner, |p, stop| (paid(p, stop), false));
         for (estimate, &k) in estimates.iter_mut().zip(points) {
             estimate.x = std::array::from_fn(|c| mesh.x()[k][c] + estimate.x[c]);
         }
@@ -156,6 +159,15 @@ pub(super) struct Walks<'a, const D: usize> {
     periodic: [bool; D],
 }
 
+/// Means over the walks from all points.
+pub(super) struct Means<const D: usize> {
+    pub estimates: Vec<Estimate<D>>,
+    /// Jumps and stops of all walks.
+    pub path_steps: usize,
+    /// Walks whose value came from another subdomain.
+    pub handed_on: usize,
+}
+
 /// The node at which a walk stopped.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stop<const D: usize> {
@@ -175,25 +187,34 @@ impl<'a, const D: usize> Walks<'a, D> {
         Ok(Self { problem, nodes: lattice.nodes(), strides: lattice.strides(), periodic: lattice.periodic() })
     }
 
-    /// For each point the mean over its walks of `pay(number of the point, stop)`, and the number of jumps and stops.
+    /// For each point the mean over its walks of `pay(number of the point, stop)`, which says, too, whether the walk
+    /// was handed on. The rank `owner(number of the point)` does its walks.
     pub fn mean(
         &self,
         points: &[usize],
         walks: usize,
-        pay: impl Fn(usize, Stop<D>) -> [f64; D] + Sync + Send,
-    ) -> (Vec<Estimate<D>>, usize) {
+        owner: impl Fn(usize) -> usize,
+        pay: impl Fn(usize, Stop<D>) -> ([f64; D], bool) + Sync + Send,
+    ) -> Means<D> {
         let numbers: Vec<usize> = (0..points.len()).collect();
-        let found = parallel::map(&numbers, |&p| {
+        let found = Ranks::here().map(&numbers, owner, |&p| {
             let mut samples = Samples::new();
-            let mut steps = 0;
+            let (mut steps, mut handed_on) = (0, 0);
             for path in 0..walks {
                 let stop = self.walk(points[p], path, &mut steps);
-                samples.add(pay(p, stop));
+                let (paid, away) = pay(p, stop);
+                samples.add(paid);
+                handed_on += usize::from(away);
             }
-            (samples.estimate([0.0; D]), steps)
+            (samples.estimate([0.0; D]), steps, handed_on)
         });
-        let steps = found.iter().map(|(_, steps)| steps).sum();
-        (found.into_iter().map(|(estimate, _)| estimate).collect(), steps)
+        let mut means = Means { estimates: Vec::with_capacity(found.len()), path_steps: 0, handed_on: 0 };
+        for (estimate, steps, handed_on) in found {
+            means.estimates.push(estimate);
+            means.path_steps += steps;
+            means.handed_on += handed_on;
+        }
+        means
     }
 
     /// One walk. A random word of 32 bits selects a neighbour, or a stop, by the cumulated weights.

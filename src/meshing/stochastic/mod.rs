@@ -28,7 +28,7 @@ use crate::geometry::{Density, Lattice, Mesh, Patch};
 use crate::kept::Kept;
 use crate::kind::kinds;
 use crate::numerics::linear::Robust;
-use crate::parallel;
+use crate::ranks::Ranks;
 use crate::setting::Axes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -203,6 +203,7 @@ impl<E: Estimator<D, S>, const D: usize, const S: usize> Stochastic<E, D, S> {
     /// [`Error::Invalid`].
     pub fn check(&self, lattice: &Lattice<D>) -> Result<()> {
         let decomposition = Decomposition::new(lattice, *self.subdomains)?;
+        Ranks::here().check_subdomains(&*self.subdomains)?;
         if self.seed > i64::MAX as u64 {
             return Err(Error::invalid("seed", self.seed, "must be a whole number from 0 to 2^63 - 1"));
         }
@@ -266,7 +267,7 @@ impl<E: Estimator<D, S>, const D: usize, const S: usize> Stochastic<E, D, S> {
         let seconds = started.elapsed().as_secs_f64();
 
         let (jump, size) = (mesh.jump(), size(mesh));
-        let solved = parallel::map_mut(&mut parts.patches, |(patch, solver)| {
+        let solved = Ranks::here().map_mut(&mut parts.patches, |(patch, solver)| {
             operator.solve::<S, D>(*patch, mesh.x(), &x, jump, solver, size)
         });
         for ((patch, _), solved) in parts.patches.iter().zip(solved) {

@@ -4,8 +4,8 @@ use super::segment::Segment;
 use super::{Estimate, Estimates, Estimator, Problem, Strips};
 use crate::error::{Error, Failure, Result};
 use crate::meshing::Decomposition;
-use crate::parallel;
 use crate::random::normals;
+use crate::ranks::Ranks;
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -134,7 +134,9 @@ impl MonteCarlo {
         walk: impl Fn([f64; D], &[[Lanes; 2]], usize, Words<'_>) -> ([Lanes; D], usize) + Sync,
     ) -> Result<Estimates<D>, Failure> {
         let bridge = Bridge::new(self.substeps);
-        let found = parallel::map(points, |&k| self.point(problem, &walk, &bridge, k));
+        let ranks = Ranks::here();
+        let owner = |p: usize| ranks.owner(p, points.len());
+        let found = ranks.map(points, owner, |&k| self.point(problem, &walk, &bridge, k));
         let path_steps = found.iter().map(|(_, steps)| steps).sum();
         let estimates = found.into_iter().map(|(estimate, _)| estimate).collect();
         let work = Work { path_steps, ..Work::default() };

@@ -1,5 +1,5 @@
 use super::coarse::SOLVED;
-use super::lattice_walk::{Stop, Walks, check_walks, for_each_neighbour, forget_certainty, lowest, mean_jumps};
+use super::lattice_walk::{Means, Stop, Walks, check_walks, for_each_neighbour, forget_certainty, lowest, mean_jumps};
 use super::strips::{Corrected, Reach, Strips};
 use super::{Estimate, Estimates, Estimator, Problem};
 use crate::error::{Error, Failure, Result};
@@ -10,7 +10,6 @@ use crate::setting::Auto;
 use crate::work::Work;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Random walks that estimate the error which strips leave
 ///
@@ -119,22 +118,22 @@ fn pay_residual<const D: usize, const S: usize>(
     estimates: &mut Estimates<D>,
 ) {
     let owners: Vec<Option<usize>> = points.iter().map(|&k| strips.owner(k)).collect();
-    let handed_on = AtomicUsize::new(0);
-    let (mut paid, path_steps) = walks.mean(points, count, |p, Stop { node, .. }| {
-        let own = |node: usize| owners[p].and_then(|part| strips.seen(part, node));
-        // a node on a bounded side is owned by no subdomain, and its residual is zero
-        if own(node).is_none() && strips.owner(node).is_some_and(|owner| owners[p] != Some(owner)) {
-            handed_on.fetch_add(1, Ordering::Relaxed);
-        }
-        left(problem, found, node, |node| own(node).unwrap_or(found.correction[node]))
-    });
+    // what a subdomain sees of a strip is on its own rank
+    let rank = |p: usize| owners[p].map_or(0, |part| strips.rank(part));
+    let Means { estimates: mut paid, path_steps, handed_on } =
+        walks.mean(points, count, rank, |p, Stop { node, .. }| {
+            let own = |node: usize| owners[p].and_then(|part| strips.seen(part, node));
+            // a node on a bounded side is owned by no subdomain, and its residual is zero
+            let away = own(node).is_none() && strips.owner(node).is_some_and(|owner| owners[p] != Some(owner));
+            (left(problem, found, node, |node| own(node).unwrap_or(found.correction[node])), away)
+        });
     forget_certainty(&mut paid);
     for (estimate, paid) in estimates.points.iter_mut().zip(paid) {
         let x = std::array::from_fn(|c| estimate.x[c] + paid.x[c]);
         *estimate = Estimate { x, standard_error: paid.standard_error };
     }
     estimates.walks = count;
-    estimates.handed_on = handed_on.into_inner();
+    estimates.handed_on = handed_on;
     estimates.work += Work { path_steps, ..Work::default() };
 }
 

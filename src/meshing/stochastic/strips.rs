@@ -6,7 +6,7 @@ use super::coarse::Coarse;
 use crate::error::Failure;
 use crate::geometry::Patch;
 use crate::numerics::larger;
-use crate::parallel;
+use crate::ranks::Ranks;
 use crate::work::Work;
 
 /// Subdomains extended by a strip of their neighbours, with the memory of their solvers
@@ -227,14 +227,17 @@ impl<const D: usize, const S: usize> Strips<D, S> {
             whole.own.iter().for_each(|&(node, place)| guess[node] = whole.correction[place]);
         }
         let residual = &found.residual;
-        let corrected = parallel::map_mut(&mut self.parts, |part| {
+        let corrected = Ranks::here().map_mut(&mut self.parts, |part| {
             part.prepare(problem.operator, residual);
             part.start(lattice, &guess);
-            part.correct(local, size)
+            let work = part.correct(local, size)?;
+            Ok((work, part.rests, part.own_correction()))
         });
-        for (part, corrected) in self.parts.iter().zip(corrected) {
-            found.work += corrected?;
-            part.own.iter().for_each(|&(node, place)| found.correction[node] = part.correction[place]);
+        for (part, corrected) in self.parts.iter_mut().zip(corrected) {
+            let (work, rests, correction) = corrected?;
+            found.work += work;
+            part.rests = rests;
+            part.own.iter().zip(correction).for_each(|(&(node, _), c)| found.correction[node] = c);
         }
         let change = found.correction.as_flattened().iter().fold(0.0, |m, &c| larger(m, c));
         let share = changed.map_or(1.0, |share| self.left_by_coarse(share));
@@ -247,13 +250,18 @@ impl<const D: usize, const S: usize> Strips<D, S> {
         self.parts.iter().all(|part| part.rests)
     }
 
+    /// The rank that owns a part.
+    pub(super) fn rank(&self, part: usize) -> usize {
+        Ranks::here().owner(part, self.parts.len())
+    }
+
     /// The part that owns a node.
     pub(super) fn owner(&self, node: usize) -> Option<usize> {
         self.owner.get(node).map(|&part| part as usize).filter(|&part| part < self.parts.len())
     }
 
-    /// The correction of a node as a part computed it; none outside the part and the nearer half of its strip, beyond
-    /// which the strip sees too little.
+    /// The correction of a node as a part of this rank computed it; none outside the part and the nearer half of its
+    /// strip, beyond which the strip sees too little.
     pub(super) fn seen(&self, part: usize, node: usize) -> Option<[f64; D]> {
         let part = &self.parts[part];
         let margin = self.reach.width - 1 - self.reach.width / 2;
