@@ -4,6 +4,11 @@ mod runs;
 
 use runs::{line, plane};
 
+/// The largest difference of two solutions at a node.
+fn largest(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}
+
 /// Solutions that rest are reached by steps of any length, though cells are too wide for central fluxes: those of
 /// automatic steps and of steps in which the flow crosses twenty cells differ from those of short ones by 1e-6 at most.
 #[test]
@@ -39,7 +44,7 @@ fn a_steady_solution_is_reached_by_steps_of_any_length() {
         };
         let rests = at_end("step = 0.025");
         for step in ["", "step = 0.1", "step = 0.5"] {
-            let off = at_end(step).iter().zip(&rests).fold(0.0, |m: f64, (u, rests)| m.max((u - rests).abs()));
+            let off = largest(&at_end(step), &rests);
             assert!(off < 1e-6, "flux {flux}, {step}: {off:e}");
         }
     }
@@ -76,7 +81,7 @@ fn a_steady_solution_in_the_plane_is_reached_by_steps_of_any_length() {
     };
     let rests = at_end("step = 0.05");
     for step in ["", "step = 0.5"] {
-        let off = at_end(step).iter().zip(&rests).fold(0.0, |m: f64, (u, rests)| m.max((u - rests).abs()));
+        let off = largest(&at_end(step), &rests);
         assert!(off < 1e-6, "{step}: {off:e}");
     }
 }

@@ -20,8 +20,8 @@ const FOLLOWED_ACROSS_CELLS: usize = 10;
 /// The damping is frozen sooner once residuals are below this share of those at the start: what κ still changes is
 /// small then beside what the step does.
 const FOLLOWED_TO: f64 = 1e-3;
-/// From this number of Newton steps on κ goes half of the way only: it then turns from one to the other of two states
-/// that follow from each other, as at a shock in a cell.
+/// From this number of Newton steps on κ goes only half of the way to what the newest values give: a κ that has not
+/// settled by then, as at a shock within a cell, swings between two states, and half-way it comes to rest between them.
 const HALFWAY: usize = 3;
 /// Newton's method is given up once residuals are larger than this multiple of those at its start.
 const DIVERGED: f64 = 10.0;
