@@ -71,3 +71,18 @@ fn no_file_of_code_is_longer_than_400_lines_and_none_of_tests_than_600() {
     let long: Vec<String> = long.collect();
     assert!(long.is_empty(), "too long:\n{}", long.join("\n"));
 }
+
+#[test]
+fn every_file_of_tests_is_part_of_the_suite() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for directory in ["tests", "cli/tests"] {
+        let suite = std::fs::read_to_string(root.join(directory).join("suite.rs")).unwrap();
+        let entries = std::fs::read_dir(root.join(directory)).unwrap().map(|entry| entry.unwrap().path());
+        let names = entries.filter(|path| has_ending(path, &["rs"])).map(|path| path.file_stem().unwrap().to_owned());
+        // ranks need an MPI library: a program of its own
+        for name in names.filter(|name| name != "suite" && name != "ranks") {
+            let module = format!("mod {};", name.display());
+            assert!(suite.lines().any(|line| line == module), "{directory}/suite.rs lacks `{module}`");
+        }
+    }
+}

@@ -1,15 +1,13 @@
 //! Phases that begin or end along a part of a wall, and set-ups that no front can have.
 
-mod front_runs;
-
+use crate::front_runs::{course, study};
 use driftmesh::stefan::{Change, Material, Similarity};
 use driftmesh::study::Kind;
 use driftmesh::{Error, Failure};
-use front_runs::{course, study};
 
 /// What a study is refused with, and the remedy.
 fn refused(text: &str, set: &[impl AsRef<str>]) -> String {
-    let error = front_runs::refused(text, set);
+    let error = crate::front_runs::refused(text, set);
     format!("{error} {}", error.help().unwrap_or_default())
 }
 

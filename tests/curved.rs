@@ -1,11 +1,9 @@
 //! Studies of moving meshes in domains that are not boxes.
 
-mod runs;
-
+use crate::runs::{HEAD, plane};
 use driftmesh::error::Error;
 use driftmesh::geometry::Mesh;
 use driftmesh::study::{Begin, Kind, MovingMesh, PoissonStudy, Source};
-use runs::{HEAD, plane};
 
 fn study(text: &str) -> Result<MovingMesh, Error> {
     MovingMesh::from_source(&Source::new("curved.toml", format!("{HEAD}{text}")))

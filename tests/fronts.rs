@@ -1,8 +1,6 @@
 //! Fronts by default: order in space and time, data sheets, walls with a flux, against exact solutions.
 
-mod front_runs;
-
-use front_runs::{AS_IT_IS, course, refused};
+use crate::front_runs::{AS_IT_IS, course, refused};
 
 /// Neumann's solution from a front that starts at a twentieth of the height.
 const NEAR_THE_WALL: &str = r#"

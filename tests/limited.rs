@@ -1,9 +1,7 @@
 //! Limited fluxes: no new extrema, whatever the mesh does; and bounds.
 
-mod runs;
-
+use crate::runs::{HEAD, line, plane};
 use driftmesh::study::{Kind, MovingLine, MovingRun, Source};
-use runs::{HEAD, line, plane};
 
 /// The least and the largest value of an unknown.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -1,10 +1,8 @@
 //! Phases that vanish and appear, and melts below their melting temperature, against exact solutions.
 
-mod front_runs;
-
+use crate::front_runs::{AS_IT_IS, course, refused, study};
 use driftmesh::stefan::{Change, LOWER, UPPER};
 use driftmesh::study::{Begin, Kind};
-use front_runs::{AS_IT_IS, course, refused, study};
 
 /// u = exp(t − y) − 1 below h = t, and ice at its melting point above: the ice is gone at t = 1.
 const MELT_OUT: &str = r#"

@@ -1,10 +1,8 @@
 //! Public problems as studies, against exact solutions and independent references, and beside equal cells. The values
 //! that SciPy gives are printed by `python tests/python/problems.py`.
 
-mod runs;
-
+use crate::runs::line;
 use driftmesh::study::MovingRun;
-use runs::line;
 
 /// An unknown over x, linear between the nodes.
 struct Profile {

@@ -2,11 +2,9 @@
 //! `published/references.py` makes with NumPy and SciPy. The layers of Burgers' equation that form and merge are in
 //! `moving_line.rs`.
 
-mod runs;
-
+use crate::runs::{HEAD, line as run};
 use driftmesh::error::Error;
 use driftmesh::study::{Kind, MovingLine, MovingRun, Source};
-use runs::{HEAD, line as run};
 use std::path::Path;
 
 /// How a run ended, and its failure.

@@ -1,10 +1,8 @@
 //! Conditions by side for equations given by formulas.
 
-mod runs;
-
+use crate::runs::{HEAD, line, plane};
 use driftmesh::error::Error;
 use driftmesh::study::{Kind, MovingMesh, Source};
-use runs::{HEAD, line, plane};
 
 /// A reactor with Danckwerts' inlet and a closed outlet, u_t + 5 u_x = u_xx − 2u with 5u − u_x = 5 at x = 0 and 0 at
 /// x = 1: at rest u = A e^{px} + B e^{qx}, p and q = (5 ± √33)/2. The error is of order 2.

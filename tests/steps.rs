@@ -1,8 +1,6 @@
 //! Steps of any length: what rests is reached, and given steps are no worse than automatic ones.
 
-mod runs;
-
-use runs::{line, plane};
+use crate::runs::{line, plane};
 
 /// The largest difference of two solutions at a node.
 fn largest(a: &[f64], b: &[f64]) -> f64 {

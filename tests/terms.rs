@@ -1,9 +1,7 @@
 //! Tensors, cross diffusion, gradients in fluxes, diffusivities and sources, storage: against exact solutions.
 
-mod runs;
-
+use crate::runs::{HEAD, line, plane};
 use driftmesh::study::{Kind, MovingMesh, Source};
-use runs::{HEAD, line, plane};
 
 /// The order of the largest error from n to 2n cells and half the step, of a mesh that is moved about.
 fn order(pde: &str) -> f64 {

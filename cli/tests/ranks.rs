@@ -1,7 +1,5 @@
 //! One run on several ranks. `make mpi` runs this; `mpirun` finds in the environment what it needs on a small machine.
 
-#![cfg(feature = "mpi")]
-
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
