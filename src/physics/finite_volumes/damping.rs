@@ -81,11 +81,36 @@ struct Speed {
     flow: f64,
     /// Speed through the moving face.
     relative: f64,
+}
+
+/// How much a face lacks of the diffusion with which a central flux makes no extremum.
+#[derive(Debug, Clone, Copy, Default)]
+struct Lack {
+    /// a of [`Damping`].
+    a: f64,
+    /// w (a/2 − D).
+    excess: f64,
+}
+
+/// Where the flow through a face comes from.
+struct Origin {
     /// Diffusion that the law's own flux has beside the mean of the fluxes of both nodes: where it is negative, the
     /// law's own flux steepens what passes.
     own: f64,
     /// Whether the flow comes from the node below, and from the node above.
     from: [bool; 2],
+}
+
+/// What the nodes on both sides of a face send through it.
+struct Sent<const B: usize> {
+    /// The fluxes, as if both nodes had the values of one.
+    fluxes: [[f64; B]; 2],
+    /// Derivatives of ½ Δt times these.
+    still: [Block<B>; 2],
+    /// The same relative to the nodes of the mesh.
+    moving: [Block<B>; 2],
+    /// Half of the area that the face sweeps.
+    swept: f64,
 }
 
 impl<const D: usize> Half<'_, D> {
@@ -100,53 +125,33 @@ impl<const D: usize> Half<'_, D> {
         if !wanted.contains(&true) {
             return Damping::none();
         }
-        let (strides, row) = (patch.padded_strides(), patch.pencil_len() + 2);
-        let mut speeds = vec![[[Speed::default(); B]; D]; u.len()];
-        parallel::for_each_row(&mut speeds, row, |q, speeds| {
-            if patch.pencil_in_row(q).is_none() {
-                return;
-            }
-            for (k, speeds) in (q * row..).zip(speeds).skip(1).take(row - 2) {
-                for (axis, stride) in strides.into_iter().enumerate().filter(|&(axis, _)| patch.has_face(k, axis)) {
-                    speeds[axis] = self.speeds(law, view, u, [k, k + stride], axis);
-                }
-            }
-        });
-        let fastest = |axis: usize, c: usize| speeds.iter().fold(0.0, |m, speeds| larger(m, speeds[axis][c].flow));
-        let vanishes = law.vanishing_diffusion();
-        let fastest: [[f64; B]; D] = std::array::from_fn(|axis| {
-            std::array::from_fn(|c| if vanishes[c] { f64::INFINITY } else { SWEEPS * fastest(axis, c) })
-        });
-        let ranges: [f64; B] = std::array::from_fn(|c| {
-            let [low, high] = ends(u.iter().map(|u| u[c]));
-            high - low
-        });
-        let excess = |k: usize, axis: usize, c: usize, change: f64| {
-            let most = fastest[axis][c] * length(self.cells.normals()[k][axis]);
-            let (a, enough) = (speeds[k][axis][c].relative.min(most), view.faces[k][axis].diffusion[c]);
-            ((0.5 * a - enough) * wide(a / enough.max(0.0), change.abs() / ranges[c], L::COUNTING), a)
-        };
+        let lacking = self.lacking(law, view, u);
+        let lacks = |k: usize, axis: usize| lacking[k][axis].iter().any(|lack| lack.excess > 0.0);
+        let strides = patch.padded_strides();
+        let mut marked = vec![[false; D]; u.len()];
+        for k in patch.places() {
+            marked[k] = std::array::from_fn(|axis| lacks(k, axis) || lacks(k - strides[axis], axis));
+        }
+        patch.wrap(&mut marked);
         let (lattice, sides) = (self.mesh.lattice(), sides(law, self.t, self.mesh));
-        let steps = Places { lattice, patch, x: self.x, sides: &sides, wanted }.increments(u);
+        let places = Places { lattice, patch, x: self.x, sides: &sides, wanted, marked: Some(&marked) };
+        let steps = places.increments(u);
         let mut damping = vec![[[Kappa::default(); B]; D]; u.len()];
-        parallel::for_each_row(&mut damping, row, |q, damping| {
-            if patch.pencil_in_row(q).is_none() {
+        self.for_each_face(&mut damping, |damping, k, axis| {
+            if !lacks(k, axis) {
                 return;
             }
-            for (k, damping) in (q * row..).zip(damping).skip(1).take(row - 2) {
-                for (axis, stride) in strides.into_iter().enumerate().filter(|&(axis, _)| patch.has_face(k, axis)) {
-                    for c in (0..B).filter(|&c| wanted[c]) {
-                        let change = u[k + stride][c] - u[k][c];
-                        let (excess, a) = excess(k, axis, c, change);
-                        if a > 0.0 && excess > 0.0 && change != 0.0 {
-                            let towards = [steps[k][axis][1][c], steps[k + stride][axis][0][c]];
-                            let value = speeds[k][axis][c].damping(excess, a, towards.map(|step| step / change));
-                            // the flow crosses 2 a/volume cells in a step
-                            let volume = dot(self.way(k, k + stride), self.cells.normals()[k][axis]);
-                            let upwind = if 2.0 * a > volume { value.max(excess) } else { value };
-                            damping[axis][c] = Kappa { value, upwind };
-                        }
-                    }
+            let above = k + strides[axis];
+            let origins = self.origins(law, view, u, [k, above], axis);
+            for (c, Lack { a, excess }) in lacking[k][axis].into_iter().enumerate() {
+                let change = u[above][c] - u[k][c];
+                if a > 0.0 && excess > 0.0 && change != 0.0 {
+                    let towards = [steps[k][axis][1][c], steps[above][axis][0][c]];
+                    let value = origins[c].damping(excess, a, towards.map(|step| step / change));
+                    // the flow crosses 2 a/volume cells in a step
+                    let volume = dot(self.way(k, above), self.cells.normals()[k][axis]);
+                    let upwind = if 2.0 * a > volume { value.max(excess) } else { value };
+                    damping[c] = Kappa { value, upwind };
                 }
             }
         });
@@ -154,23 +159,74 @@ impl<const D: usize> Half<'_, D> {
         Damping(damping)
     }
 
-    /// The largest absolute eigenvalue that belongs to each unknown at a face.
-    fn speeds<const B: usize, L: Law<B, D>>(
+    /// What all faces lack, for the unknowns that are damped.
+    fn lacking<const B: usize, L: Law<B, D>>(
         &self,
         law: &L,
         view: &View<L::Node, B, D>,
         u: &[[f64; B]],
-        [i, k]: [usize; 2],
+    ) -> Vec<[[Lack; B]; D]> {
+        let (patch, wanted, vanishes) = (self.cells.patch(), law.damped(), law.vanishing_diffusion());
+        let strides = patch.padded_strides();
+        let mut speeds = vec![[[Speed::default(); B]; D]; u.len()];
+        self.for_each_face(&mut speeds, |speeds, k, axis| {
+            *speeds = self.speeds(law, view, u, [k, k + strides[axis]], axis);
+        });
+        let fastest = |axis: usize, c: usize| speeds.iter().fold(0.0, |m, speeds| larger(m, speeds[axis][c].flow));
+        let fastest: [[f64; B]; D] = std::array::from_fn(|axis| {
+            std::array::from_fn(|c| if vanishes[c] { f64::INFINITY } else { SWEEPS * fastest(axis, c) })
+        });
+        let ranges: [f64; B] = std::array::from_fn(|c| {
+            let [low, high] = ends(u.iter().map(|u| u[c]));
+            high - low
+        });
+        let mut lacking = vec![[[Lack::default(); B]; D]; u.len()];
+        self.for_each_face(&mut lacking, |lacking, k, axis| {
+            let area = length(self.cells.normals()[k][axis]);
+            for c in (0..B).filter(|&c| wanted[c]) {
+                let change = u[k + strides[axis]][c] - u[k][c];
+                let a = speeds[k][axis][c].relative.min(fastest[axis][c] * area);
+                let enough = view.faces[k][axis].diffusion[c];
+                let w = wide(a / enough.max(0.0), change.abs() / ranges[c], L::COUNTING);
+                lacking[c] = Lack { a, excess: (0.5 * a - enough) * w };
+            }
+        });
+        patch.wrap(&mut lacking);
+        lacking
+    }
+
+    /// Calls `each` with the entry of every face above a node, the place of the node and the axis, in parallel by rows.
+    fn for_each_face<T: Send>(&self, entries: &mut [[T; D]], each: impl Fn(&mut T, usize, usize) + Sync) {
+        let patch = self.cells.patch();
+        let row = patch.pencil_len() + 2;
+        parallel::for_each_row(entries, row, |q, entries| {
+            if patch.pencil_in_row(q).is_none() {
+                return;
+            }
+            for (k, entries) in (q * row..).zip(entries).skip(1).take(row - 2) {
+                for (axis, entry) in entries.iter_mut().enumerate().filter(|&(axis, _)| patch.has_face(k, axis)) {
+                    each(entry, k, axis);
+                }
+            }
+        });
+    }
+
+    /// What the nodes i and k send through the face between them.
+    #[inline(always)]
+    fn sent<const B: usize, L: Law<B, D>>(
+        &self,
+        law: &L,
+        view: &View<L::Node, B, D>,
+        nodes: [usize; 2],
         axis: usize,
-    ) -> [Speed; B] {
+    ) -> Sent<B> {
+        let [i, _] = nodes;
         let (normal, half, swept) = (self.cells.normals()[i][axis], 0.5 * self.dt, 0.5 * self.swept[i][axis]);
-        let (wanted, has_own_flux, area) = (law.damped(), law.has_own_flux(), length(normal));
-        let through = [i, k].map(|at| law.convection(&view.nodes[at], &view.nodes[at], normal));
-        // relative to nodes that stay, and to those of the mesh
+        let through = nodes.map(|at| law.convection(&view.nodes[at], &view.nodes[at], normal));
         let [still, moving] = [0.0, swept].map(|swept| {
             [0, 1].map(|end| -> Block<B> {
                 let Crossing { by_below, by_above, .. } = &through[end];
-                let stored = view.stored.get([i, k][end]).map(|stored| &stored.by_value);
+                let stored = view.stored.get(nodes[end]).map(|stored| &stored.by_value);
                 std::array::from_fn(|c| {
                     std::array::from_fn(|e| {
                         let of_u = if c == e { 1.0 } else { 0.0 };
@@ -179,35 +235,71 @@ impl<const D: usize> Half<'_, D> {
                 })
             })
         });
-        let largest = [&still, &moving].map(|jacobians| speeds(jacobians, wanted));
-        let passing = law.convection(&view.nodes[i], &view.nodes[k], normal);
+        Sent { fluxes: through.map(|crossing| crossing.value), still, moving, swept }
+    }
+
+    /// The slope of a difference of fluxes of an unknown between two values; 0 where these differ by rounding.
+    #[inline(always)]
+    fn slope(&self, [below, above]: [f64; 2], more: f64) -> f64 {
+        let change = above - below;
+        let counts = change.abs() > ROUNDING * (below.abs() + above.abs());
+        if counts { 0.5 * self.dt * more / change } else { 0.0 }
+    }
+
+    /// The largest absolute eigenvalue that belongs to each unknown at a face.
+    #[inline(always)]
+    fn speeds<const B: usize, L: Law<B, D>>(
+        &self,
+        law: &L,
+        view: &View<L::Node, B, D>,
+        u: &[[f64; B]],
+        [i, k]: [usize; 2],
+        axis: usize,
+    ) -> [Speed; B] {
+        let (wanted, has_own_flux) = (law.damped(), law.has_own_flux());
+        let sent = self.sent(law, view, [i, k], axis);
+        let largest = [&sent.still, &sent.moving].map(|jacobians| speeds(jacobians, wanted));
+        let area = length(self.cells.normals()[i][axis]);
         std::array::from_fn(|c| {
-            let change = u[k][c] - u[i][c];
-            let counts = change.abs() > ROUNDING * (u[i][c].abs() + u[k][c].abs());
-            let slope = |more: f64| if counts { half * more / change } else { 0.0 };
-            let own = slope(0.5 * (through[0].value[c] + through[1].value[c]) - passing.value[c]);
+            let [flow, relative] = largest.map(|largest| largest[c]);
             if !has_own_flux[c] || !view.stored.is_empty() {
-                let carried: [f64; 2] = std::array::from_fn(|end| moving[end][c][c]);
+                return Speed { flow: flow / area, relative };
+            }
+            let secant = self.slope([u[i][c], u[k][c]], sent.fluxes[1][c] - sent.fluxes[0][c]);
+            Speed { flow: larger(flow, secant) / area, relative: larger(relative, secant - sent.swept) }
+        })
+    }
+
+    /// Where the flow of each unknown through a face comes from.
+    fn origins<const B: usize, L: Law<B, D>>(
+        &self,
+        law: &L,
+        view: &View<L::Node, B, D>,
+        u: &[[f64; B]],
+        [i, k]: [usize; 2],
+        axis: usize,
+    ) -> [Origin; B] {
+        let has_own_flux = law.has_own_flux();
+        let Sent { fluxes, moving, swept, .. } = self.sent(law, view, [i, k], axis);
+        let passing = law.convection(&view.nodes[i], &view.nodes[k], self.cells.normals()[i][axis]);
+        std::array::from_fn(|c| {
+            let slope = |more: f64| self.slope([u[i][c], u[k][c]], more);
+            let own = slope(0.5 * (fluxes[0][c] + fluxes[1][c]) - passing.value[c]);
+            let carried: [f64; 2] = std::array::from_fn(|end| moving[end][c][c]);
+            if !has_own_flux[c] || !view.stored.is_empty() {
                 let alone = moving.iter().all(|j| (0..B).all(|e| e == c || (j[c][e] == 0.0 && j[e][c] == 0.0)));
                 let comes = |sign: f64| !alone || carried.iter().any(|speed| sign * speed > 0.0);
-                let from = [comes(1.0), comes(-1.0)];
-                return Speed { flow: largest[0][c] / area, relative: largest[1][c], own, from };
+                return Origin { own, from: [comes(1.0), comes(-1.0)] };
             }
-            let secant = slope(through[1].value[c] - through[0].value[c]);
-            let relative = [moving[0][c][c], moving[1][c][c], secant - swept];
+            let relative = [carried[0], carried[1], slope(fluxes[1][c] - fluxes[0][c]) - swept];
             let from = [relative.iter().any(|speed| *speed > 0.0), relative.iter().any(|speed| *speed < 0.0)];
-            Speed {
-                flow: larger(largest[0][c], secant) / area,
-                relative: larger(largest[1][c], secant - swept),
-                own,
-                from,
-            }
+            Origin { own, from }
         })
     }
 }
 
-impl Speed {
-    /// κ from a/2 − D, a, and (u₋ − u_i)/(u_k − u_i) and (u_k − u₊)/(u_k − u_i).
+impl Origin {
+    /// κ from w (a/2 − D), a, and (u₋ − u_i)/(u_k − u_i) and (u_k − u₊)/(u_k − u_i).
     fn damping(&self, excess: f64, a: f64, towards: [f64; 2]) -> f64 {
         let theta = |end: usize| if self.from[end] { 1.0 - 2.0 * towards[end] } else { LEAST };
         let steepening = (-self.own).max(0.0) * (2.0 * excess / a).min(1.0);

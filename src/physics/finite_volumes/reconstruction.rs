@@ -57,9 +57,15 @@ pub(super) struct Places<'a, const B: usize, const D: usize> {
     pub sides: &'a [Side<B>],
     /// The unknowns whose values are wanted.
     pub wanted: [bool; B],
+    /// The places, with their rings, where values along each axis are wanted; none for all places.
+    pub marked: Option<&'a [[bool; D]]>,
 }
 
 impl<const B: usize, const D: usize> Places<'_, B, D> {
+    fn is_marked(&self, k: usize, axis: usize) -> bool {
+        self.marked.is_none_or(|marked| marked[k][axis])
+    }
+
     fn distance(&self, i: usize, k: usize) -> f64 {
         let way: [f64; D] = std::array::from_fn(|d| self.x[k][d] - self.x[i][d]);
         length(way)
@@ -77,7 +83,7 @@ impl<const B: usize, const D: usize> Places<'_, B, D> {
                 return;
             }
             for (k, steps) in (q * row..).zip(steps).skip(1).take(row - 2) {
-                for (d, s) in strides.into_iter().enumerate() {
+                for (d, s) in strides.into_iter().enumerate().filter(|&(d, _)| self.is_marked(k, d)) {
                     let h = [self.distance(k - s, k), self.distance(k, k + s)];
                     for c in (0..B).filter(|&c| wanted[c]) {
                         let differences = [u[k][c] - u[k - s][c], u[k + s][c] - u[k][c]];
@@ -105,6 +111,10 @@ impl<const B: usize, const D: usize> Places<'_, B, D> {
             }
             for (k, seconds) in (q * row..).zip(seconds).skip(1).take(row - 2) {
                 for (d, s) in strides.into_iter().enumerate() {
+                    // those of neighbours tell whether an extremum is smooth
+                    if [k - s, k, k + s].iter().all(|&k| !self.is_marked(k, d)) {
+                        continue;
+                    }
                     let [below, above] = [self.distance(k - s, k), self.distance(k, k + s)];
                     // beyond a bounded side there is nothing
                     if below == 0.0 || above == 0.0 {

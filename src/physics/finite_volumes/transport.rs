@@ -205,7 +205,7 @@ where
         let patch = *stage.cells.patch();
         let strides = patch.padded_strides();
         let (lattice, wanted) = (stage.mesh.lattice(), self.limited.unknowns);
-        let steps = Places { lattice, patch, x: &stage.x, sides: &stage.sides, wanted }.increments(u);
+        let steps = Places { lattice, patch, x: &stage.x, sides: &stage.sides, wanted, marked: None }.increments(u);
         let mut faces = vec![[[0.0; B]; D]; u.len()];
         let mut speeds = vec![[0.0; D]; u.len()];
         let seen = inside(&stage.mesh, &stage.x);
