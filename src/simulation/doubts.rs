@@ -53,39 +53,35 @@ where
         return Vec::new();
     };
     let names = simulation.physics.unknowns();
-    let lost = References::new(simulation, state, finer);
-    let lost = names.iter().enumerate().map(|(c, name)| lost.as_ref()?.lost(simulation, state, c, name));
-    let hidden = hidden(simulation, state, finer).into_iter().chain(std::iter::repeat(None));
+    let [equal, coarser] = [finer, finer / 2].map(|finer| initial_on_equal_cells(simulation, state, finer));
+    let references = equal.as_ref().zip(coarser.as_ref()).map(|(finer, coarser)| References { finer, coarser });
+    let lost = names.iter().enumerate().map(|(c, name)| references.as_ref()?.lost(simulation, state, c, name));
+    let hidden = hidden(simulation, state, finer, equal.as_ref()).into_iter().chain(std::iter::repeat(None));
     lost.zip(hidden).filter_map(|(lost, hidden)| lost.or(hidden)).collect()
 }
 
 /// The initial data on equal cells, a few times smaller than those of the mesh, and on cells twice as large.
-struct References<const D: usize> {
-    finer: (Mesh<D>, Field),
-    coarser: (Mesh<D>, Field),
+struct References<'a, const D: usize> {
+    finer: &'a (Mesh<D>, Field),
+    coarser: &'a (Mesh<D>, Field),
 }
 
-impl<const D: usize> References<D>
+impl<const D: usize> References<'_, D>
 where
     Mesh<D>: Cells<D>,
 {
-    fn new(simulation: &Simulation<D>, state: &State<D>, finer: usize) -> Option<Self> {
-        let at = |finer| initial_on_equal_cells(simulation, state, finer);
-        Some(Self { finer: at(finer)?, coarser: at(finer / 2)? })
-    }
-
     /// Says that the mesh misses a share of an unknown's content ∫|u − m|, with m the median of u over the domain.
     /// Nothing is said where the content on the coarser cells differs from that on the finer ones by half as much as
     /// that on the mesh does, or more: no reference is known then.
     fn lost(&self, simulation: &Simulation<D>, state: &State<D>, c: usize, name: &str) -> Option<String> {
         let nodal: Vec<f64> = state.u.component(c).collect();
         let values: Vec<f64> = self.finer.1.component(c).collect();
-        let size = values.iter().fold(0.0, |m, u| larger(m, *u)) * of_box(&state.mesh);
+        let size = values.iter().fold(0.0, |m, u| larger(m, *u)) * state.mesh.volume();
         let median = median(values);
         let content = |mesh: &Mesh<D>, u: &Field| {
             sum(node_areas(mesh).into_iter().zip(u.component(c)).map(|(area, u)| area * (u - median).abs()))
         };
-        let [there, twice] = [&self.finer, &self.coarser].map(|(mesh, u)| content(mesh, u));
+        let [there, twice] = [self.finer, self.coarser].map(|(mesh, u)| content(mesh, u));
         let seen = content(&state.mesh, &state.u);
         let off = (there - seen).abs();
         (off > LOSS * there && there > ROUNDING * size && (there - twice).abs() < 0.5 * off).then(|| {
@@ -102,7 +98,12 @@ where
 
 /// Something small between the nodes: a value within a cell that is far outside of those at the nodes around it. It is
 /// looked for within every cell, and on equal cells, since a blob may be smaller than what divides a wide cell.
-fn hidden<const D: usize>(simulation: &Simulation<D>, state: &State<D>, finer: usize) -> Vec<Option<String>>
+fn hidden<const D: usize>(
+    simulation: &Simulation<D>,
+    state: &State<D>,
+    finer: usize,
+    equal: Option<&(Mesh<D>, Field)>,
+) -> Vec<Option<String>>
 where
     Mesh<D>: Cells<D>,
 {
@@ -113,18 +114,16 @@ where
         let node = within.lattice().node(k);
         std::array::from_fn(|d| (node[d] / finer).min(cells[d] - 1))
     };
-    let mut looked = vec![(simulation.physics.initial(state.t, &within), (0..within.x().len()).map(own).collect())];
-    let mut places = vec![within];
-    if let Some((equal, data)) = initial_on_equal_cells(simulation, state, finer) {
-        looked.push((data, mesh.parameters().holding(equal.parameters().x().iter().copied())));
-        places.push(equal);
+    let data = simulation.physics.initial(state.t, &within);
+    let mut looked = vec![(&data, &within, (0..within.x().len()).map(own).collect())];
+    if let Some((equal, data)) = equal {
+        looked.push((data, equal, mesh.parameters().holding(equal.parameters().x().iter().copied())));
     }
     let names = simulation.physics.unknowns();
     let told = names.iter().enumerate().map(|(c, name)| {
         let nodal: Vec<f64> = state.u.component(c).collect();
         let [low, high] = ends(looked[0].0.component(c).chain(nodal.iter().copied()));
-        let looks = looked.iter().zip(&places);
-        let all = looks.map(|((data, cells), places)| worst(lattice, &nodal, data, c, cells, places));
+        let all = looked.iter().map(|(data, places, cells)| worst(lattice, &nodal, data, c, cells, places));
         let (off, x, value, [least, most]) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
         (off > HIDDEN * (high - low)).then(|| {
             format!(
@@ -149,8 +148,14 @@ fn worst<const D: usize>(
     places: &Mesh<D>,
 ) -> (f64, [f64; D], f64, [f64; 2]) {
     let mut worst = (f64::NEG_INFINITY, [0.0; D], 0.0, [0.0; 2]);
+    // places of one cell follow each other
+    let mut last = None;
     for ((value, &cell), &x) in data.component(c).zip(cells).zip(places.x()) {
-        let around @ [least, most] = around(lattice, nodal, cell);
+        let around @ [least, most] = match last {
+            Some((same, around)) if same == cell => around,
+            _ => around(lattice, nodal, cell),
+        };
+        last = Some((cell, around));
         let off = (least - value).max(value - most);
         if off > worst.0 {
             worst = (off, x, value, around);
@@ -195,10 +200,6 @@ fn initial_on_equal_cells<const D: usize>(
     let mesh = of.even(lattice).ok()?;
     let u = simulation.physics.initial(state.t, &mesh);
     u.values().iter().all(|u| u.is_finite()).then_some((mesh, u))
-}
-
-fn of_box<const D: usize>(mesh: &Mesh<D>) -> f64 {
-    mesh.volume()
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
