@@ -21,6 +21,7 @@ mod equidistribution;
 mod errors;
 mod floors;
 mod forced;
+mod forming;
 mod formula_pde;
 mod front_runs;
 mod fronts;

@@ -2,6 +2,7 @@ use super::mmpde::cell_means;
 use super::{Form, Mmpde};
 use crate::error::{Failure, Result};
 use crate::geometry::{Density, Lattice, Mesh, Patch, diagonal, strides};
+use crate::numerics::larger;
 use crate::numerics::linear::{LinearSolver, Robust};
 use crate::work::Work;
 
@@ -145,7 +146,9 @@ fn at_ends<const D: usize>(
     (0..D).filter(|&d| !along.contains(&d) && upper(d)).map(|d| last[d] * strides[d]).sum()
 }
 
-/// The largest coordinate along each axis.
+/// The largest coordinate along each axis, of the box or, where nodes have left it along a periodic axis, of a node:
+/// what is computed with it is rounded to a share of it.
 pub(super) fn size<const D: usize>(mesh: &Mesh<D>) -> [f64; D] {
-    std::array::from_fn(|d| mesh.lower()[d].abs().max(mesh.upper()[d].abs()))
+    let of_box = std::array::from_fn(|d| mesh.lower()[d].abs().max(mesh.upper()[d].abs()));
+    mesh.x().iter().fold(of_box, |size, x| std::array::from_fn(|d| larger(size[d], x[d])))
 }

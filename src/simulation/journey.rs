@@ -13,13 +13,12 @@ const MOST: f64 = 3e-3;
 const OF_UNIFORM: f64 = 0.25;
 /// Moving the nodes in a step may add this share of what the solution changes by itself.
 const OF_CHANGE: f64 = 0.2;
-/// Moving the nodes in a step may add this share of what the solution changes by itself where the mesh does not resolve
-/// it, as while a layer forms.
+/// The same where equal cells do not resolve the unknown, as when a layer forms: it gets thinner while the mesh is on
+/// its way, and a mesh that is too slow never arrives.
 const WHERE_UNRESOLVED: f64 = 0.5;
-/// A mesh begins not to resolve an unknown where an edge holds more than the first of these shares of its range, and
-/// does not from the second on. Layers that the mesh is at rest around have a third of the range on an edge where cells
-/// are few.
-const UNRESOLVED: [f64; 2] = [0.5, 0.7];
+/// Equal cells begin not to resolve an unknown where its steepest slope, over the length of one, is the first of these
+/// shares of its range, and do not from the second on.
+const UNRESOLVED: [f64; 2] = [0.25, 0.4];
 /// Linear interpolation of a layer that changes by the share g of its range over a cell has an error of this times g²,
 /// as a share of the range.
 const INTERPOLATION: f64 = 0.2;
@@ -42,10 +41,10 @@ const INTERPOLATION: f64 = 0.2;
 ///
 /// E₀ and E are the errors with which equal cells and this mesh interpolate the unknown, estimated from its largest
 /// change over a cell, so that over a run the error stays below a quarter of the one of equal cells. U is what the
-/// solution changes by itself in a unit of time, of which a mesh that follows may add the share c, from 0.2 to 0.5; n
-/// is the [`Need`], which is 0 where equal cells resolve all unknowns. The last term is for the way back to equal
-/// cells, where these have become better than this mesh; there E and E₀ from second differences along the lattice
-/// count, too, which see wide cells at the crest of a wave.
+/// solution changes by itself in a unit of time, of which a mesh that follows may add the share c: from 0.2 to 0.5, the
+/// worse equal cells resolve the unknown. n is the [`Need`], which is 0 where equal cells resolve all unknowns. The
+/// last term is for the way back to equal cells, where these have become better than this mesh; there E and E₀ from second
+/// differences along the lattice count, too, which see wide cells at the crest of a wave.
 pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
 where
     Mesh<D>: Cells<D>,
@@ -87,9 +86,8 @@ where
             .zip(end.areas())
             .map(|(k, area)| (0..D).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
-        // what the mesh itself does not resolve does more harm than the way to where it does
         let jump = largest_step(lattice, &values) / range;
-        let unresolved = ((jump - UNRESOLVED[0]) / (UNRESOLVED[1] - UNRESOLVED[0])).clamp(0.0, 1.0);
+        let unresolved = ((over_cell - UNRESOLVED[0]) / (UNRESOLVED[1] - UNRESOLVED[0])).clamp(0.0, 1.0);
         let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
         let [here, equal] = of_bends(places, &patch, &u, h);

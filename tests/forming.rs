@@ -1,0 +1,45 @@
+//! Layers that form or get thinner where they are, out of data that equal cells resolve: the mesh follows them.
+
+use crate::runs::line;
+use driftmesh::study::MovingRun;
+
+fn l_inf(run: &MovingRun<1>) -> f64 {
+    run.record.reports.last().unwrap().error.unwrap().linf
+}
+
+/// u = tanh(10 eᵗ (x − ½)), which is 55 times as steep at t = 4 as at the start, with steps of any length. Equal cells are off by .6 and more.
+#[test]
+fn a_layer_that_gets_thinner_is_followed() {
+    let error = |cells: usize, step: &str| {
+        l_inf(&line(&format!(
+            r#"
+            [domain]
+            lower = [0.0]
+            upper = [1.0]
+            [grid]
+            cells = [{cells}]
+            [time]
+            start = 0.0
+            end = 4.0
+            {step}
+            [pde]
+            kind = "formula"
+            unknowns = ["u"]
+            diffusivity = {{ u = "1e-3" }}
+            source = {{ u = "(1 - tanh(10*(x - 0.5)*exp(t))^2)*10*exp(t)*(x - 0.5 + 0.02*exp(t)*tanh(10*(x - 0.5)*exp(t)))" }}
+            initial = {{ u = "tanh(10*(x - 0.5))" }}
+            boundary = {{ u = "tanh(10*(x - 0.5)*exp(t))" }}
+            exact = {{ u = "tanh(10*(x - 0.5)*exp(t))" }}
+            "#
+        )))
+    };
+    // on 200 cells equal ones resolve the layer for so long that the mesh is late
+    for (cells, allowed) in [(33, 5e-3), (48, 1.5e-3), (80, 1.5e-3), (97, 1.5e-3), (200, 4e-2)] {
+        let error = error(cells, "");
+        assert!(error < allowed, "{cells} cells: {error:e}");
+    }
+    for step in [0.1, 0.02, 0.002] {
+        let error = error(48, &format!("step = {step}"));
+        assert!(error < 1.5e-3, "steps of {step}: {error:e}");
+    }
+}
