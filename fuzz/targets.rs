@@ -6,7 +6,7 @@
 #![allow(dead_code)] // each user takes one of them
 
 #[path = "line.rs"]
-mod line;
+pub mod line;
 
 use driftmesh::formula::{Formula, Program};
 use driftmesh::study::{EquidistributionStudy, Kind, Source, Study};

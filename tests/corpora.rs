@@ -1,7 +1,6 @@
 //! Replays what the fuzzer found, and every study of ours.
 
-#[path = "../fuzz/targets.rs"]
-mod targets;
+use crate::targets;
 
 fn replay(directory: &str, target: fn(&[u8])) {
     let entries = std::fs::read_dir(directory).unwrap();

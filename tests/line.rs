@@ -1,9 +1,6 @@
 //! A line never stalls: densities of all kinds are equidistributed, and every Schwarz method converges or says why.
 
-#[path = "../fuzz/line.rs"]
-mod drawn;
-
-use drawn::dice::Dice;
+use crate::targets::line::{self as drawn, dice::Dice};
 use driftmesh::equidistribution::{FaceDensity, Line, LineDensity};
 use driftmesh::study::{EquidistributionStudy, Kind, Source};
 use rayon::prelude::*;

@@ -13,7 +13,6 @@ mod data;
 mod data_sheets;
 mod defaults;
 mod degenerate;
-mod dice;
 mod dimensions;
 mod domains;
 mod doubts;
@@ -54,3 +53,7 @@ mod studies;
 mod sweep;
 mod terms;
 mod uniform;
+
+/// What the fuzzer tries, and the random choices of studies.
+#[path = "../fuzz/targets.rs"]
+mod targets;

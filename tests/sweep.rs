@@ -1,6 +1,6 @@
 //! Random studies: each is completed or ends with a named error, and no mesh that a run shows is folded or off its box.
 
-use crate::dice::Dice;
+use crate::targets::line::dice::Dice;
 use driftmesh::geometry::{Mesh, check_unfolded};
 use driftmesh::simulation::{Event, Observer, Record, Retries, Snapshot};
 use driftmesh::study::{Kind, MovingMesh, Source};
