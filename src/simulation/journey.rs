@@ -43,8 +43,8 @@ const INTERPOLATION: f64 = 0.2;
 /// change over a cell, so that over a run the error stays below a quarter of the one of equal cells. U is what the
 /// solution changes by itself in a unit of time, of which a mesh that follows may add the share c: from 0.2 to 0.5, the
 /// worse equal cells resolve the unknown. n is the [`Need`], which is 0 where equal cells resolve all unknowns. The
-/// last term is for the way back to equal cells, where these have become better than this mesh; there E and E₀ from second
-/// differences along the lattice count, too, which see wide cells at the crest of a wave.
+/// last term is for the way back to equal cells, where these have become better than this mesh; there E and E₀ from
+/// second differences along the lattice count, too, which see wide cells at the crest of a wave.
 pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
 where
     Mesh<D>: Cells<D>,
