@@ -4,7 +4,7 @@
 
 Each solver has a mesh that follows its own temperature. In each step the temperature of one is mapped to the mesh of
 the other by interpolation ("consistent"), and the heat that passes is mapped back with its integral ("conservative").
-Prints the largest error of each temperature against Fourier's series, and which share of the heat is lost or gained.
+Prints the largest error of each temperature against Fourier's series, and the share of heat made or lost to 12 digits.
 """
 
 import numpy as np

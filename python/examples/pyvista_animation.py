@@ -18,6 +18,7 @@ STUDY = {
     "pde": {"kind": "burgers", "viscosity": 0.005},
     "output": {"report": False},
 }
+BAR = {"vertical": True, "position_x": 0.88, "fmt": "%.2f"}  # with room for its numbers
 
 
 def animate(run, path, name="u", height=0.3, window=(640, 480)):
@@ -28,7 +29,7 @@ def animate(run, path, name="u", height=0.3, window=(640, 480)):
     for frame in run.frames:
         relief = frame.mesh.to_pyvista(**{name: frame[name]}).warp_by_scalar(name, factor=height)
         # what has the name of something in the frame before replaces it
-        plotter.add_mesh(relief, name="relief", clim=limits, show_edges=True, scalar_bar_args={"vertical": True})
+        plotter.add_mesh(relief, name="relief", clim=limits, show_edges=True, scalar_bar_args=BAR)
         plotter.add_text(f"t = {frame.t:.2f}", name="time", font_size=12)
         plotter.write_frame()
     plotter.close()
