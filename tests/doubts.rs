@@ -35,10 +35,10 @@ fn a_relaxation_that_is_too_short_is_told_the_limit() {
             said.contains(&format!("it is {short:.1} time steps, and the mesh turns back from step to step")),
             "{said}"
         );
-        let limit = said.split("it comes to rest with ").nth(1).and_then(|text| text.split(',').next());
+        let limit = said.split("it rests with ").nth(1).and_then(|text| text.split(';').next());
         let limit: f64 = limit.unwrap_or_else(|| panic!("{said}")).parse().unwrap();
         assert!(limit > short, "{said}");
-        let enough = format!("{{ steps = {}, prediction = 0.2 }}", 1.5 * limit);
+        let enough = format!("{{ steps = {}, prediction = 0.2 }}", limit);
         assert_eq!(warnings(&standing_front(width, &enough)), [""; 0], "{width}: {limit}");
         assert_eq!(warnings(&standing_front(width, "\"auto\"")), [""; 0]);
     }

@@ -44,6 +44,7 @@ mod remedies;
 mod resume;
 mod runs;
 mod safety;
+mod same_everywhere;
 mod schwarz_theorems;
 mod shallow_water;
 mod sides;

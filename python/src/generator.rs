@@ -5,7 +5,7 @@ use crate::mover::{Movers, Parts, Settings, busy};
 use crate::threads::{BRIEFLY, Ended, Threads, calls, compute, interruptible};
 use driftmesh::Error;
 use driftmesh::density::{NOISE_WORTH_A_WARNING, noise};
-use driftmesh::geometry::{Mesh, check_unfolded};
+use driftmesh::geometry::{Mesh, check_unfolded, interpolate};
 use driftmesh::meshing::{LineGeneratorKind, Movable, Relaxation};
 use driftmesh::mover::{self, Ending, Step, steps_to_rest};
 use driftmesh::study::Source;
@@ -242,13 +242,11 @@ impl Generator {
         Mesh<D>: Movable<D>,
     {
         let limit = self.at_work(py, move |parts: &mut Parts<D>| {
-            steps_to_rest(&mesh, parts.mover.equation.form, &*parts.monitor, &u)
+            let values = |on: &Mesh<D>| interpolate(&mesh, &u, on);
+            steps_to_rest(&mesh, parts.mover.equation, dt, &*parts.monitor, values)
         })?;
         let limit = limit.map_or("\"auto\" finds how many steps it takes to rest".into(), |steps| {
-            format!(
-                "on this u it comes to rest with {:.3e}, {steps:.0} steps, which \"auto\" finds by itself",
-                steps * dt
-            )
+            format!("on this u it rests with {:.3e}, {steps:.0} steps; \"auto\" finds it by itself", steps * dt)
         });
         Ok(format!("`relaxation` is short: the mesh turns back from step to step; {limit}"))
     }

@@ -66,8 +66,10 @@ const PASSES: f64 = 8.0;
 /// on periodic axes or where a front winds across the lines, a mesh of 40 cells would not come to rest around layers
 /// thinner than a hundredth of the box.
 const FEW: f64 = 2.0;
-/// u is constant but for rounding where its change over the domain, at the steepest slope, is below this share of its
-/// size; slopes are even where their excess is below this share of the background.
+/// u is constant but for what solvers leave where its change over the domain, at the steepest slope, is below this
+/// share of its size.
+const ALIKE: f64 = 1e-7;
+/// Slopes are even where their excess is below this share of the background.
 const ROUNDING: f64 = 1e-10;
 /// An unknown whose range is below this share of the largest of all is made of rounding, and is left out.
 const OF_ROUNDING: f64 = 1e-9;
@@ -180,7 +182,7 @@ impl<const D: usize> Followed<D> {
                 continue;
             }
             let Slopes { along, steepest, axes } = Slopes::of(mesh, u, range);
-            if steepest * range * longest <= ROUNDING * size {
+            if steepest * range * longest <= ALIKE * size {
                 continue;
             }
             step = larger(step, largest_step(lattice, u) / range);

@@ -1,9 +1,10 @@
 use super::{Followed, Gait, Mover};
 use crate::density::Monitor;
 use crate::error::Result;
-use crate::geometry::{Density, Mesh, check_unfolded, interpolate, strides};
-use crate::meshing::{Form, Mmpde, Movable, Relaxation};
+use crate::geometry::{Density, Mesh, check_unfolded, strides};
+use crate::meshing::{Form, Mmpde, Movable, Relaxation, Steps};
 use crate::numerics::ends;
+use std::iter::successors;
 
 /// A mesh that was adapted to a density at the start.
 #[derive(Debug, Clone)]
@@ -43,6 +44,14 @@ const JUMP_AT_THE_END: f64 = 0.4;
 const THIN_AT_THE_END: f64 = 0.1;
 /// A mesh stands still where no node moves by more than this share of the shortest edge in a step.
 const AT_REST: f64 = 4e-3;
+/// Factor between one τ and the next that is tried.
+const LONGER: f64 = 1.25;
+/// A τ of this many steps is not tried any more.
+const LONGEST: f64 = 1e3;
+/// A mesh that does not turn back in [`WATCHED`] steps may do so later where its τ is close to the limit.
+const SURE: f64 = 1.5;
+/// Number of steps in which a mesh that is moved with a τ is watched.
+const WATCHED: usize = 200;
 
 /// The mesh that rests on a density, from a given mesh
 ///
@@ -88,24 +97,41 @@ where
     to_rest(if check_unfolded(&start).is_ok() { start } else { mesh }, form, followed)
 }
 
-/// The fewest time steps in τ with which a mesh rests on `values`, given at the nodes of `mesh` and carried by
-/// interpolation, as far as [`adapted`] can tell from equal cells; nothing where it does not come to rest.
+/// Time steps in τ with which a mesh does not turn back from step to step on what `values` are on a mesh: the given τ is
+/// made longer until it does not, and then [`SURE`] times as long. Nothing where no τ of less than [`LONGEST`] steps
+/// will do.
+///
+/// The equation has the given τ, in time steps of length `dt`.
 pub fn steps_to_rest<const D: usize>(
     mesh: &Mesh<D>,
-    form: Form,
+    equation: Mmpde,
+    dt: f64,
     monitor: &dyn Monitor<D>,
-    values: &[f64],
+    values: impl Fn(&Mesh<D>) -> Vec<f64>,
 ) -> Option<f64>
 where
     Mesh<D>: Movable<D>,
 {
-    let uniform = mesh.even(*mesh.lattice()).ok()?;
-    let start = to_rest(uniform, form, &mut |on| {
-        let u = interpolate(mesh, values, on);
-        let rho = monitor.density(on, &u, None)?;
-        Ok((vec![u], rho))
-    });
-    start.ok().filter(|start| start.end == Ending::AtRest).map(|start| start.steps)
+    let Mmpde { relaxation, form } = equation;
+    let prediction = relaxation.prediction();
+    let longer = successors(Some(relaxation.over(dt) / dt), |steps| Some(LONGER * steps));
+    let rests = |&steps: &f64| {
+        let equation = Mmpde { relaxation: Relaxation::Steps(Steps { steps, prediction }), form };
+        let mut mover = Mover::by(Mesh::whole(0.1 * AT_REST), equation);
+        let (mut on, mut gait) = (mesh.clone(), Gait::at_rest(mesh));
+        (0..WATCHED).all(|_| {
+            let u = values(&on);
+            let step = monitor
+                .density(&on, &u, None)
+                .ok()
+                .and_then(|rho| mover.step(&on, &gait, Followed { u: &u, rho: &rho }, 1.0).ok());
+            step.is_some_and(|step| {
+                (on, gait) = (step.moved.mesh, step.gait);
+                !gait.is_restless()
+            })
+        })
+    };
+    longer.skip(1).take_while(|steps| *steps < LONGEST).find(rests).map(|steps| SURE * steps)
 }
 
 /// The mesh that rests on a density, from the given mesh alone; see [`adapted`].

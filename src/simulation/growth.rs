@@ -1,6 +1,7 @@
 //! Cells in which small values grow.
 
 use super::doubts::named;
+use super::pace::ALIKE;
 use super::{Record, Simulation, State};
 use crate::geometry::{Cells, Density, Mesh, node_areas};
 use crate::meshing::Movable;
@@ -75,6 +76,9 @@ where
         for (c, name) in self.physics.unknowns().into_iter().enumerate() {
             let value = |k: usize| u.values()[k * u.components() + c];
             let [low, high] = ends(u.component(c));
+            if high - low <= ALIKE * high.abs().max(low.abs()) {
+                continue;
+            }
             let steepest = edges().fold(0.0, |most, (a, b, way)| larger(most, (value(b) - value(a)) / way));
             if steepest * equal <= FRONT * (high - low) {
                 continue;
@@ -87,7 +91,7 @@ where
             }
         }
         let (times, Some((name, k))) = worst else { return };
-        let times = times / OUTRUNS;
+        let times = (10.0 * times / OUTRUNS).ceil() / 10.0;
         record.warnings.push(format!(
             "`{name}`: {GROWS}: at t = {t}, {}, one is {times:.1} times as wide as a front can cross before they do, \
              2√(D/k) for growth at the rate k, and the front may be at the wrong place; refine `grid.cells` {times:.1} \

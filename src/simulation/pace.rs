@@ -1,6 +1,6 @@
 mod change;
 
-pub(crate) use change::rushed;
+pub(crate) use change::{ALIKE, rushed};
 
 use super::control::Control;
 use super::coupling::{Advanced, Stretch, attempt};
@@ -13,7 +13,7 @@ use crate::geometry::{Field, Mesh};
 use crate::meshing::Movable;
 use crate::numerics::larger;
 use crate::physics::Motion;
-use change::{at_rest, change_at_nodes, relative, share};
+use change::{at_rest, change_at_nodes, largest, relative, scale, share};
 use serde::{Deserialize, Serialize};
 
 /// How long time steps are, and what is remembered for the next.
@@ -166,8 +166,8 @@ const FEWEST: f64 = 20.0;
 /// more, it is measured again on a mesh that rests. Short steps are due to the moving mesh if the solution would change
 /// on a mesh that rests by less than this share of what it does.
 const DOUBTED: f64 = 0.5;
-/// Steps are short because of a blow-up if the range of the first unknown grows by more than this share of its largest
-/// change at a node.
+/// Steps are short because of a blow-up if the range of the first unknown, or its size where it is the same everywhere,
+/// grows by more than this share of its largest change at a node.
 const GROWS: f64 = 0.5;
 /// Steps are short because of the start up to this share of the run.
 const AT_START: f64 = 1e-3;
@@ -182,10 +182,6 @@ const OF_ROUNDING: f64 = 1e-9;
 /// A solution has begun to change once it exceeds this share of the size that prescribed formulas will give to it:
 /// below that, changes are measured by this share.
 const BEGUN: f64 = 1e-4;
-/// An unknown whose range is below this share of its size is the same everywhere but for rounding, and its changes are
-/// measured by its size.
-const ALIKE: f64 = 1e-13;
-
 impl Free {
     fn new<const D: usize>(
         simulation: &mut Simulation<D>,
@@ -197,12 +193,13 @@ impl Free {
         Mesh<D>: Movable<D>,
     {
         let ranges: Vec<f64> = (0..state.u.components()).map(|c| range(&state.u, c)).collect();
+        let sizes: Vec<f64> = (0..ranges.len()).map(|c| largest(&state.u, c)).collect();
         let free = |dt: f64, longest: f64| Self {
             dt,
             longest,
             scale: dt,
             ranges: ranges.clone(),
-            sizes: vec![0.0; ranges.len()],
+            sizes: sizes.clone(),
             foreseen: vec![0.0; ranges.len()],
             control,
             failures: 0,
@@ -218,7 +215,7 @@ impl Free {
             let motion = Motion { t: state.t, dt: trial, old: &state.mesh, new: &state.mesh };
             match simulation.physics.step(motion, &state.u) {
                 Ok((u, _)) => {
-                    let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), ranges[0]);
+                    let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), scale(ranges[0], sizes[0]));
                     // a trial in which too much happens says little
                     if share <= CHANGE || number >= TRIALS {
                         let least = if simulation.physics.is_given() { GIVEN * longest } else { 0.0 };
@@ -361,7 +358,8 @@ impl Free {
         let change = change_at_nodes(after.mesh.lattice(), &before.u, &after.u);
         let (start, end) = (simulation.schedule.start(), simulation.schedule.end());
         let at_rest = at_rest(simulation, before, self.dt);
-        let grows = |change: f64, u: &Field| range(u, 0) - range(&before.u, 0) > GROWS * change;
+        let size = |u: &Field| scale(range(u, 0), largest(u, 0));
+        let grows = |change: f64, u: &Field| size(u) - size(&before.u) > GROWS * change;
         // what sweeps over a peak that grows lowers it at its nodes now and then
         if grows(change, &after.u) || at_rest.as_ref().is_some_and(|(change, u)| grows(*change, u)) {
             Cause::BlowUp
@@ -377,10 +375,7 @@ impl Free {
     /// What the change of each unknown is measured by: its range, or its largest size so far where it is the same
     /// everywhere; but at least a small share of the size that prescribed formulas will give to it.
     fn scales(&self) -> Vec<f64> {
-        let scale = |c: usize| {
-            let (range, size) = (self.ranges[c], self.sizes[c]);
-            if range > ALIKE * size { range } else { size }.max(BEGUN * self.foreseen[c])
-        };
+        let scale = |c: usize| scale(self.ranges[c], self.sizes[c]).max(BEGUN * self.foreseen[c]);
         (0..self.ranges.len()).map(scale).collect()
     }
 

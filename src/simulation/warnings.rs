@@ -4,7 +4,7 @@ use super::doubts::named;
 use super::forced::Hidden;
 use super::{INTERFACE_NOISE_WORTH_A_WARNING, Record, Simulation, State};
 use crate::error::{Cause, Error, Failure};
-use crate::geometry::Mesh;
+use crate::geometry::{Mesh, interpolate};
 use crate::meshing::{Movable, Relaxation};
 use crate::mover;
 use crate::numerics::ends;
@@ -65,15 +65,20 @@ where
             return;
         }
         let steps = relaxation.over(dt) / dt;
-        let found =
-            self.monitor.followed(t, &state.mesh, &state.u).ok().and_then(|values| {
-                mover::steps_to_rest(&state.mesh, self.mover.equation.form, &*self.monitor, &values)
-            });
+        // what is given is known on any mesh; what was computed is carried there
+        let given = self.physics.is_given();
+        let on_state = self.monitor.followed(t, &state.mesh, &state.u);
+        let found = on_state.ok().and_then(|on_state| {
+            let carried = |on: &Mesh<D>| interpolate(&state.mesh, &on_state, on);
+            let known = |on: &Mesh<D>| self.monitor.followed(t, on, &self.physics.initial(t, on)).ok();
+            let values = |on: &Mesh<D>| known(on).filter(|_| given).unwrap_or_else(|| carried(on));
+            mover::steps_to_rest(&state.mesh, self.mover.equation, dt, &*self.monitor, values)
+        });
         let limit = match found {
-            Some(limit) if limit > steps => {
-                format!("on this solution it comes to rest with {limit:.0}, which \"auto\" finds by itself")
+            Some(limit) => {
+                format!("on the solution of that time it rests with {limit:.0}; \"auto\" finds it by itself")
             }
-            _ => "\"auto\" finds how many it takes".into(),
+            None => "\"auto\" finds how many it takes".into(),
         };
         record.warnings.push(format!(
             "{HASTY}: at t = {t} it is {steps:.1} time steps, and the mesh turns back from step to step; {limit}"

@@ -59,7 +59,7 @@ impl Study {
         }
         #[derive(Deserialize)]
         struct PeekCells {
-            cells: Vec<u64>,
+            cells: Vec<serde::de::IgnoredAny>,
         }
         let is_line = || source.parse::<PeekGrid>().is_ok_and(|peek| peek.grid.cells.len() == 1);
         // whatever is wrong before the kind is known is told by the reader of the first kind

@@ -295,8 +295,9 @@ where
                 let why = match start.end {
                     Ending::AtRest => None,
                     Ending::Jump => Some(
-                        "the initial solution jumps, and no mesh resolves a jump; it starts with its \
-                         thinnest cells there",
+                        "the initial solution changes by much of its range within one of the thinnest cells \
+                         that this mesh comes to: it jumps there, which no mesh resolves, or takes more \
+                         `grid.cells`",
                     ),
                     Ending::Restless => Some(
                         "the mesh does not come to rest on the initial solution, which may be \

@@ -8,6 +8,9 @@ use crate::physics::Motion;
 use crate::simulation::journey::range;
 use crate::simulation::{Simulation, State};
 
+/// An unknown whose range is below this share of its size is the same everywhere but for what Newton's method leaves.
+pub(crate) const ALIKE: f64 = 1e-8;
+
 /// The change in a step of length `dt` if the mesh rested, and the solution that this would lead to; none where that
 /// fails.
 pub(super) fn at_rest<const D: usize>(
@@ -30,10 +33,10 @@ where
     Mesh<D>: Movable<D>,
 {
     let follows = simulation.mover.equation.relaxation == Relaxation::Auto && simulation.mover.generator.moves();
-    let range = range(&before.u, 0).max(range(&after.u, 0));
+    let of = |measure: fn(&Field, usize) -> f64| measure(&before.u, 0).max(measure(&after.u, 0));
     follows
         && !simulation.physics.is_given()
-        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), range) > CHANGE
+        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), scale(of(range), of(largest))) > CHANGE
 }
 
 /// The largest error of all unknowns, each as a share of its range.
@@ -54,4 +57,14 @@ pub(super) fn change_at_nodes<const D: usize>(lattice: &Lattice<D>, before: &Fie
 /// A change as a share of a range; 0 for constants.
 pub(super) fn share(change: f64, range: f64) -> f64 {
     if range > 0.0 { change / range } else { 0.0 }
+}
+
+/// What the changes of an unknown are measured by: its range, or its size where it is the same everywhere.
+pub(super) fn scale(range: f64, size: f64) -> f64 {
+    if range > ALIKE * size { range } else { size }
+}
+
+/// The largest size of an unknown.
+pub(super) fn largest(u: &Field, c: usize) -> f64 {
+    u.component(c).fold(0.0, larger)
 }
