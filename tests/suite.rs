@@ -47,6 +47,7 @@ mod safety;
 mod same_everywhere;
 mod schwarz_theorems;
 mod shallow_water;
+mod shocks;
 mod sides;
 mod stefan;
 mod steps;

@@ -5,6 +5,7 @@
 mod arclength;
 mod following;
 mod given;
+mod jump;
 mod need;
 mod noise;
 mod root_gradient;
@@ -13,10 +14,10 @@ mod tables;
 
 pub use arclength::{Arclength, Strength};
 pub use given::Given;
+pub(crate) use jump::{edges, largest_step};
 pub(crate) use need::Need;
 pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
-pub(crate) use root_gradient::largest_step;
 pub use smoothing::smooth;
 pub use tables::{ArclengthTable, GivenTable, RootGradientTable};
 

@@ -1,3 +1,4 @@
+use super::jump::jump;
 use super::need::{Need, bends, between};
 use super::{Density, Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
@@ -53,9 +54,8 @@ const CONTRAST: f64 = 1e6;
 /// are about a hundredth of equal ones. A shock without viscosity is never wider than a cell, and thinner cells take
 /// more steps to follow it.
 const CONTRAST_OF_JUMPS: f64 = 500.0;
-/// An edge of the mesh over which u changes by the first share of its range begins to be treated as a jump; from the
-/// second on it is one.
-const JUMPS: [f64; 2] = [0.25, 0.5];
+/// Lengths in equal cells of edges that are short enough to hold a jump, and that are not.
+const THIN: [f64; 2] = [0.05, 0.2];
 /// Ratio of the steepest slope to the background's below which the density is even, and above which it counts in full:
 /// where all slopes are alike there is no place from which nodes could be taken.
 const STEEPER: [f64; 2] = [2.0, 4.0];
@@ -104,9 +104,9 @@ impl RootGradient {
         // in a domain with a chart equal cells are those of the unit box
         let (domain, mesh) = (mesh, mesh.parameters());
         let lattice = mesh.lattice();
-        let Followed { slopes, needs, step } = Followed::of(mesh, unknowns);
+        let Followed { slopes, needs, jump } = Followed::of(mesh, unknowns);
         // all of a jump is in one cell, and the smaller that gets, the larger ρ would be there
-        let contrast = CONTRAST * (CONTRAST_OF_JUMPS / CONTRAST).powf(between(JUMPS, step));
+        let contrast = CONTRAST * (CONTRAST_OF_JUMPS / CONTRAST).powf(jump);
         let axes = slopes.into_iter().zip(needs).map(|(slopes, need)| Roots::of(mesh, slopes, need));
         let axes: Vec<Roots> = axes.collect();
         let most = axes.iter().map(Roots::drawn).fold(0.0, larger);
@@ -159,8 +159,8 @@ struct Followed<const D: usize> {
     slopes: Vec<Vec<f64>>,
     /// The largest need along each axis.
     needs: [f64; D],
-    /// The largest change over an edge of the mesh, as a share of the range of its unknown.
-    step: f64,
+    /// How far an unknown jumps, from 0 to 1.
+    jump: f64,
 }
 
 impl<const D: usize> Followed<D> {
@@ -175,7 +175,7 @@ impl<const D: usize> Followed<D> {
         let sizes = ends.iter().map(|[low, high]| high.max(-low));
         let largest = sizes.clone().fold(0.0, larger);
         let need = Need::on(mesh);
-        let (mut slopes, mut needs, mut step) = (Vec::new(), [0.0; D], 0.0);
+        let (mut slopes, mut needs, mut most) = (Vec::new(), [0.0; D], 0.0);
         for ((u, [low, high]), size) in unknowns.iter().zip(&ends).zip(sizes) {
             let range = high - low;
             if range <= OF_ROUNDING * largest {
@@ -185,7 +185,7 @@ impl<const D: usize> Followed<D> {
             if steepest * range * longest <= ALIKE * size {
                 continue;
             }
-            step = larger(step, largest_step(lattice, u) / range);
+            most = larger(most, jump(mesh, u, range, THIN));
             // a slope across the axes has 1/√D of itself along each
             let by_slopes = axes.map(|slope| need.by_slopes((D as f64).sqrt() * slope));
             let all = need.by_slopes(steepest);
@@ -204,7 +204,7 @@ impl<const D: usize> Followed<D> {
                 }),
             }
         }
-        Self { slopes, needs, step }
+        Self { slopes, needs, jump: most }
     }
 }
 
@@ -234,19 +234,6 @@ impl<const D: usize> Slopes<D> {
         let axes = std::array::from_fn(|d| along[d].iter().copied().fold(0.0, larger));
         Self { along, steepest: steepest2.sqrt(), axes }
     }
-}
-
-/// The largest difference between neighbouring nodes.
-pub(crate) fn largest_step<const D: usize>(lattice: &Lattice<D>, u: &[f64]) -> f64 {
-    let (nodes, wraps, steps) = (lattice.nodes(), lattice.periodic(), lattice.strides());
-    (0..D).fold(0.0, |most, axis| {
-        let (n, s) = (nodes[axis], steps[axis]);
-        u.chunks_exact(n * s).fold(most, |most, block| {
-            let inner = block.iter().zip(&block[s..]).fold(most, |most, (a, b)| larger(most, b - a));
-            let over = block[..s].iter().zip(&block[(n - 1) * s..]).map(|(a, b)| b - a);
-            if wraps[axis] { over.fold(inner, larger) } else { inner }
-        })
-    })
 }
 
 /// √|g_d| of the cells of a mesh.

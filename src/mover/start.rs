@@ -1,7 +1,7 @@
 use super::{Followed, Gait, Mover};
-use crate::density::Monitor;
+use crate::density::{Monitor, edges};
 use crate::error::Result;
-use crate::geometry::{Density, Mesh, check_unfolded, strides};
+use crate::geometry::{Density, Mesh, check_unfolded};
 use crate::meshing::{Form, Mmpde, Movable, Relaxation, Steps};
 use crate::numerics::ends;
 use std::iter::successors;
@@ -97,8 +97,8 @@ where
     to_rest(if check_unfolded(&start).is_ok() { start } else { mesh }, form, followed)
 }
 
-/// Time steps in τ with which a mesh does not turn back from step to step on what `values` are on a mesh: the given τ is
-/// made longer until it does not, and then [`SURE`] times as long. Nothing where no τ of less than [`LONGEST`] steps
+/// Time steps in τ with which a mesh does not turn back from step to step on what `values` are on a mesh: the given τ
+/// is made longer until it does not, and then [`SURE`] times as long. Nothing where no τ of less than [`LONGEST`] steps
 /// will do.
 ///
 /// The equation has the given τ, in time steps of length `dt`.
@@ -166,17 +166,6 @@ where
 
 /// True where an edge shorter than `thin` uniform cells holds more than the share `most` of the range of u.
 fn holds<const D: usize>(mesh: &Mesh<D>, u: &[f64], most: f64, thin: f64) -> bool {
-    let (mesh, lattice) = (mesh.parameters(), mesh.lattice());
-    let (x, u, cells) = (mesh.closed(), lattice.closed(u), lattice.cells());
-    let size: [f64; D] = std::array::from_fn(|d| mesh.extent()[d] / cells[d] as f64);
     let [low, high] = ends(u.iter().copied());
-    let nodes = cells.map(|n| n + 1);
-    let strides = strides(nodes);
-    (0..D).any(|d| {
-        let below = (0..x.len()).filter(|k| k / strides[d] % nodes[d] < cells[d]);
-        below.map(|k| (k, k + strides[d])).any(|(a, b)| {
-            let way = (0..D).map(|c| ((x[b][c] - x[a][c]) / size[c]).powi(2)).sum::<f64>().sqrt();
-            (u[b] - u[a]).abs() > most * (high - low) && way < thin
-        })
-    })
+    edges(mesh, u).any(|(length, change)| change > most * (high - low) && length < thin)
 }

@@ -92,6 +92,12 @@ pub trait Physics<const D: usize = 2>: Send {
         Vec::new()
     }
 
+    /// Whether an unknown without diffusion has a flux that is not linear in the unknowns, so that it steepens until it
+    /// jumps.
+    fn forms_shocks(&self) -> bool {
+        false
+    }
+
     /// For each unknown, whether it has no time derivative, so that it is at any time what the others make of it; empty
     /// if all have one.
     fn instantaneous(&self) -> Vec<bool> {

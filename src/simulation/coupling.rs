@@ -1,4 +1,4 @@
-use super::{Record, Schedule, Simulation, State, growth, journey, timed};
+use super::{Record, Schedule, Simulation, State, growth, journey, shocks, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Cells, Density, Field, Mesh, check_unfolded};
@@ -235,7 +235,8 @@ fn stepped<const D: usize>(
 }
 
 /// ρ from the solution: what the monitor makes of what it follows, and of the gradient of the first unknown where that
-/// is known exactly, and no less than [what grows](growth::narrowed) needs.
+/// is known exactly, no more than [a shock](shocks::blunted) takes, and no less than [what grows](growth::narrowed)
+/// needs.
 pub(super) fn density<const D: usize>(
     physics: &dyn Physics<D>,
     monitor: &dyn Monitor<D>,
@@ -247,7 +248,10 @@ where
     Mesh<D>: Cells<D>,
 {
     let gradient = physics.gradient(t, mesh);
-    let rho = monitor.density_of(t, mesh, u, gradient.as_deref())?;
+    let mut rho = monitor.density_of(t, mesh, u, gradient.as_deref())?;
+    if physics.forms_shocks() {
+        rho = shocks::blunted(&rho);
+    }
     let widest = physics.widest_cells(t, mesh, u);
     Ok(if widest.is_empty() { rho } else { growth::narrowed(mesh, &rho, &widest) })
 }

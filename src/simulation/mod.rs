@@ -19,6 +19,7 @@ mod record;
 mod safety;
 mod scene;
 mod schedule;
+mod shocks;
 mod warnings;
 
 pub use benefit::Benefit;

@@ -193,13 +193,12 @@ impl Free {
         Mesh<D>: Movable<D>,
     {
         let ranges: Vec<f64> = (0..state.u.components()).map(|c| range(&state.u, c)).collect();
-        let sizes: Vec<f64> = (0..ranges.len()).map(|c| largest(&state.u, c)).collect();
         let free = |dt: f64, longest: f64| Self {
             dt,
             longest,
             scale: dt,
             ranges: ranges.clone(),
-            sizes: sizes.clone(),
+            sizes: vec![0.0; ranges.len()],
             foreseen: vec![0.0; ranges.len()],
             control,
             failures: 0,
@@ -215,7 +214,7 @@ impl Free {
             let motion = Motion { t: state.t, dt: trial, old: &state.mesh, new: &state.mesh };
             match simulation.physics.step(motion, &state.u) {
                 Ok((u, _)) => {
-                    let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), scale(ranges[0], sizes[0]));
+                    let share = share(change_at_nodes(state.mesh.lattice(), &state.u, &u), ranges[0]);
                     // a trial in which too much happens says little
                     if share <= CHANGE || number >= TRIALS {
                         let least = if simulation.physics.is_given() { GIVEN * longest } else { 0.0 };

@@ -30,6 +30,8 @@ pub(super) struct Kinds<const B: usize> {
     pub loaded: [bool; B],
     /// Unknowns that are only carried and diffused, and so keep the range of their data.
     pub keeps_range: [bool; B],
+    /// Whether an unknown without diffusion has a flux that is not linear in the unknowns.
+    pub forms_shocks: bool,
     /// Unknowns that have a source, no term that takes gradients, no storage, and no flux that is given on a side.
     pub reacts: [bool; B],
     /// Sides through which something flows that is not given there, as (axis, end).
@@ -46,6 +48,11 @@ impl<const B: usize> Kinds<B> {
         let is_plain = |c: usize| !by_gradients(c) && !terms.has_storage(c);
         // derivatives by unknowns follow all quantities themselves, unknown by unknown
         let by_unknown = |c: usize, e: usize| &nodal[((D + 2) * (1 + e) + D + 1) * B + c];
+        let steepens = |c: usize| {
+            // derivatives of the flux by an unknown that depend on one
+            let speeds = (0..D).flat_map(|d| (0..B).map(move |e| &nodal[((D + 2) * (1 + e) + d) * B + c]));
+            speeds.into_iter().any(|speed| (0..B).any(|e| speed.depends_on(D + e)))
+        };
         let bends = |c: usize| (0..B).any(|e| by_unknown(c, c).depends_on(D + e));
         // what diffuses by a diffusivity that takes gradients, along each axis
         let steep = |c: usize| match terms.fluxes.get(c) {
@@ -110,6 +117,7 @@ impl<const B: usize> Kinds<B> {
             bends: std::array::from_fn(bends),
             reacts_alike: std::array::from_fn(reacts_alike),
             keeps_range: std::array::from_fn(keeps_range),
+            forms_shocks: (0..B).any(|c| limited[c] && !diffuses(c) && steepens(c)),
             loaded: std::array::from_fn(|c| shares(c) && is_loaded(c)),
             reacts: std::array::from_fn(|c| has_source(c) && is_plain(c) && !is_fed(c)),
             open: (0..D).flat_map(|d| [(d, 0), (d, 1)]).filter(opens).collect(),

@@ -96,6 +96,10 @@ where
         self.kinds.keeps_range.to_vec()
     }
 
+    fn forms_shocks(&self) -> bool {
+        self.kinds.forms_shocks
+    }
+
     fn instantaneous(&self) -> Vec<bool> {
         self.terms.algebraic().to_vec()
     }

@@ -34,9 +34,12 @@ where
 {
     let follows = simulation.mover.equation.relaxation == Relaxation::Auto && simulation.mover.generator.moves();
     let of = |measure: fn(&Field, usize) -> f64| measure(&before.u, 0).max(measure(&after.u, 0));
+    let (range, size) = (of(range), of(largest));
+    // what is the same everywhere needs no mesh
     follows
         && !simulation.physics.is_given()
-        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), scale(of(range), of(largest))) > CHANGE
+        && range > ALIKE * size
+        && share(change_at_nodes(after.mesh.lattice(), &before.u, &after.u), range) > CHANGE
 }
 
 /// The largest error of all unknowns, each as a share of its range.
