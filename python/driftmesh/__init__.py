@@ -22,6 +22,7 @@ from .line import SchwarzResult, equidistribute, schwarz
 from .mesh import Mesh
 from .methods import Fixed, GridWalk, Interpolation, MonteCarlo, ResidualWalk, Schwarz, Stochastic, Strip, Whole
 from .monitors import Arclength, Given, Largest, RootGradient
+from .poisson import Poisson
 from .quality import Quality
 from .remap import transfer
 from .study import Run, load, run, studies
@@ -38,6 +39,7 @@ __all__ = [
     "MeshError",
     "MeshGenerator",
     "MonteCarlo",
+    "Poisson",
     "Quality",
     "ResidualWalk",
     "RootGradient",

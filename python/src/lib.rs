@@ -29,7 +29,7 @@ mod _driftmesh {
     #[pymodule_export]
     use super::program::{program, write_examples};
     #[pymodule_export]
-    use super::stencils::stencils;
+    use super::stencils::{edges, poisson, quarters};
     #[pymodule_export]
     use super::study::{check, run};
     #[pymodule_export]

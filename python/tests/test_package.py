@@ -27,6 +27,7 @@ MODULES = [
     "mesh",
     "methods",
     "monitors",
+    "poisson",
     "quality",
     "remap",
     "study",
