@@ -31,6 +31,7 @@ MODULES = [
     "quality",
     "remap",
     "study",
+    "widget",
 ]
 
 
