@@ -1,5 +1,7 @@
 //! Conditions by side and a diffusivity for Poisson's equation, against manufactured and exact solutions.
 
+use driftmesh::geometry::{Lattice, Mesh};
+use driftmesh::laplacian::{Entry, Laplacian, Poisson, diffusion, stencils};
 use driftmesh::study::{Kind, PoissonStudy, Solved, Source};
 
 /// A study of n × n cells with more lines.
@@ -144,4 +146,32 @@ fn conditions_that_are_none_are_refused() {
     let text =
         format!("{square}[equation]\nsource = \"0\"\nboundary = {{ flux = \"0\" }}\n[sides]\nneumann = [\"left\"]");
     assert!(refused(&text).contains("leave one of both out"));
+}
+
+/// The entries are the equations that are solved, on every kind of side, with D and with 25 points.
+#[test]
+fn solutions_satisfy_the_entries() {
+    let lattice = Lattice::bounded([9, 7]).unwrap();
+    let mesh = Mesh::uniform(lattice, [0.0, 0.0], [1.0, 1.0]).unwrap();
+    let mesh =
+        mesh.moved(mesh.x().iter().map(|&[x, y]| [x + 0.1 * y * x, y + 0.05 * (3.0 * x).sin()]).collect()).unwrap();
+    let of = |f: fn(f64, f64) -> f64| mesh.x().iter().map(|&[x, y]| f(x, y)).collect::<Vec<f64>>();
+    let (source, side) = (of(|x, y| (3.0 * x).sin() + y), of(|x, y| x - y));
+    let (robin, diffusivity) = (of(|x, _| -1.0 - x), of(|x, y| 1.0 + x * y));
+    for kind in [Laplacian::Optimised, Laplacian::Mapped, Laplacian::Compact25] {
+        let plain = stencils(&mesh, kind).unwrap();
+        let weighted = match kind {
+            Laplacian::Compact25 => plain,
+            _ => diffusion(&mesh, &plain, |[x, y]| 1.0 + x * y).unwrap(),
+        };
+        let neumann = [[true, false], [true, false]];
+        let all =
+            Poisson { source: &source, side: &side, robin: &robin, diffusivity: &diffusivity, mean: 0.0, neumann };
+        let u = all.solve(&mesh, &weighted).unwrap();
+        let mut left: Vec<f64> = (0..u.len()).map(|k| if lattice.on_side(k) { -side[k] } else { 0.0 }).collect();
+        for Entry { row, column, on_u, on_source } in all.entries(&mesh, &weighted).unwrap() {
+            left[row] += on_u * u[column] - on_source * source[column];
+        }
+        assert!(left.iter().all(|v| v.abs() < 1e-10), "{kind:?}: {left:?}");
+    }
 }

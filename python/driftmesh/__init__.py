@@ -21,23 +21,27 @@ from .laplacian import laplacian_stencils
 from .line import SchwarzResult, equidistribute, schwarz
 from .mesh import Mesh
 from .methods import Fixed, GridWalk, Interpolation, MonteCarlo, ResidualWalk, Schwarz, Stochastic, Strip, Whole
-from .monitors import Arclength, Given, Largest, RootGradient
+from .monitors import Arclength, Curvature, Given, Largest, Limited, RootGradient
+from .poisson import Poisson
 from .quality import Quality
 from .remap import transfer
 from .study import Run, load, run, studies
 
 __all__ = [
     "Arclength",
+    "Curvature",
     "Fixed",
     "Frame",
     "Given",
     "GridWalk",
     "Interpolation",
     "Largest",
+    "Limited",
     "Mesh",
     "MeshError",
     "MeshGenerator",
     "MonteCarlo",
+    "Poisson",
     "Quality",
     "ResidualWalk",
     "RootGradient",

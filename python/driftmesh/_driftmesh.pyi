@@ -16,21 +16,27 @@ __all__ = [
     "Generator",
     "areas",
     "check",
+    "edges",
     "equidistribute",
     "interpolate",
+    "poisson",
     "quality",
+    "quarters",
     "read_nodes",
     "run",
     "schwarz",
-    "stencils",
     "transfer",
     "uniform",
+    "viewer_data",
+    "viewer_data_of",
+    "viewer_files",
 ]
 
 VERSION: str
 
 _Floats = NDArray[np.float64]
 _Mesh = tuple[_Floats, tuple[float, ...], tuple[float, ...], tuple[bool, ...], "Chart | None"]
+_Named = tuple[str, str | None, str | None]
 _Density = tuple[str, str] | tuple[list[float], list[float]] | Callable[[_Floats], _Floats]
 
 @final
@@ -67,11 +73,12 @@ def transfer(
     threads: int | None,
 ) -> _Floats: ...
 def interpolate(mesh: _Mesh, fields: _Floats, points: _Floats, cubic: bool) -> tuple[_Floats | None, int]: ...
-def stencils(
+def edges(mesh: _Mesh, kind: _Named) -> _Floats: ...
+def poisson(
     mesh: _Mesh,
-    kind: str,
-    polynomials: str | None,
-    scaling: str | None,
+    kind: _Named,
+    diffusivity: tuple[_Floats, _Floats | None] | None,
+    sides: tuple[_Floats, list[list[bool]]] | None,
 ) -> tuple[
     NDArray[np.int64],
     NDArray[np.int64],
@@ -79,6 +86,7 @@ def stencils(
     _Floats,
     list[tuple[tuple[int, int], float]],
 ]: ...
+def quarters(mesh: _Mesh) -> _Floats: ...
 def check(path: Path | None, origin: str, text: str, set: list[str]) -> str: ...
 def run(
     path: Path | None,
@@ -105,3 +113,10 @@ def schwarz(
 ]: ...
 def program(words: list[str]) -> int: ...
 def write_examples(directory: Path) -> list[Path]: ...
+def viewer_data(directory: Path) -> str | None: ...
+def viewer_data_of(
+    frames: list[tuple[float, _Floats, _Floats, list[tuple[str, _Floats]]]],
+    corners: list[list[float]] | None,
+    periodic: tuple[bool, bool],
+) -> str | None: ...
+def viewer_files(line: bool, clock: str) -> tuple[str, str]: ...

@@ -17,10 +17,10 @@ from ._boxes import check_box, fills_box, images, periodic_values
 from ._toml import Kind
 from .mesh import Mesh
 from .methods import Fixed, Schwarz, Stochastic, Whole
-from .monitors import Given, Largest, MonitorKind, RootGradient
+from .monitors import Given, Largest, Limited, MonitorKind, RootGradient, WithCells
 
 #: Where a mesh should be fine: a monitor of u, the density itself, or a function of mesh and u that gives it.
-Monitor: TypeAlias = "MonitorKind | Largest | ArrayLike | Callable[[Mesh, Any], ArrayLike]"
+Monitor: TypeAlias = "MonitorKind | Largest | Limited | ArrayLike | Callable[[Mesh, Any], ArrayLike]"
 
 #: τ in units of time or in time steps, or chosen.
 Relaxation: TypeAlias = "float | Mapping[str, float] | Literal['auto']"
@@ -38,9 +38,10 @@ class MeshGenerator:
     """Moves a mesh step by step to where its monitor wants it: x_t = (1/τ)(∇ρ/ρ·∇x + ∇²x) in ξ, implicit in time.
 
     Args:
-        monitor: :class:`RootGradient` (the default, with nothing to set), :class:`Arclength` or :class:`Given`; or the
-            density itself, an array of the shape of the mesh; or a function of mesh and u that returns it. ``a | b``
-            is the larger of two monitors (:class:`Largest`). A density is positive, and only its ratios matter.
+        monitor: :class:`RootGradient` (the default, with nothing to set), :class:`Arclength`, :class:`Curvature` or
+            :class:`Given`; or the density itself, an array of the shape of the mesh; or a function of mesh and u that
+            returns it. ``a | b`` is the larger of two monitors (:class:`Largest`); :class:`Limited` bounds the sizes of
+            cells. A density is positive, and only its ratios matter.
         method: :class:`Whole` (the default), :class:`Stochastic`, :class:`Schwarz` or :class:`Fixed`. Subdomains of a
             line are one number.
         relaxation: τ, the time that the mesh takes to follow the density. ``"auto"`` chooses it from how the mesh
@@ -247,7 +248,14 @@ class MeshGenerator:
 
     def _wanted(self) -> Kind:
         """The monitor of the library: a density that is given or computed here is its own."""
-        return self.monitor if isinstance(self.monitor, Kind) else Given()
+        core = self._core()
+        kind = core if isinstance(core, Kind) else Given()
+        limits = self.monitor
+        return WithCells(kind, limits.smallest, limits.largest) if isinstance(limits, Limited) else kind
+
+    def _core(self) -> Any:
+        """The monitor without limits."""
+        return self.monitor.monitor if isinstance(self.monitor, Limited) else self.monitor
 
     def _begin(self) -> None:
         mesh = {"generator": self._method._table(), "relaxation": self._relaxation, "form": self._form}
@@ -265,22 +273,23 @@ class MeshGenerator:
 
     def _followed(self, mesh: Mesh, u: Any, start: Mesh | None = None) -> Floats:
         """What the monitor looks at on a mesh: u, or the density; an array of densities is that of the start."""
-        if isinstance(self.monitor, Kind):
+        core = self._core()
+        if isinstance(core, Kind):
             if u is None:
                 raise ValueError(f"`u` is None, but the monitor {self.monitor} looks at it")
             name = "u" if start is None else "u0"
             values = finite(name, u, mesh.shape)
-        elif callable(self.monitor):
-            name, values = "density", finite("density", self.monitor(mesh, u), mesh.shape)
+        elif callable(core):
+            name, values = "density", finite("density", core(mesh, u), mesh.shape)
         else:
-            name, values = "density", finite("density", _values(self.monitor, start or mesh, mesh), mesh.shape)
-        if isinstance(self._wanted(), Given) and not (values > 0).all():
+            name, values = "density", finite("density", _values(core, start or mesh, mesh), mesh.shape)
+        if (isinstance(core, Given) or not isinstance(core, Kind)) and not (values > 0).all():
             place = tuple(int(k) for k in np.argwhere(~(values > 0))[0])
             raise ValueError(f"the density is {values[place]} at index {place}, but must be above 0")
         return periodic_values(name, values, mesh._periodic)
 
     def __repr__(self) -> str:
-        monitor = self.monitor if isinstance(self.monitor, Kind) else "a density"
+        monitor = self.monitor if isinstance(self._core(), Kind) else "a density"
         return (
             f"MeshGenerator(monitor={monitor}, method={self._method}, relaxation={self._relaxation}, "
             f"form={self._form!r})"

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import Floats
+from ._arrays import Floats, scalar
 from ._toml import Kind
 
 if TYPE_CHECKING:
     from .mesh import Mesh
 
 #: A monitor of u, or a function of mesh and u that gives the density.
-Part: TypeAlias = "MonitorKind | Largest | Callable[[Mesh, Any], ArrayLike]"
+Part: TypeAlias = "MonitorKind | Largest | Limited | Callable[[Mesh, Any], ArrayLike]"
 
 
 class MonitorKind(Kind):
@@ -53,7 +53,8 @@ class Largest:
 
     def __init__(self, *monitors: Part) -> None:
         for monitor in monitors:
-            if isinstance(monitor, type) or not (isinstance(monitor, MonitorKind) or callable(monitor)):
+            known = isinstance(monitor, (MonitorKind, Limited)) or callable(monitor)
+            if isinstance(monitor, type) or not known:
                 raise ValueError(f"a monitor is {monitor!r}, but must be Arclength(…), RootGradient(), … or a function")
         if not monitors:
             raise ValueError("there is no monitor to take the largest of")
@@ -84,6 +85,72 @@ class Largest:
         return " | ".join(repr(monitor) for monitor in self.monitors)
 
 
+class Limited:
+    """Any monitor, with limits on how small and how large cells may be
+
+    ::
+
+        m/largest ≤ ρ ≤ m/smallest   along every mesh line, m = the mean of ρ there
+
+    At rest an edge has the length m/ρ, in units of the mean edge of its mesh line: on a line the limits are met
+    exactly, in the plane, where mesh lines are tied to their neighbours, nearly.
+
+    Args:
+        monitor: A monitor, a function of mesh and u that gives a density, or a density.
+        smallest: The smallest edge as a share of the mean one, above 0 and below 1: ``0.2`` on a line of N cells and
+            the length L is 0.2 L/N. None for no limit.
+        largest: The largest edge as a multiple of the mean one, above 1. None for no limit.
+
+    Raises:
+        ValueError: A limit out of range, none at all, or a monitor that has limits already.
+
+    >>> import numpy as np
+    >>> from driftmesh import Limited, Mesh, MeshGenerator, RootGradient
+    >>> generator = MeshGenerator(monitor=Limited(RootGradient(), smallest=0.25))
+    >>> line = generator.adapt(Mesh.uniform(cells=40), lambda x: np.tanh(500 * (x - 0.4)))
+    >>> round(40 * float(np.diff(line.x).min()), 2)
+    0.25
+    """
+
+    def __init__(
+        self,
+        monitor: Part | ArrayLike,
+        *,
+        smallest: float | None = None,
+        largest: float | None = None,
+    ) -> None:
+        if isinstance(monitor, (Limited, type, str)) or monitor is None:
+            raise ValueError(f"`monitor` is {monitor!r}, but must be Arclength(…), … without limits, or a density")
+        if smallest is None and largest is None:
+            raise ValueError("there is no limit; give `smallest`, `largest` or both")
+        if smallest is not None and not 0 < scalar("smallest", smallest) < 1:
+            raise ValueError(f"`smallest` is {smallest}, but must be above 0 and below 1: a share of an equal cell")
+        if largest is not None and not scalar("largest", largest) > 1:
+            raise ValueError(f"`largest` is {largest}, but must be above 1: a multiple of an equal cell")
+        self.monitor, self.smallest, self.largest = monitor, smallest, largest
+
+    def __or__(self, other: Part) -> Largest:
+        return Largest(self, other)
+
+    def __ror__(self, other: Part) -> Largest:
+        return Largest(other, self)
+
+    def __repr__(self) -> str:
+        return f"Limited({self.monitor!r}, smallest={self.smallest}, largest={self.largest})"
+
+
+@dataclass(frozen=True)
+class WithCells(Kind):
+    """A monitor with its limits, as a table of a study."""
+
+    monitor: Kind
+    smallest: float | None
+    largest: float | None
+
+    def _table(self) -> dict[str, Any]:
+        return {**self.monitor._table(), "cells": {"smallest": self.smallest, "largest": self.largest}}
+
+
 @dataclass(frozen=True)
 class Arclength(MonitorKind):
     """ρ = √(1 + α|∇u|²), smoothed.
@@ -110,14 +177,62 @@ class Arclength(MonitorKind):
     gradient: Literal["central", "log", "safe"] = "central"
 
     def __post_init__(self) -> None:
-        if self.relative is not None and self.absolute is not None:
-            raise ValueError(f"give `relative` or `absolute`, not both: {self.relative} and {self.absolute}")
+        _refuse_both(self.relative, self.absolute)
 
     def _table(self) -> dict[str, Any]:
-        strength = {"relative": self.relative, "absolute": self.absolute}
-        if self.relative is None and self.absolute is None:
-            strength["relative"] = 30.0
+        strength = _strength(self.relative, self.absolute, 30.0)
         return {"kind": self.kind, "strength": strength, "smoothing": self.smoothing, "gradient": self.gradient}
+
+
+@dataclass(frozen=True)
+class Curvature(MonitorKind):
+    """ρ = (1 + α |H|²)^(1/(d + 4)), smoothed, H being the second derivatives of u in d dimensions.
+
+    It spreads the L² error of linear interpolation evenly: cells of width 1/ρ have the same h^(d + 4) |H|². Monitors of
+    ∇u put most nodes where u is steepest, where an error of interpolation need not be.
+
+    Args:
+        relative: α as a multiple of 1/⟨|H|^(2/(d + 4))⟩^(d + 4), ⟨⟩ being the mean over the domain: 1, the default
+            where neither this nor ``absolute`` is given, gives about half of the nodes to where u is curved.
+        absolute: α itself, in the unit (x²/u)².
+        smoothing: Passes of the filter (1 2 1)⊗(1 2 1)/16 over ρ.
+        gradient: As of :class:`Arclength`.
+
+    Raises:
+        ValueError: Both are given. Numbers out of range are refused by the generator.
+
+    Source: Huang and Russell, *Adaptive Moving Mesh Methods*, Springer (2011), where ρ^d, the density of volume, has
+    the exponent d/(d + 4).
+
+    >>> from driftmesh import Curvature, Mesh, MeshGenerator
+    >>> line = Mesh.uniform(cells=8)
+    >>> rho = MeshGenerator(monitor=Curvature(absolute=0.5)).density(line, 4 * line.x**2)  # u'' = 8
+    >>> bool(abs(rho - 33**0.2).max() < 1e-12)
+    True
+    """
+
+    kind = "curvature"
+    relative: float | None = None
+    absolute: float | None = None
+    smoothing: int = 2
+    gradient: Literal["central", "log", "safe"] = "central"
+
+    def __post_init__(self) -> None:
+        _refuse_both(self.relative, self.absolute)
+
+    def _table(self) -> dict[str, Any]:
+        strength = _strength(self.relative, self.absolute, 1.0)
+        return {"kind": self.kind, "strength": strength, "smoothing": self.smoothing, "gradient": self.gradient}
+
+
+def _refuse_both(relative: float | None, absolute: float | None) -> None:
+    if relative is not None and absolute is not None:
+        raise ValueError(f"give `relative` or `absolute`, not both: {relative} and {absolute}")
+
+
+def _strength(relative: float | None, absolute: float | None, default: float) -> dict[str, float | None]:
+    """α as a study writes it."""
+    return {"relative": default if relative is None and absolute is None else relative, "absolute": absolute}
 
 
 @dataclass(frozen=True)

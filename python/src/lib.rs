@@ -13,6 +13,7 @@ mod program;
 mod stencils;
 mod study;
 mod threads;
+mod viewer;
 
 use pyo3::prelude::*;
 
@@ -29,9 +30,11 @@ mod _driftmesh {
     #[pymodule_export]
     use super::program::{program, write_examples};
     #[pymodule_export]
-    use super::stencils::stencils;
+    use super::stencils::{edges, poisson, quarters};
     #[pymodule_export]
     use super::study::{check, run};
+    #[pymodule_export]
+    use super::viewer::{viewer_data, viewer_data_of, viewer_files};
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

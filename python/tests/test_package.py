@@ -27,9 +27,11 @@ MODULES = [
     "mesh",
     "methods",
     "monitors",
+    "poisson",
     "quality",
     "remap",
     "study",
+    "widget",
 ]
 
 

@@ -37,14 +37,28 @@ pub struct Arclength {
     pub smoothing: usize,
 }
 
-/// How α of the arc-length density √(1 + α |∇u|²) is chosen.
+/// How α of a density is chosen: of √(1 + α |∇u|²), or of (1 + α |H|²)^p by the second derivatives H.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Strength {
-    /// A number without unit: α is this over the largest |∇u|² at a node.
+    /// A number without unit: α is this over the largest |∇u|² at a node, or over a mean of |H|².
     Relative(f64),
-    /// α itself, in the unit of (x/u)².
+    /// α itself, in the unit of (x/u)², of second derivatives (x²/u)².
     Absolute(f64),
+}
+
+impl Strength {
+    /// Refuses a number out of range.
+    pub(super) fn check(self) -> Result<()> {
+        let (key, value) = match self {
+            Self::Relative(value) => ("strength.relative", value),
+            Self::Absolute(value) => ("strength.absolute", value),
+        };
+        match value.is_finite() && value >= 0.0 {
+            true => Ok(()),
+            false => Err(Error::invalid(key, value, "must be a finite number, 0 or more")),
+        }
+    }
 }
 
 impl Default for Arclength {
@@ -59,13 +73,7 @@ impl Arclength {
     /// # Errors
     /// [`Error::Invalid`] where the strength is negative or not finite, or the smoothing beyond all reason.
     pub fn check(&self) -> Result<()> {
-        let (key, value) = match self.strength {
-            Strength::Relative(value) => ("strength.relative", value),
-            Strength::Absolute(value) => ("strength.absolute", value),
-        };
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(Error::invalid(key, value, "must be a finite number, 0 or more"));
-        }
+        self.strength.check()?;
         if self.smoothing > MAX_SMOOTHING {
             return Err(Error::invalid("smoothing", self.smoothing, format!("must be at most {MAX_SMOOTHING} passes")));
         }

@@ -3,9 +3,11 @@
 //! Every density is positive and finite, and only its ratios matter: ρ and cρ give the same mesh.
 
 mod arclength;
+mod curvature;
 mod following;
 mod given;
 mod jump;
+mod limited;
 mod need;
 mod noise;
 mod root_gradient;
@@ -13,13 +15,15 @@ mod smoothing;
 mod tables;
 
 pub use arclength::{Arclength, Strength};
+pub use curvature::Curvature;
 pub use given::Given;
 pub(crate) use jump::{edges, largest_step};
+pub use limited::CellSizes;
 pub(crate) use need::Need;
 pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
 pub use smoothing::smooth;
-pub use tables::{ArclengthTable, GivenTable, RootGradientTable};
+pub use tables::{ArclengthTable, CurvatureTable, GivenTable, RootGradientTable};
 
 use crate::error::{Failure, Result};
 pub use crate::geometry::Density;
@@ -27,6 +31,7 @@ use crate::geometry::{Cells, Field, Mesh};
 use crate::kind::kinds;
 use crate::numerics::difference::Gradient;
 use following::Following;
+use limited::Limited;
 
 /// Largest number of passes of the filter over a density that a study may set: more leave nothing of it on any lattice
 /// that fits a machine.
@@ -69,6 +74,7 @@ kinds! {
     MonitorKind {
         "auto" = RootGradientTable: "rho = 1 + 4 sqrt(|du/dx|) over its mean along each axis, smoothed; nothing to set",
         "arclength" = ArclengthTable: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
+        "curvature" = CurvatureTable: "rho = (1 + alpha |H|^2)^(1/(D + 4)), H the second derivatives of u, smoothed",
         "given" = GivenTable: "rho = the unknown itself, smoothed",
     }
 }
@@ -85,9 +91,11 @@ impl MonitorKind {
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid).
     pub fn check(&self) -> Result<()> {
+        self.cells().map_or(Ok(()), CellSizes::check)?;
         match self {
             Self::RootGradientTable(_) => Ok(()),
             Self::ArclengthTable(arclength) => arclength.density().check(),
+            Self::CurvatureTable(curvature) => curvature.density().check(),
             Self::GivenTable(given) => given.density().check(),
         }
     }
@@ -97,6 +105,7 @@ impl MonitorKind {
         match self {
             Self::RootGradientTable(_) => Gradient::Safe,
             Self::ArclengthTable(arclength) => arclength.gradient,
+            Self::CurvatureTable(curvature) => curvature.gradient,
             Self::GivenTable(given) => given.gradient,
         }
     }
@@ -106,7 +115,18 @@ impl MonitorKind {
         match self {
             Self::RootGradientTable(root) => root.of.as_deref(),
             Self::ArclengthTable(arclength) => arclength.of.as_deref(),
+            Self::CurvatureTable(curvature) => curvature.of.as_deref(),
             Self::GivenTable(given) => given.of.as_deref(),
+        }
+    }
+
+    /// Limits on the sizes of cells, where there are some.
+    pub fn cells(&self) -> Option<&CellSizes> {
+        match self {
+            Self::RootGradientTable(root) => root.cells.as_ref(),
+            Self::ArclengthTable(arclength) => arclength.cells.as_ref(),
+            Self::CurvatureTable(curvature) => curvature.cells.as_ref(),
+            Self::GivenTable(given) => given.cells.as_ref(),
         }
     }
 
@@ -121,14 +141,20 @@ impl MonitorKind {
         // the first unknown is what all but the default follow without a word
         let of_all = matches!(self, Self::RootGradientTable(_)) && unknowns.len() > 1;
         let is_first = |of: &str| Some(of) == unknowns.first().map(String::as_str);
+        let cells = self.cells().copied().filter(|cells| *cells != CellSizes::default());
         let of = self.of().filter(|of| of_all || !is_first(of)).map(String::from);
         let monitor: Box<dyn Monitor<D>> = match self {
             Self::RootGradientTable(_) => Box::new(RootGradient::default()),
             Self::ArclengthTable(arclength) => Box::new(arclength.density()),
+            Self::CurvatureTable(curvature) => Box::new(curvature.density()),
             Self::GivenTable(given) => Box::new(given.density()),
         };
-        Ok(match of {
+        let monitor = match of {
             Some(of) => Box::new(Following::new(monitor, &of, unknowns)?),
+            None => monitor,
+        };
+        Ok(match cells {
+            Some(cells) => Box::new(Limited { monitor, cells }),
             None => monitor,
         })
     }

@@ -49,23 +49,79 @@ const NE: usize = 8;
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 pub fn diffusion(mesh: &Mesh<2>, stencils: &Stencils, d: impl Fn([f64; 2]) -> f64 + Sync) -> Result<Stencils> {
-    let (lattice, patch) = (mesh.lattice(), stencils.patch());
-    let Some(nine) = stencils.nine_points() else {
-        let rule = "has 25 points, which take no diffusivity; take \"mapped\" or another kind of nine points";
-        return Err(Error::invalid("laplacian.kind", "\"compact25\"", rule));
-    };
-    let everything = padded(lattice, mesh.x(), mesh.jump());
-    let width = lattice.nodes()[1] + 2;
-    let skip = patch.wraps.map(|wraps| usize::from(!wraps));
-    let n = patch.size[1];
+    weighted(mesh, stencils, |_, own, e| harmonic(|s| d(sample(own, e, s))))?
+        .map_err(|k| not_positive(mesh, stencils, k, &d).into())
+}
+
+/// The places at which [`diffusion`] looks at D: for each row of the stencils, for each of its eight neighbours in the
+/// order of [`LatticeMatrix::POINTS`](crate::numerics::linear::LatticeMatrix::POINTS), eight along the edge to it.
+///
+/// # Errors
+/// [`Error::Invalid`] for the 25 points of [`Laplacian::Compact25`].
+pub fn edge_places(mesh: &Mesh<2>, stencils: &Stencils) -> Result<Vec<[f64; 2]>> {
+    nine_points(stencils)?;
+    let (ring, n) = (Ring::of(mesh, stencils), stencils.patch().size[1]);
+    let edges = (0..stencils.patch().len()).flat_map(|k| {
+        let (own, around) = ring.around(k / n, k % n);
+        around.into_iter().map(move |e| (own, e))
+    });
+    Ok(edges.flat_map(|(own, e)| (0..SAMPLES).map(move |s| sample(own, e, s))).collect())
+}
+
+/// [`diffusion`] by the values of D at the [`edge_places`], for a D that only one thread can evaluate.
+///
+/// # Errors
+/// [`Failure::WrongLength`] where there is not one value a place; else as [`diffusion`].
+///
+/// # Example
+/// ```
+/// use driftmesh::geometry::{Lattice, Mesh};
+/// use driftmesh::laplacian::{Laplacian, diffusion, diffusion_by, edge_places, stencils};
+/// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 1.0])?;
+/// let laplacian = stencils(&mesh, Laplacian::Mapped)?;
+/// let d: Vec<f64> = edge_places(&mesh, &laplacian)?.iter().map(|[x, y]| 1.0 + x * y).collect();
+/// let by_values = diffusion_by(&mesh, &laplacian, &d)?;
+/// assert_eq!(by_values.nine_points(), diffusion(&mesh, &laplacian, |[x, y]| 1.0 + x * y)?.nine_points());
+/// # Ok::<(), driftmesh::Error>(())
+/// ```
+pub fn diffusion_by(mesh: &Mesh<2>, stencils: &Stencils, d: &[f64]) -> Result<Stencils> {
+    let expected = stencils.patch().len() * NEIGHBOURS.len() * SAMPLES;
+    if d.len() != expected {
+        return Err(Failure::WrongLength { what: "the diffusivity along the edges", found: d.len(), expected }.into());
+    }
+    let (edges, _) = d.as_chunks::<SAMPLES>();
+    let at = |row: usize, edge: usize| &edges[row * NEIGHBOURS.len() + edge];
+    weighted(mesh, stencils, |[row, edge], _, _| harmonic(|s| at(row, edge)[s]))?.map_err(|k| {
+        let (n, node) = (stencils.patch().size[1], node(stencils.patch(), k));
+        let (own, around) = Ring::of(mesh, stencils).around(k / n, k % n);
+        let all = (0..NEIGHBOURS.len()).flat_map(|edge| (0..SAMPLES).map(move |s| (edge, s)));
+        let bad = |&(edge, s): &(usize, usize)| !is_positive(at(k, edge)[s]);
+        let (place, value) =
+            all.clone().find(bad).map_or((own, f64::NAN), |(edge, s)| (sample(own, around[edge], s), at(k, edge)[s]));
+        Failure::NotPositive { what: "the diffusivity", value, at: NodePlace::new(node, place) }.into()
+    })
+}
+
+fn nine_points(stencils: &Stencils) -> Result<&[[f64; 9]]> {
+    let rule = "has 25 points, which take no diffusivity; take \"mapped\" or another kind of nine points";
+    stencils.nine_points().ok_or_else(|| Error::invalid("laplacian.kind", "\"compact25\"", rule))
+}
+
+/// The stencils with the inverse of the mean of 1/D along each edge, a function of row and edge, of the node and of the
+/// way to its neighbour; else the first row that is not finite.
+fn weighted(
+    mesh: &Mesh<2>,
+    stencils: &Stencils,
+    along: impl Fn([usize; 2], [f64; 2], [f64; 2]) -> f64 + Sync,
+) -> Result<std::result::Result<Stencils, usize>> {
+    let n = stencils.patch().size[1];
     let conservative = stencils.laplacian() == Laplacian::Mapped;
-    let mut rows = nine.to_vec();
+    let mut rows = nine_points(stencils)?.to_vec();
+    let ring = Ring::of(mesh, stencils);
     parallel::for_each_row(&mut rows, n, |i, rows| {
         for (j, row) in rows.iter_mut().enumerate() {
-            let at = |p: usize, q: usize| everything[(i + skip[0] + p) * width + skip[1] + q + j];
-            let own = at(1, 1);
-            let e = NEIGHBOURS.map(|[p, q]| [at(p, q)[0] - own[0], at(p, q)[1] - own[1]]);
-            let along = |k: usize| resistance(own, e[k - 1], &d);
+            let (own, e) = ring.around(i, j);
+            let along = |k: usize| along([i * n + j, k - 1], own, e[k - 1]);
             if conservative {
                 *row = faces(&e, along);
             } else {
@@ -74,20 +130,48 @@ pub fn diffusion(mesh: &Mesh<2>, stencils: &Stencils, d: impl Fn([f64; 2]) -> f6
             }
         }
     });
-    match rows.iter().position(|row| !row.iter().all(|a| a.is_finite())) {
+    Ok(match rows.iter().position(|row| !row.iter().all(|a| a.is_finite())) {
         None => Ok(stencils.with_rows(rows)),
-        Some(k) => Err(not_positive(mesh, stencils, k, &d).into()),
+        Some(k) => Err(k),
+    })
+}
+
+/// Positions of the nodes, with images beyond the ends of closed axes.
+struct Ring {
+    x: Vec<[f64; 2]>,
+    width: usize,
+    skip: [usize; 2],
+}
+
+impl Ring {
+    fn of(mesh: &Mesh<2>, stencils: &Stencils) -> Self {
+        let lattice = mesh.lattice();
+        let skip = stencils.patch().wraps.map(|wraps| usize::from(!wraps));
+        Self { x: padded(lattice, mesh.x(), mesh.jump()), width: lattice.nodes()[1] + 2, skip }
+    }
+
+    /// The node of the patch with these indices, and the ways to its neighbours.
+    fn around(&self, i: usize, j: usize) -> ([f64; 2], [[f64; 2]; 8]) {
+        let at = |p: usize, q: usize| self.x[(i + self.skip[0] + p) * self.width + self.skip[1] + q + j];
+        let own = at(1, 1);
+        (own, NEIGHBOURS.map(|[p, q]| [at(p, q)[0] - own[0], at(p, q)[1] - own[1]]))
     }
 }
 
-/// The inverse of the mean of 1/D along an edge; NaN where D is not above 0.
-fn resistance(from: [f64; 2], e: [f64; 2], d: impl Fn([f64; 2]) -> f64) -> f64 {
-    let sample = |k: usize| {
-        let share = (k as f64 + 0.5) / SAMPLES as f64;
-        let found = d([from[0] + share * e[0], from[1] + share * e[1]]);
-        if found > 0.0 && found.is_finite() { 1.0 / found } else { f64::NAN }
-    };
-    SAMPLES as f64 / (0..SAMPLES).map(sample).sum::<f64>()
+/// The s-th place along an edge at which D is looked at.
+fn sample(from: [f64; 2], e: [f64; 2], s: usize) -> [f64; 2] {
+    let share = (s as f64 + 0.5) / SAMPLES as f64;
+    [from[0] + share * e[0], from[1] + share * e[1]]
+}
+
+/// The inverse of the mean of 1/D over the places along an edge; NaN where D is not above 0.
+fn harmonic(d: impl Fn(usize) -> f64) -> f64 {
+    let inverse = |s: usize| Some(d(s)).filter(|d| is_positive(*d)).map_or(f64::NAN, |d| 1.0 / d);
+    SAMPLES as f64 / (0..SAMPLES).map(inverse).sum::<f64>()
+}
+
+fn is_positive(d: f64) -> bool {
+    d > 0.0 && d.is_finite()
 }
 
 /// The first value of D around a node that is not above 0.
@@ -98,7 +182,7 @@ fn not_positive(mesh: &Mesh<2>, stencils: &Stencils, k: usize, d: impl Fn([f64; 
         for share in (0..=2 * SAMPLES).map(|s| s as f64 / (2 * SAMPLES) as f64) {
             let place = [0, 1].map(|c| own[c] + share * (x[c] - own[c]));
             let value = d(place);
-            if !(value > 0.0 && value.is_finite()) {
+            if !is_positive(value) {
                 return Failure::NotPositive { what: "the diffusivity", value, at: NodePlace::new(node, place) };
             }
         }

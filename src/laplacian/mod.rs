@@ -16,8 +16,8 @@ mod nine;
 mod poisson;
 mod stencils;
 
-pub use diffusion::diffusion;
-pub use poisson::{Poisson, outward};
+pub use diffusion::{diffusion, diffusion_by, edge_places};
+pub use poisson::{Entry, Poisson, outward};
 pub use stencils::{NearDegenerate, Stencils};
 
 use crate::error::{Error, Failure, Result};

@@ -54,6 +54,19 @@ pub struct Poisson<'a> {
     pub neumann: [[bool; 2]; 2],
 }
 
+/// An entry of the matrices of A u = B f + g over the nodes of a mesh, in lattice order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// The node whose equation it is.
+    pub row: usize,
+    /// The node whose u and f it multiplies.
+    pub column: usize,
+    /// Of A.
+    pub on_u: f64,
+    /// Of B.
+    pub on_source: f64,
+}
+
 impl Poisson<'_> {
     /// The solution at every node, by a sparse direct solver.
     ///
@@ -72,29 +85,18 @@ impl Poisson<'_> {
         let free = self.is_free(lattice);
         let mut system = SparseSystem::new(unknown.len());
         let mut b = vec![0.0; unknown.len()];
-        let mut couple = |row: usize, index: usize, a: f64, b: &mut f64| match place[index] {
-            usize::MAX => *b -= a * self.side[index],
-            0 if free => {}
-            column => system.add(row, column, a),
-        };
-        for k in 0..stencils.patch().len() {
-            let row = place[stencils.index(k)];
-            for (index, a, source) in stencils.points(k) {
-                couple(row, index, a, &mut b[row]);
-                b[row] += source * self.source[index];
+        for Entry { row, column, on_u, on_source } in self.entries(mesh, stencils)? {
+            let row = place[row];
+            match place[column] {
+                _ if row == usize::MAX => continue,
+                usize::MAX => b[row] -= on_u * self.side[column],
+                0 if free => {}
+                column => system.add(row, column, on_u),
             }
+            b[row] += on_source * self.source[column];
         }
-        for &index in &unknown {
-            if let Some(side) = self.neumann_side(lattice, index) {
-                let row = place[index];
-                let [d, c] = [(self.diffusivity, 1.0), (self.robin, 0.0)]
-                    .map(|(values, none)| values.get(index).copied().unwrap_or(none));
-                for (index, a) in derivative(mesh, index, side, outward(mesh, index, side))? {
-                    couple(row, index, d * a, &mut b[row]);
-                }
-                couple(row, index, -c, &mut b[row]);
-                b[row] += self.side[index];
-            }
+        for &index in unknown.iter().filter(|&&index| lattice.on_side(index)) {
+            b[place[index]] += self.side[index];
         }
         if free {
             (0..stencils.patch().len()).for_each(|k| system.add(place[stencils.index(k)], 0, 1.0));
@@ -111,6 +113,53 @@ impl Poisson<'_> {
         Ok(u)
     }
 
+    /// The equations of all nodes, A u = B f + g, g being [`side`](Self::side) on the sides and 0 inside: entries of A
+    /// and B in order of the rows, those of nodes inside first
+    ///
+    /// ```text
+    /// Σ_j a_j u_j = Σ_j b_j f_j inside,   u = g   or   D n·∇u − c u = g on the sides
+    /// ```
+    ///
+    /// n·∇u at a node of a side comes from the 3 × 3 nodes next to it and is exact for quadratics.
+    ///
+    /// # Errors
+    /// [`Failure::WrongLength`] where `robin` or `diffusivity` does not fit the mesh; [`Failure::DegenerateStencil`]
+    /// where the nodes next to a side determine no derivative there.
+    ///
+    /// # Example
+    /// ```
+    /// use driftmesh::geometry::{Lattice, Mesh};
+    /// use driftmesh::laplacian::{Laplacian, Poisson, stencils};
+    /// let mesh = Mesh::uniform(Lattice::bounded([4, 4])?, [0.0, 0.0], [1.0, 1.0])?;
+    /// let entries = Poisson::default().entries(&mesh, &stencils(&mesh, Laplacian::Mapped)?)?;
+    /// // nine for each node inside, one for each on a side, where u is given
+    /// assert_eq!(entries.len(), 9 * 9 + 16);
+    /// # Ok::<(), driftmesh::Error>(())
+    /// ```
+    pub fn entries(&self, mesh: &Mesh<2>, stencils: &Stencils) -> Result<Vec<Entry>, Failure> {
+        let lattice = mesh.lattice();
+        self.check_sides(lattice)?;
+        let mut entries = Vec::with_capacity(9 * lattice.len());
+        for k in 0..stencils.patch().len() {
+            let row = stencils.index(k);
+            let points = stencils.points(k).into_iter();
+            entries.extend(points.map(|(column, on_u, on_source)| Entry { row, column, on_u, on_source }));
+        }
+        for row in (0..lattice.len()).filter(|&index| lattice.on_side(index)) {
+            let entry = |column, on_u| Entry { row, column, on_u, on_source: 0.0 };
+            let Some(side) = self.neumann_side(lattice, row) else {
+                entries.push(entry(row, 1.0));
+                continue;
+            };
+            let [d, c] = [(self.diffusivity, 1.0), (self.robin, 0.0)]
+                .map(|(values, none)| values.get(row).copied().unwrap_or(none));
+            let slope = derivative(mesh, row, side, outward(mesh, row, side))?;
+            entries.extend(slope.map(|(column, a)| entry(column, d * a)));
+            entries.push(entry(row, -c));
+        }
+        Ok(entries)
+    }
+
     /// Whether u is known up to a constant only: it is given nowhere, and no flux depends on it.
     pub fn is_free(&self, lattice: &Lattice<2>) -> bool {
         let determines = |&index: &usize| {
@@ -124,12 +173,17 @@ impl Poisson<'_> {
     fn check(&self, lattice: &Lattice<2>) -> Result<usize, Failure> {
         check_length(lattice, "the source", self.source.len())?;
         check_length(lattice, "the side data", self.side.len())?;
+        self.check_sides(lattice)?;
+        Ok(lattice.len())
+    }
+
+    fn check_sides(&self, lattice: &Lattice<2>) -> Result<(), Failure> {
         for (what, values) in [("the diffusivity", self.diffusivity), ("what fluxes take of u", self.robin)] {
             if !values.is_empty() {
                 check_length(lattice, what, values.len())?;
             }
         }
-        Ok(lattice.len())
+        Ok(())
     }
 
     /// The solution by an iterative solver, for nine-point stencils on a mesh with given values on all sides. It takes

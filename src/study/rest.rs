@@ -122,15 +122,15 @@ where
     let smoothing = match &mut bare {
         MonitorKind::RootGradientTable(_) => 0,
         MonitorKind::ArclengthTable(arclength) => std::mem::take(&mut arclength.smoothing),
+        MonitorKind::CurvatureTable(curvature) => std::mem::take(&mut curvature.smoothing),
         MonitorKind::GivenTable(given) => std::mem::take(&mut given.smoothing),
     };
-    let none = match &bare {
-        MonitorKind::ArclengthTable(arclength) => match arclength.strength {
-            Strength::Relative(strength) | Strength::Absolute(strength) => strength == 0.0,
-        },
-        MonitorKind::RootGradientTable(_) | MonitorKind::GivenTable(_) => false,
+    let strength = match &bare {
+        MonitorKind::ArclengthTable(arclength) => Some(arclength.strength),
+        MonitorKind::CurvatureTable(curvature) => Some(curvature.strength),
+        MonitorKind::RootGradientTable(_) | MonitorKind::GivenTable(_) => None,
     };
-    if none {
+    if let Some(Strength::Relative(0.0) | Strength::Absolute(0.0)) = strength {
         return Ok("its density is constant: `monitor.strength` is 0".into());
     }
     if !varies(study, simulation, state)? {
