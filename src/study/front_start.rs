@@ -3,7 +3,7 @@
 use super::front_given::{Given, Wall};
 use super::stefan::StefanStudy;
 use crate::error::{Error, Result};
-use crate::stefan::{Front, FrontState, LOWER, Problem, Sides, UPPER};
+use crate::stefan::{Front, FrontState, LOWER, Problem, Side, UPPER};
 
 /// Moments of a run at which formulas of its walls are looked at.
 const MOMENTS: usize = 512;
@@ -20,7 +20,7 @@ impl Given {
     /// Whether nothing depends on x, so far as the formulas between the walls go.
     pub(super) fn is_alike(&self) -> bool {
         match self {
-            Self::Formulas { sides: Some(_), .. } => false,
+            Self::Formulas { sides, .. } if sides.iter().any(Option::is_some) => false,
             Self::Formulas { front, initial, walls, .. } => {
                 let wall = |wall: &Wall| match wall {
                     Wall::Value(formula) => formula.depends_on(0),
@@ -107,7 +107,9 @@ impl StefanStudy {
     fn check_sides(&self, front: &Front, given: &Given, [start, end]: [f64; 2]) -> Result<()> {
         const HEIGHTS: usize = 16;
         let (x, melting) = (front.columns.x(), front.material.melting);
-        for (side, i) in [0, x.len() - 1].into_iter().enumerate().filter(|_| front.sides != Sides::Neumann) {
+        for (side, i) in
+            [0, x.len() - 1].into_iter().enumerate().filter(|(side, _)| front.sides[*side] != Side::Insulated)
+        {
             let walls @ [bottom, top] = [LOWER, UPPER].map(|phase| front.columns.wall(phase)[i]);
             let refused = |t: f64, said: String| {
                 let key = self.walls.side(side).map_or_else(|| "walls.sides".into(), |(key, _)| key);
@@ -122,7 +124,7 @@ impl StefanStudy {
                 if let Some(lost) = (0..=HEIGHTS).map(value).find(|value| !value.is_finite()) {
                     return refused(t, format!("is {lost}, and must be finite over the whole run,"));
                 }
-                if front.sides == Sides::Exact && given.side_front(x[i], walls, t).is_none() {
+                if front.sides[side] == Side::Given && given.side_front(x[i], walls, t).is_none() {
                     let rule = format!("never falls through the melting temperature {melting} from bottom to top");
                     return refused(t, rule);
                 }
