@@ -47,6 +47,7 @@ mod safety;
 mod schwarz_theorems;
 mod shallow_water;
 mod sides;
+mod species;
 mod stefan;
 mod steps;
 mod studies;

@@ -24,12 +24,13 @@ from .methods import Fixed, GridWalk, Interpolation, MonteCarlo, ResidualWalk, S
 from .monitors import Arclength, Given, Largest, RootGradient
 from .quality import Quality
 from .remap import transfer
-from .study import Run, load, run, studies
+from .study import Fronts, Run, load, run, studies
 
 __all__ = [
     "Arclength",
     "Fixed",
     "Frame",
+    "Fronts",
     "Given",
     "GridWalk",
     "Interpolation",

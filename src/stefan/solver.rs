@@ -150,11 +150,6 @@ impl FrontState {
     pub(super) fn fields(&self) -> Fields {
         Fields { h: self.front.clone(), u: self.u.clone(), alone: self.alone, bare: self.bare.clone() }
     }
-
-    /// The share of its way by which the front is in doubt, since rows near it are few; none before it has moved.
-    pub fn doubt(&self) -> Option<f64> {
-        (self.way[0] > 0.0).then(|| self.way[1] / self.way[0])
-    }
 }
 
 /// What a step comes to.

@@ -129,6 +129,7 @@ impl Kind for StefanStudy {
         self.check_formulas(&front, &given, [schedule.start(), schedule.end()])?;
         let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
         self.check_temperatures(&front, &state)?;
+        self.check_undercooling(&front, &state)?;
         let frames = self.output.frames_of(&schedule)?;
         self.output.check()?;
         Ok(FrontRun::of(&self.study.name, front, given, (state, schedule), frames))

@@ -133,6 +133,25 @@ impl StefanStudy {
         Ok(())
     }
 
+    /// Refuses a melt so cold that what freezes cannot warm it up to melting: growth would have no finite speed.
+    pub(super) fn check_undercooling(&self, front: &Front, state: &FrontState) -> Result<()> {
+        let Some(melt) = front.undercooled.filter(|melt| state.alone.is_none_or(|alone| alone == *melt)) else {
+            return Ok(());
+        };
+        let s = front.undercooling(melt, state);
+        if s < 1.0 {
+            return Ok(());
+        }
+        let name = NAMES[melt];
+        let most = front.material.latent_heat / front.material.capacity[melt];
+        let rule = format!(
+            "is {s:.3} times latent heat over capacity, {most}, below melting: what freezes cannot warm this melt up to \
+             melting, and the front would run away; raise it, or the latent heat"
+        );
+        let text = [&self.phase.lower, &self.phase.upper][melt].initial.clone().unwrap_or_default();
+        Err(Error::invalid(format!("phase.{name}.initial"), format!("{text:?}"), rule))
+    }
+
     /// Refuses phases that are farther on the wrong side of the melting temperature than on their own.
     pub(super) fn check_temperatures(&self, front: &Front, state: &FrontState) -> Result<()> {
         let melting = front.material.melting;
