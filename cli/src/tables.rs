@@ -156,7 +156,8 @@ impl Told for SpeciesStudy {
         }
         let (work, s) = (summary.figures.work, summary.seconds);
         text + &format!(
-            "work     {} steps, {} rejected, {} Newton iterations\nseconds  {:.2} (pde {:.2}, output {:.2}), {} threads",
+            "work     {} steps, {} rejected, {} Newton iterations\n\
+             seconds  {:.2} (pde {:.2}, output {:.2}), {} threads",
             work.steps,
             work.rejected_steps,
             work.work.newton_iterations,

@@ -97,8 +97,8 @@ impl Front {
         Some(state.energy.imbalance().map_or(rows, |gap| rows.max(gap * answer)))
     }
 
-    /// C (T_m − u) / Λ of the coldest place of a melt: at 1 what freezes there gives just the heat that warms the melt up
-    /// to melting.
+    /// C (T_m − u) / Λ of the coldest place of a melt: at 1 what freezes there gives just the heat that warms the melt
+    /// up to melting.
     pub fn undercooling(&self, melt: usize, state: &FrontState) -> f64 {
         let coldest = state.u[melt].iter().copied().fold(self.material.melting, f64::min);
         self.material.capacity[melt] * (self.material.melting - coldest) / self.material.latent_heat

@@ -145,8 +145,8 @@ impl StefanStudy {
         let name = NAMES[melt];
         let most = front.material.latent_heat / front.material.capacity[melt];
         let rule = format!(
-            "is {s:.3} times latent heat over capacity, {most}, below melting: what freezes cannot warm this melt up to \
-             melting, and the front would run away; raise it, or the latent heat"
+            "is {s:.3} times latent heat over capacity, {most}, below melting: what freezes cannot warm this melt up \
+             to melting, and the front would run away; raise it, or the latent heat"
         );
         let text = [&self.phase.lower, &self.phase.upper][melt].initial.clone().unwrap_or_default();
         Err(Error::invalid(format!("phase.{name}.initial"), format!("{text:?}"), rule))
