@@ -186,7 +186,7 @@ fn the_total_of_a_species_is_kept_across_a_front() {
         let total = report.species["c"];
         println!("{coordinates}: {total:?} {:?}", report.front);
         assert!(total.imbalance < 1e-12 && total.consumed.abs() < 1e-12 * total.start, "{total:?}");
-        assert!((total.inflow + 0.2 * 0.2 * area).abs() < 1e-12 && (report.front.x[0] - 0.8).abs() > 0.01, "{total:?}");
+        assert!((total.inflow + 0.2 * 0.2 * area).abs() < 1e-12 && (report.front.x[0] - 0.8).abs() > 1e-3, "{total:?}");
     }
 }
 
@@ -236,7 +236,7 @@ step = 0.05
 #[test]
 fn a_phase_that_vanishes_is_named() {
     let text = SHRINKING.replace("LEFT", "0.0").replace("LAW", "gas_shell_flux/solid_core").replace("END", "1.0");
-    let (run, failure) = study(&text, &[]).compute().unwrap();
+    let (run, failure) = study(&text, &["grid.cells=[10, 40]".into()]).compute().unwrap();
     let failure = failure.unwrap();
     let Error::Failed { failure: cause, moment } = &failure else { panic!("{failure}") };
     let (t, gone) = (moment.unwrap().t, 4.0 / 6.0 * (1.0 - (1.0 - 3.0 * 0.81 + 2.0 * 0.729)));

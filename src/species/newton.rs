@@ -16,7 +16,7 @@ const MOST_STEPS: usize = 30;
 /// A phase keeps at least this share of its width in one step of Newton's method.
 const LEFT: f64 = 0.5;
 /// A phase counts as vanished where it is thinner than this share of the line.
-const VANISHED: f64 = 1e-6;
+const VANISHED: f64 = 1e-3;
 /// Every third place may be changed at once: an equation takes its own place and the two beside it.
 const STRIDE: usize = 3;
 
@@ -144,7 +144,7 @@ impl Species {
         Some(residents[(unknown - self.before(phase)) % residents.len()].species)
     }
 
-    /// Refuses unknowns that are not finite, and phases that are thinner than a millionth of the line.
+    /// Refuses unknowns that are not finite, and phases that are thinner than a thousandth of the line.
     pub(super) fn check(&self, z: &[f64]) -> Result<(), Failure> {
         if let Some(at) = z.iter().position(|z| !z.is_finite()) {
             return Err(self.not_finite("the concentration", at, z[at], z));

@@ -23,6 +23,8 @@ const FIRST: f64 = 1e-5;
 const PARTS: f64 = 50.0;
 /// How often an automatic step that fails is halved before the run fails.
 const HALVINGS: usize = 12;
+/// Automatic steps that are shorter than this share of the run are not halved again.
+const SHORTEST: f64 = 1e-7;
 /// How often an automatic step with too large an error is shortened before it is taken as it is.
 const REJECTIONS: usize = 12;
 
@@ -203,7 +205,9 @@ impl Running for SpeciesRun {
             self.course.seconds.parts.pde += began.elapsed().as_secs_f64();
             let attempt = match attempt {
                 Ok(attempt) => attempt,
-                Err(Error::Failed { .. }) if self.schedule.is_automatic() && halvings < HALVINGS => {
+                Err(Error::Failed { .. })
+                    if self.schedule.is_automatic() && halvings < HALVINGS && dt > SHORTEST * self.span() =>
+                {
                     halvings += 1;
                     self.course.pace = Some(0.5 * dt);
                     self.course.work.rejected_steps += 1;
