@@ -69,6 +69,7 @@ pub mod meshing;
 pub mod physics;
 
 pub mod mover;
+pub mod species;
 pub mod stefan;
 
 pub mod simulation;

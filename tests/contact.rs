@@ -217,14 +217,15 @@ end = 0.8
 step = 0.01
 "#;
 
-/// Heat through the sides, which depends on the temperature there; temperatures on the sides.
+/// Heat through the sides, which depends on the temperature there; temperatures on the sides; one of each.
 #[test]
 fn sides_have_fluxes_or_temperatures() {
     let (b, c) = (15.0_f64.to_radians().sin(), 15.0_f64.to_radians().cos());
     let text = TILTED.replace('B', &format!("{b:?}")).replace('C', &format!("{c:?}"));
-    let values = "walls.sides=\"if(c*y - b*x < t, 2, 1)*(exp(t - c*y + b*x) - 1)\"";
-    let values = values.replace("c*", &format!("{c:?}*")).replace("b*", &format!("{b:?}*"));
-    for set in [&[][..], &[&values[..]]] {
+    let value = "\"if(c*y - b*x < t, 2, 1)*(exp(t - c*y + b*x) - 1)\"";
+    let value = value.replace("c*", &format!("{c:?}*")).replace("b*", &format!("{b:?}*"));
+    let [both, left, right] = ["", ".left", ".right"].map(|side| format!("walls.sides{side}={value}"));
+    for set in [&[][..], &[&both[..]], &[&left[..]], &[&right[..]]] {
         let error = |n: usize| {
             let cells = format!("grid.cells=[{}, {}, {}]", 10 * n, 10 * n, 10 * n);
             let step = format!("time.step={}", 0.01 / n as f64);
@@ -237,7 +238,7 @@ fn sides_have_fluxes_or_temperatures() {
         assert!(errors[1] < 2e-4 && (errors[0] / errors[1]).log2() > 1.7, "{set:?}: {errors:?}");
     }
     for (set, words) in [
-        ("walls.sides={ left = \"no-flux\", right = \"1\" }", &["walls.sides", "both"][..]),
+        ("walls.sides.right=\"exact\"", &["walls.sides.right", "[exact]"][..]),
         ("walls.sides={ left = \"1 - y\", right = \"1\" }", &["walls.sides.right", "melting temperature"]),
         ("walls.sides.left={ flux = \"sqrt(0.6 - t)\" }", &["walls.sides.left", "NaN"]),
         ("walls.sides={ bottom = \"no-flux\" }", &["walls.sides.bottom", "boundary"]),
@@ -245,4 +246,63 @@ fn sides_have_fluxes_or_temperatures() {
         let said = refused(&text, &[set]);
         assert!(words.iter().all(|word| said.contains(word)), "{set}: {said}");
     }
+}
+
+/// A front that is symmetric about x = 0, with conditions that change in time.
+const SYMMETRIC: &str = r#"
+[study]
+name = "symmetric"
+kind = "stefan"
+[domain]
+x = [-1.0, 1.0]
+bottom = "0"
+top = "2"
+front = "1 + 0.1*cos(2*x)"
+[grid]
+cells = [16, 10, 10]
+[phase.lower]
+initial = "1 + 0.1*cos(2*x) - y"
+boundary = "1 + 0.1*cos(2*x) + t"
+[phase.upper]
+initial = "1 + 0.1*cos(2*x) - y"
+boundary = { flux = "u - 0.5" }
+[walls]
+sides = "1 + 0.1*cos(2*x) - y + t/2"
+[time]
+end = 0.3
+"#;
+
+/// The axis of a symmetric front is an insulated side: half of the box, beside temperatures or a flux on the other
+/// side, has the front of the whole box.
+#[test]
+fn an_insulated_side_is_an_axis_of_symmetry() {
+    const VALUE: &str = "\"1 + 0.1*cos(2*x) - y + t/2\"";
+    const FLUX: &str = "{ flux = \"0.3 - u/2\" }";
+    for condition in [VALUE, FLUX] {
+        let whole = course(SYMMETRIC, &[format!("walls.sides={condition}")]).state.front;
+        for (x, sides) in [
+            ("[-1.0, 0.0]", format!("walls.sides={{ left = {condition}, right = \"no-flux\" }}")),
+            ("[0.0, 1.0]", format!("walls.sides={{ left = \"neumann\", right = {condition} }}")),
+        ] {
+            let half =
+                course(SYMMETRIC, &[format!("domain.x={x}"), "grid.cells=[8, 10, 10]".into(), sides]).state.front;
+            let there = if x.starts_with("[-") { &whole[..9] } else { &whole[8..] };
+            let off = half.iter().zip(there).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            println!("{condition} on {x}: {off:e}, {there:?}");
+            assert!(off < 1e-8, "{condition} on {x}: {off:e}");
+        }
+    }
+}
+
+/// Each side of a flat exact front may have it, or let nothing through; nothing else.
+#[test]
+fn an_exact_side_stands_beside_an_insulated_one() {
+    let head = SYMMETRIC[..SYMMETRIC.find("[phase.lower]").unwrap()].replace("front = \"1 + 0.1*cos(2*x)\"\n", "");
+    let text = head
+        + "[exact]\nkind = \"planar\"\nwall = 1.0\nfar = -0.5\nstart_front = 0.7\n"
+        + "[walls.sides]\nleft = \"exact\"\nright = \"neumann\"\n[time]\nduration = 0.2\n";
+    let report = course(&text, crate::front_runs::AS_IT_IS).reports[0];
+    assert!(report.front.error_linf.unwrap() < 2e-3, "{report:?}");
+    let said = refused(&text, &["walls.sides.left=\"1 - y\""]);
+    assert!(["walls.sides.left", "\"exact\" or \"neumann\""].iter().all(|word| said.contains(word)), "{said}");
 }

@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 10] = [
     &["geometry", "ranks"],
     &["numerics"],
     &["density", "equidistribution", "laplacian", "meshing", "physics"],
-    &["mover", "stefan"],
+    &["mover", "species", "stefan"],
     &["simulation"],
     &["output"],
     &["report"],

@@ -65,6 +65,7 @@ fn pages_name_every_key() {
         ("MovingMesh", [STUDY, EQUATION, SUBDOMAINS, SAFETY, DOMAINS].concat()),
         ("PoissonStudy", LAPLACIAN.to_string()),
         ("StefanStudy", [FRONTS, LAPLACIAN].concat()),
+        ("SpeciesStudy", FRONTS.to_string()),
         ("EquidistributionStudy", LINE.to_string()),
     ] {
         let mut names = BTreeSet::new();

@@ -161,6 +161,54 @@ fn a_front_on_too_few_rows_is_in_doubt() {
     }
 }
 
+/// Near Λ/C the speed turns on the last per cent of the heat: the doubt tells the error of the front to a factor of two
+/// and warns, also where rows are close at the front and too wide beyond, and a melt beyond Λ/C is refused.
+#[test]
+fn growth_near_the_largest_undercooling_is_in_doubt() {
+    const GROWTH: &str = r#"
+[study]
+name = "fast"
+kind = "stefan"
+[domain]
+x = [0.0, 0.2]
+bottom = "0"
+top = "1"
+[grid]
+cells = [4, 8, 40]
+[front]
+undercooled = true
+[exact]
+kind = "planar-growth"
+far = -0.9
+start_front = 0.1
+[time]
+duration = 0.01
+"#;
+    for (set, warns) in [
+        (&[][..], true),
+        (&["grid.cells=[4, 8, 80]", "grid.grading=3"], true),
+        (&["exact.far=-0.98", "time.duration=0.0015", "grid.cells=[4, 8, 120]", "grid.grading=3"], true),
+        (&["exact.far=-0.5", "time.duration=0.05"], false),
+    ] {
+        let study = study(GROWTH, set);
+        let start = study.begin().unwrap().course.state.front[0];
+        let out = tempfile::tempdir().unwrap();
+        let summary = study.run(&out.path().join("run"), Begin::Anew, &mut []).unwrap().summary;
+        let front = summary.figures.reports[0].front;
+        let off = front.error_linf.unwrap() / (front.mean - start);
+        println!("{set:?}: off by {off:e}, doubt {:e}", front.doubt.unwrap());
+        assert!((0.5..2.0).contains(&(front.doubt.unwrap() / off)) || !warns, "{set:?}: {off:e}, {front:?}");
+        let warned = summary.warnings.iter().any(|said| said.contains("last per cent of the heat"));
+        assert!(warned == warns, "{set:?}: {front:?}");
+    }
+    let error = refused(&undercooled(), &["phase.upper.initial=\"-1.5*(y - 0.1)\""]);
+    let said = format!("{error} {}", error.help().unwrap_or_default());
+    assert!(
+        ["phase.upper.initial", "latent heat over capacity", "raise it"].iter().all(|w| said.contains(w)),
+        "{said}"
+    );
+}
+
 /// Upside down the melt is the lower phase; without the key that is refused with its name, and the key without such a
 /// melt, too.
 #[test]

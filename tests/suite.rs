@@ -50,6 +50,7 @@ mod schwarz_theorems;
 mod shallow_water;
 mod shocks;
 mod sides;
+mod species;
 mod stefan;
 mod steps;
 mod studies;

@@ -53,6 +53,7 @@ impl Run {
             Study::MovingLine(study) => self.watched(study, &out),
             Study::Poisson(study) => self.watched(study, &out),
             Study::Stefan(study) => self.watched(study, &out),
+            Study::Species(study) => self.watched(study, &out),
             Study::Equidistribution(study) => self.watched(study, &out),
         }
     }

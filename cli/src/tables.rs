@@ -6,7 +6,7 @@ use driftmesh::output::Summary;
 use driftmesh::simulation::Retries;
 use driftmesh::study::{
     EquidistributionStudy, FrontSummary, Kind, LineFigures, MovingFigures, MovingLine, MovingMesh, NumberedIterate,
-    PoissonFigures, PoissonStudy, Running, StefanStudy, UniformEquivalent,
+    PoissonFigures, PoissonStudy, Running, SpeciesStudy, SpeciesSummary, StefanStudy, UniformEquivalent,
 };
 
 /// What is said of a run in a few lines.
@@ -127,6 +127,48 @@ impl Told for StefanStudy {
     }
 
     fn left(summary: &Summary<FrontSummary>) -> String {
+        last_good(summary.figures.work.steps)
+    }
+}
+
+impl Told for SpeciesStudy {
+    fn table(summary: &Summary<SpeciesSummary>) -> String {
+        let mut text = String::new();
+        if !summary.figures.reports.is_empty() {
+            text += "       t     front  velocity   species      content       inflow     consumed  imbalance\n";
+        }
+        for report in &summary.figures.reports {
+            let fronts = report.front.x.iter().zip(&report.front.velocity);
+            let mut fronts = fronts.map(|(x, velocity)| format!("{x:9.6} {velocity:9.2e}"));
+            let mut species = report.species.iter().map(|(name, total)| {
+                let [content, inflow, consumed] = [total.content, total.inflow, total.consumed];
+                format!("{name:>9} {content:12.6} {inflow:12.6} {consumed:12.6} {:10.1e}", total.imbalance)
+            });
+            let mut time = Some(moment(report.t));
+            loop {
+                let (front, total) = (fronts.next(), species.next());
+                if front.is_none() && total.is_none() {
+                    break;
+                }
+                let time = time.take().unwrap_or_default();
+                text += &format!("{time:>8} {:19} {}\n", front.unwrap_or_default(), total.unwrap_or_default());
+            }
+        }
+        let (work, s) = (summary.figures.work, summary.seconds);
+        text + &format!(
+            "work     {} steps, {} rejected, {} Newton iterations\n\
+             seconds  {:.2} (pde {:.2}, output {:.2}), {} threads",
+            work.steps,
+            work.rejected_steps,
+            work.work.newton_iterations,
+            s.wall,
+            s.parts.pde,
+            s.output,
+            summary.parallel.threads
+        )
+    }
+
+    fn left(summary: &Summary<SpeciesSummary>) -> String {
         last_good(summary.figures.work.steps)
     }
 }

@@ -25,13 +25,14 @@ from .monitors import Arclength, Curvature, Given, Largest, Limited, RootGradien
 from .poisson import Poisson
 from .quality import Quality
 from .remap import transfer
-from .study import Run, load, run, studies
+from .study import Fronts, Run, load, run, studies
 
 __all__ = [
     "Arclength",
     "Curvature",
     "Fixed",
     "Frame",
+    "Fronts",
     "Given",
     "GridWalk",
     "Interpolation",

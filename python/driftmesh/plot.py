@@ -64,6 +64,13 @@ def run(of: Run, path: str | PathLike[str] | None, ax: Axes | None) -> Axes:
         ax.set_xlabel("ξ")
         ax.set_ylabel("x")
         ax.set_title(of.summary["study"])
+    elif x is not None and x.ndim == 1 and "t" in of.final:
+        for name, values in of.final.items():
+            if name not in ("x", "phase") and values.shape == x.shape:
+                ax.plot(x, values, label=name)
+        ax.set_xlabel("x")
+        ax.legend()
+        ax.set_title(f"{of.summary['study']}, t = {float(of.final['t']):.4g}")
     else:
         raise ValueError(f"{of.directory} has no state to draw: the run is {of.status}")
     if path is not None:

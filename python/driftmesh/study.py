@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -33,6 +34,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .widget import View
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """The front between two phases at every step of a run.
+
+    Attributes:
+        t: Times of the steps, shape (steps + 1,).
+        x: x of the columns, shape (nx + 1,).
+        y: Height of the front, shape (steps + 1, nx + 1).
+    """
+
+    t: Floats
+    x: Floats
+    y: Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,6 +101,23 @@ class Run:
     def mesh(self) -> Mesh:
         """The last mesh, in the plane or of a line."""
         return Mesh(self.final["x"], self.final.get("y"), **self._domain)
+
+    @cached_property
+    def fronts(self) -> Fronts:
+        """The front of a study of kind ``stefan`` as a curve over x at every step, from ``front.csv``.
+
+        Raises:
+            ValueError: The run has none. Of species on a line the places are columns of ``history``.
+        """
+        columns = _table(self.directory / "front.csv")
+        if "t" not in columns:
+            raise ValueError(
+                f"{self.directory} has no front.csv: only studies of kind `stefan` in the plane leave one; the fronts "
+                "of species on a line are columns of `history`"
+            )
+        x = np.array([float(name.removeprefix("x=")) for name in columns if name != "t"])
+        y = np.stack([column for name, column in columns.items() if name != "t"], axis=1)
+        return Fronts(columns["t"], x, y)
 
     def __repr__(self) -> str:
         steps = self.summary.get("work", {}).get("steps")

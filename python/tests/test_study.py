@@ -126,6 +126,7 @@ def test_results_are_told_apart_and_shown_shortly(result):
             {"x": (11, 13), "u": (11, 13)},
         ),
         ("table-8-1-nonlinear", {}, {"x": (101,)}),
+        ("shrinking-core", {"time.end": 0.05, "time.report": [0.05]}, {"x": (64,), "gas": (64,), "solid": (64,)}),
         ("moving-front-1d", {"time.end": 0.02}, {"x": (101,), "path": (None, 101)}),
     ],
 )
@@ -138,6 +139,23 @@ def test_every_kind_runs_and_draws(study, settings, arrays, tmp_path):
         assert result.final[name].shape[-len(shape) :][-1] == shape[-1] and np.isfinite(result.final[name]).all()
     result.plot(tmp_path / "plot.png")
     assert (tmp_path / "plot.png").stat().st_size > 5000
+
+
+def test_a_front_is_a_curve_at_every_step(result, tmp_path):
+    settings = {"time.end": 0.05, "time.report": [0.05], "grid.cells": [10, 6, 8], "output.report": False}
+    run = driftmesh.run(ROOT / "studies/stefan-slides.toml", out=tmp_path / "out", set=settings)
+    fronts, steps = run.fronts, run.summary["work"]["steps"]
+    assert fronts.t.shape == (steps + 1,) and fronts.x.shape == (11,) and fronts.y.shape == (steps + 1, 11)
+    # the front at the start as the study gives it, and the seventh row of the mesh at the end
+    assert np.allclose(fronts.y[0], 1 + np.cos(fronts.x) / 4, atol=1e-14)
+    assert np.array_equal(fronts.y[-1], run.final["y"][:, 6]) and np.array_equal(fronts.x, run.final["x"][:, 0])
+    assert np.array_equal(fronts.t, run.history["t"])
+    for frame in run.frames:
+        assert set(frame.names) >= {"u", "phase"} and "rho" not in frame.names
+        [step] = np.flatnonzero(fronts.t == frame.t)
+        assert np.array_equal(frame.y[:, 6], fronts.y[step])
+    with pytest.raises(ValueError, match="has no front.csv"):
+        result.fronts
 
 
 def test_pictures_and_animations(result, tmp_path):

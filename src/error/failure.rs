@@ -268,8 +268,8 @@ pub enum Failure {
     /// A phase became so thin that rows of it cannot be told apart.
     #[error("the {phase} phase vanishes at x = {}: only {thickness:.1e} of its column of {of:.3} is left", short(*x))]
     VanishingPhase {
-        /// `lower` or `upper`.
-        phase: &'static str,
+        /// Its name: `lower` or `upper` where there are two, with heat alone.
+        phase: String,
         /// Where.
         x: f64,
         /// What is left.

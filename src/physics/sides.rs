@@ -37,6 +37,14 @@ impl Condition {
             _ => Self::Value(text),
         }
     }
+
+    /// The value that is given, if it is one.
+    pub(crate) fn value(&self) -> Option<&str> {
+        match self {
+            Self::Value(text) => Some(text),
+            _ => None,
+        }
+    }
 }
 
 /// The conditions of one unknown: one for all sides, or each by the name of its side.
@@ -58,8 +66,8 @@ impl Conditions {
     /// The value that is given on all sides alike, if it is.
     pub fn value(&self) -> Option<&str> {
         match self {
-            Self::All(Condition::Value(text)) => Some(text),
-            _ => None,
+            Self::All(condition) => condition.value(),
+            Self::Each(_) => None,
         }
     }
 

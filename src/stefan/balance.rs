@@ -3,7 +3,7 @@
 use super::columns::{LOWER, UPPER};
 use super::conduct::{Fields, present, velocity};
 use super::energy::{Energy, Phase, total};
-use super::solver::{Front, FrontState, Problem, Sides};
+use super::solver::{Front, FrontState, Problem, Side};
 
 /// The state at an instant of a step, with its share of the step in an integral over time.
 pub(super) struct Instant<'a> {
@@ -98,36 +98,42 @@ impl Front {
                 let other = self.given_flux(problem, 1 - phase, (phase, &instant.fields.u), instant.t).unwrap_or(0.0);
                 sums[1 - phase] = [other; 2];
             }
-            let through_sides = match self.sides {
-                Sides::Neumann => None,
-                Sides::Exact => Some(at.side_fluxes()),
-                Sides::Flux => Some(self.side_inflow(problem, &at, &instant.fields.u[phase], instant.t)),
-            };
-            if let Some([all, unseen]) = through_sides {
-                sums[phase][0] += if given.is_some() { all } else { unseen };
-                sums[phase][1] += all;
+            let mut through_sides = [0.0; 2];
+            for side in 0..2 {
+                let u = &instant.fields.u[phase];
+                match self.sides[side] {
+                    Side::Insulated => (),
+                    Side::Given => at.add_side_flux(side, &mut through_sides),
+                    Side::Flux => self.add_side_inflow(problem, (&at, side), (u, instant.t), &mut through_sides),
+                }
             }
+            let [all, unseen] = through_sides;
+            sums[phase][0] += if given.is_some() { all } else { unseen };
+            sums[phase][1] += all;
         }
         sums
     }
 
-    /// What flows in through the sides of a phase: ∫q and ∫q (1 − Φ).
-    fn side_inflow(&self, problem: &dyn Problem, phase: &Phase<'_>, u: &[f64], t: f64) -> [f64; 2] {
-        let (x, nodes) = (self.columns.x(), self.columns.rows(phase.phase) + 1);
-        let mut sums = [0.0; 2];
-        for (side, i) in [0, x.len() - 1].into_iter().enumerate() {
-            let flux = |k: usize| {
-                let at = self.side_flux(problem, (phase.phase, side), [phase.y, u], (k, t));
-                let [flux, _] = at.unwrap_or_default();
-                [flux, flux * (1.0 - phase.test(k))]
-            };
-            for k in i * nodes..(i + 1) * nodes - 1 {
-                let half = 0.5 * (phase.y[k + 1] - phase.y[k]);
-                let [a, b] = [flux(k), flux(k + 1)];
-                (0..2).for_each(|c| sums[c] += half * (a[c] + b[c]));
-            }
+    /// Adds what flows into a phase through the left (0) or the right side (1): ∫q and ∫q (1 − Φ).
+    fn add_side_inflow(
+        &self,
+        problem: &dyn Problem,
+        (phase, side): (&Phase<'_>, usize),
+        (u, t): (&[f64], f64),
+        sums: &mut [f64; 2],
+    ) {
+        let nodes = self.columns.rows(phase.phase) + 1;
+        let i = [0, self.columns.x().len() - 1][side];
+        let flux = |k: usize| {
+            let at = self.side_flux(problem, (phase.phase, side), [phase.y, u], (k, t));
+            let [flux, _] = at.unwrap_or_default();
+            [flux, flux * (1.0 - phase.test(k))]
+        };
+        for k in i * nodes..(i + 1) * nodes - 1 {
+            let half = 0.5 * (phase.y[k + 1] - phase.y[k]);
+            let [a, b] = [flux(k), flux(k + 1)];
+            (0..2).for_each(|c| sums[c] += half * (a[c] + b[c]));
         }
-        sums
     }
 
     /// ∫q ds over a wall that a phase reaches, where q is given.

@@ -140,20 +140,20 @@ impl Columns {
         y
     }
 
-    /// The mesh of m nodes a column at heights y; with `mirrored`, one more column beyond each side.
-    pub(super) fn mesh(&self, m: usize, y: &[f64], mirrored: bool) -> Result<Mesh<2>> {
+    /// The mesh of m nodes a column at heights y; one more column beyond each side that is `mirrored`.
+    pub(super) fn mesh(&self, m: usize, y: &[f64], mirrored: [bool; 2]) -> Result<Mesh<2>> {
         let (n, h) = (self.x.len(), self.width);
         let at = |i: usize| if h == self.spacing() { self.x[i] } else { i as f64 * h };
         let mut nodes = Vec::with_capacity((n + 2) * m);
         let mut column = |x: f64, i: usize| nodes.extend(y[i * m..(i + 1) * m].iter().map(|&y| [x, y]));
-        if mirrored {
+        if mirrored[0] {
             column(at(0) - h, 1);
         }
         (0..n).for_each(|i| column(at(i), i));
-        if mirrored {
+        if mirrored[1] {
             column(at(n - 1) + h, n - 2);
         }
-        let across = n - 1 + if mirrored { 2 } else { 0 };
+        let across = n - 1 + mirrored.into_iter().filter(|mirrored| *mirrored).count();
         Mesh::mapped(Lattice::bounded([across, m - 1])?, nodes)
     }
 
@@ -205,6 +205,7 @@ impl Columns {
             let of = top - bottom;
             for (phase, thickness) in [("lower", y - bottom), ("upper", top - y)] {
                 if thickness < VANISHED * of && bare.get(i).is_none_or(Option::is_none) {
+                    let phase = phase.into();
                     return Err(Failure::VanishingPhase { phase, x, thickness, of });
                 }
             }

@@ -3,7 +3,7 @@
 use super::columns::{LOWER, UPPER};
 use super::front::tilt;
 use super::heat::{HeatStep, carry};
-use super::solver::{Front, Problem, Sides, Transfer};
+use super::solver::{Front, Problem, Side, Transfer};
 use crate::error::{Error, Failure, Result};
 use crate::numerics::larger;
 
@@ -175,12 +175,12 @@ impl Front {
     /// `u` with the temperatures that are given at time `t`: on the front, on walls without a flux and on sides.
     fn given(&self, problem: &dyn Problem, reach: Reach<'_>, y: &[f64], u: &[f64], t: f64) -> Result<Vec<f64>> {
         let phase = reach.phase;
-        let (nodes, last) = (self.columns.rows(phase) + 1, self.columns.x().len() - 1);
+        let nodes = self.columns.rows(phase) + 1;
         let flux = [LOWER, UPPER].map(|wall| self.has_flux(problem, wall, t));
         let mut given = u.to_vec();
         for (k, given) in given.iter_mut().enumerate() {
             let (i, j) = (k / nodes, k % nodes);
-            let side = self.held() && (i == 0 || i == last);
+            let side = self.held_at(i);
             let end = if j == 0 { Some(0) } else { (j + 1 == nodes).then_some(1) };
             let wall = end.map(|end| reach.wall(end, i));
             let of = match wall {
@@ -219,9 +219,9 @@ impl Front {
             let all = self.wall_slopes(problem, [reach.phase, wall], u, t)?;
             Ok::<_, Error>(Some(walls.iter().zip(all).map(|(wall, slope)| wall.map(|_| slope)).collect()))
         };
-        let sides = [0, 1].map(|side| match self.sides {
-            Sides::Flux => self.side_slopes(problem, (reach.phase, side), [y, u], t),
-            Sides::Neumann | Sides::Exact => Ok(None),
+        let sides = [0, 1].map(|side| match self.sides[side] {
+            Side::Flux => self.side_slopes(problem, (reach.phase, side), [y, u], t),
+            Side::Insulated | Side::Given => Ok(None),
         });
         let [left, right] = sides;
         Ok(Edges { ends: [slopes(0)?, slopes(1)?], sides: [left?, right?] })

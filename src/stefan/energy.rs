@@ -142,8 +142,8 @@ impl Phase<'_> {
         let (m, dx, n) = (self.nodes(), self.columns.spacing(), self.columns.x().len());
         let [_, wall] = self.columns.ends(self.phase);
         let on_wall: Vec<f64> = (0..n).map(|i| self.u[i * m + wall]).collect();
-        let [u_x, slope_x] =
-            [&on_wall, &self.columns.wall(self.phase).to_vec()].map(|f| super::front::tilt(self.columns, f, false));
+        let [u_x, slope_x] = [&on_wall, &self.columns.wall(self.phase).to_vec()]
+            .map(|f| super::front::tilt(self.columns, f, [false; 2]));
         let flux = |i: usize| {
             let row = |k: usize| i * m + if wall == 0 { k } else { wall - k };
             let at = |f: &[f64]| [f[row(0)], f[row(1)], f[row(2)]];
@@ -154,39 +154,34 @@ impl Phase<'_> {
         (0..n).map(|i| flux(i) * if i == 0 || i + 1 == n { 0.5 * dx } else { dx }).sum()
     }
 
-    /// Fluxes in through both sides by one-sided differences: the whole flux, and ∫k ∂_n u (1 − Φ).
-    pub fn side_fluxes(&self) -> [f64; 2] {
+    /// Adds the flux in through the left (0) or the right side (1) by one-sided differences: the whole flux, and
+    /// ∫k ∂_n u (1 − Φ).
+    pub fn add_side_flux(&self, side: usize, sums: &mut [f64; 2]) {
         let (m, dx, n) = (self.nodes(), self.columns.spacing(), self.columns.x().len());
-        let mut sums = [0.0; 2];
-        for (side, inner, outer) in [(0, 1, 2), (n - 1, n - 2, n - 3)] {
-            let flux = |j: usize| {
-                let along =
-                    |f: &[f64]| (4.0 * f[inner * m + j] - 3.0 * f[side * m + j] - f[outer * m + j]) / (2.0 * dx);
-                let k = side * m + j;
-                let u_y = match j {
-                    0 => {
-                        end_slope([self.y[k], self.y[k + 1], self.y[k + 2]], [self.u[k], self.u[k + 1], self.u[k + 2]])
-                    }
-                    j if j + 1 == m => {
-                        end_slope([self.y[k], self.y[k - 1], self.y[k - 2]], [self.u[k], self.u[k - 1], self.u[k - 2]])
-                    }
-                    _ => {
-                        let w = slope([self.y[k - 1], self.y[k], self.y[k + 1]]);
-                        w[0] * self.u[k - 1] + w[1] * self.u[k] + w[2] * self.u[k + 1]
-                    }
-                };
-                // the derivative along the row, corrected by ∂u/∂y for the slope of the row
-                -self.conductivity * (along(self.u) - u_y * along(self.y))
+        let [side, inner, outer] = [[0, 1, 2], [n - 1, n - 2, n - 3]][side];
+        let flux = |j: usize| {
+            let along = |f: &[f64]| (4.0 * f[inner * m + j] - 3.0 * f[side * m + j] - f[outer * m + j]) / (2.0 * dx);
+            let k = side * m + j;
+            let u_y = match j {
+                0 => end_slope([self.y[k], self.y[k + 1], self.y[k + 2]], [self.u[k], self.u[k + 1], self.u[k + 2]]),
+                j if j + 1 == m => {
+                    end_slope([self.y[k], self.y[k - 1], self.y[k - 2]], [self.u[k], self.u[k - 1], self.u[k - 2]])
+                }
+                _ => {
+                    let w = slope([self.y[k - 1], self.y[k], self.y[k + 1]]);
+                    w[0] * self.u[k - 1] + w[1] * self.u[k] + w[2] * self.u[k + 1]
+                }
             };
-            for j in 0..m - 1 {
-                let k = side * m + j;
-                let height = self.y[k + 1] - self.y[k];
-                let (a, b) = (flux(j), flux(j + 1));
-                sums[0] += 0.5 * height * (a + b);
-                sums[1] += 0.5 * height * (a * (1.0 - self.test(k)) + b * (1.0 - self.test(k + 1)));
-            }
+            // the derivative along the row, corrected by ∂u/∂y for the slope of the row
+            -self.conductivity * (along(self.u) - u_y * along(self.y))
+        };
+        for j in 0..m - 1 {
+            let k = side * m + j;
+            let height = self.y[k + 1] - self.y[k];
+            let (a, b) = (flux(j), flux(j + 1));
+            sums[0] += 0.5 * height * (a + b);
+            sums[1] += 0.5 * height * (a * (1.0 - self.test(k)) + b * (1.0 - self.test(k + 1)));
         }
-        sums
     }
 }
 

@@ -188,7 +188,7 @@ impl Front {
 
     /// The state with walls bare where a phase is about to leave them; none where it does not.
     pub(super) fn uncovered(&self, problem: &dyn Problem, state: &FrontState) -> Option<FrontState> {
-        if !self.mirrored() || state.alone.is_some() || self.undercooled.is_some() {
+        if self.mirrored() != [true; 2] || state.alone.is_some() || self.undercooled.is_some() {
             return None;
         }
         let speed = self.speed(problem, state)?;

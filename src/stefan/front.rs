@@ -52,14 +52,14 @@ impl Filter {
         self.0.map_or([1.0, 0.0], |[a, b, _]| [b / (b + 2.0 * a), 2.0 * a / (b + 2.0 * a)])
     }
 
-    /// Smooths values. With `mirrored` those at the ends see their mirror images, else they stay.
-    pub(super) fn apply(&self, values: &[f64], mirrored: bool) -> Vec<f64> {
+    /// Smooths values. Those at ends that are `mirrored` see their mirror images, those at others stay.
+    pub(super) fn apply(&self, values: &[f64], mirrored: [bool; 2]) -> Vec<f64> {
         let [own, other] = self.weights();
         let last = values.len() - 1;
         let smooth = |i: usize| {
             let (before, after) = match i {
-                0 if mirrored => (values[1], values[1]),
-                i if i == last && mirrored => (values[last - 1], values[last - 1]),
+                0 if mirrored[0] => (values[1], values[1]),
+                i if i == last && mirrored[1] => (values[last - 1], values[last - 1]),
                 0 => return values[0],
                 i if i == last => return values[last],
                 i => (values[i - 1], values[i + 1]),
@@ -100,11 +100,11 @@ pub(super) fn slopes<const N: usize>(
 }
 
 /// dh/dx by central differences; 0 at mirrored sides, one-sided at others.
-pub(super) fn tilt(columns: &Columns, h: &[f64], mirrored: bool) -> Vec<f64> {
+pub(super) fn tilt(columns: &Columns, h: &[f64], mirrored: [bool; 2]) -> Vec<f64> {
     let (last, dx) = (h.len() - 1, columns.spacing());
     let at = |i: usize| match i {
         i if i > 0 && i < last => (h[i + 1] - h[i - 1]) / (2.0 * dx),
-        _ if mirrored => 0.0,
+        _ if mirrored[usize::from(i == last)] => 0.0,
         0 => (4.0 * h[1] - 3.0 * h[0] - h[2]) / (2.0 * dx),
         _ => (3.0 * h[last] - 4.0 * h[last - 1] + h[last - 2]) / (2.0 * dx),
     };
@@ -162,7 +162,7 @@ pub(super) fn segments(
     tilt: &[f64],
     jump: &[f64],
     factor: f64,
-    mirrored: bool,
+    mirrored: [bool; 2],
 ) -> Result<Vec<f64>, Failure> {
     let (x, last) = (columns.x(), h.len() - 1);
     let shift: Vec<[f64; 2]> = (0..last)
@@ -179,8 +179,8 @@ pub(super) fn segments(
         .map(|i| {
             let by = match i {
                 // the other segment is its mirror image
-                0 if mirrored => [0.0, shift[0][1]],
-                i if i == last && mirrored => [0.0, shift[last - 1][1]],
+                0 if mirrored[0] => [0.0, shift[0][1]],
+                i if i == last && mirrored[1] => [0.0, shift[last - 1][1]],
                 0 => shift[0],
                 i if i == last => shift[last - 1],
                 i => [0, 1].map(|c| 0.5 * (shift[i - 1][c] + shift[i][c])),

@@ -26,7 +26,7 @@ pub(super) struct HeatStep<'a> {
     /// Slopes at the edges where no value is given.
     pub edges: &'a Edges,
     /// Whether values are given on the left and the right side.
-    pub held: bool,
+    pub held: [bool; 2],
 }
 
 /// Unknowns from which on multigrid is faster than alternating directions, which keep symmetry to round-off.
@@ -143,7 +143,7 @@ impl HeatStep<'_> {
     /// The node of the k-th unknown.
     fn own(&self, patch: &Patch<2>, k: usize) -> usize {
         let [i, j] = [k / patch.size[1], k % patch.size[1]];
-        (i + usize::from(self.held)) * self.nodes() + j + 1 - self.below()
+        (i + usize::from(self.held[0])) * self.nodes() + j + 1 - self.below()
     }
 
     /// Values of the nodes as a padded vector, whose ring lies on sides with given values and beyond others, where it
@@ -152,7 +152,7 @@ impl HeatStep<'_> {
         let (width, nodes) = (patch.size[1] + 2, self.nodes());
         let mut x = vec![[0.0]; patch.padded_len()];
         for (p, x) in x.chunks_exact_mut(width).enumerate() {
-            let column = (p + usize::from(self.held)).checked_sub(1).filter(|&i| i < self.columns.x().len());
+            let column = (p + usize::from(self.held[0])).checked_sub(1).filter(|&i| i < self.columns.x().len());
             let Some(i) = column else { continue };
             x[self.below()..].iter_mut().zip(&values[i * nodes..(i + 1) * nodes]).for_each(|(x, value)| x[0] = *value);
         }
@@ -171,7 +171,7 @@ impl HeatStep<'_> {
             y.extend_from_slice(column);
             y.extend(ends[1].iter().map(|_| 2.0 * column[last] - column[last - 1]));
         }
-        self.columns.mesh(self.nodes() + ghosts, &y, !self.held)
+        self.columns.mesh(self.nodes() + ghosts, &y, self.held.map(|held| !held))
     }
 
     fn rows(&self, laplacian: Laplacian) -> Result<Option<Rows>> {
@@ -196,8 +196,8 @@ impl HeatStep<'_> {
                     source[k] = -self.reflect(&mut row, [own / self.nodes(), end], slopes);
                 }
             }
-            if !self.held {
-                for (side, _) in [i == 0, i + 1 == count].into_iter().enumerate().filter(|(_, on)| *on) {
+            for (side, on) in [i == 0, i + 1 == count].into_iter().enumerate() {
+                if on && !self.held[side] {
                     source[k] -= self.fold(&mut row, own, side);
                 }
             }

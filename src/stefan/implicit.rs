@@ -96,9 +96,8 @@ impl Front {
     /// damped like the last stage, against their range.
     fn error(&mut self, miss: &Fields, end: &Fields, base: &Fields, tau: f64) -> Result<f64> {
         let mut error = 0.0_f64;
-        let last = end.h.len() - 1;
         for (i, (miss, h)) in miss.h.iter().zip(&end.h).enumerate() {
-            if !self.held() || i != 0 && i != last {
+            if !self.held_at(i) {
                 error = larger(error, miss / self.columns.room(i, *h));
             }
         }

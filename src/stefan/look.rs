@@ -80,6 +80,30 @@ impl Front {
         sums
     }
 
+    /// The share of its way by which the front is in doubt, since rows are few; none before it has moved
+    ///
+    /// It is by how much the way would be another one if gradients at the front were taken over four rows in place of
+    /// three; in an undercooled melt at least the gap ε of the balance of energy times what the speed of growth answers
+    /// to a change of the heat, for a flat front about
+    ///
+    /// ```text
+    /// ε (1 − S/2) / (1 − S),      S = C (T_m − u) / Λ of the coldest melt
+    /// ```
+    pub fn doubt(&self, state: &FrontState) -> Option<f64> {
+        let rows = (state.way[0] > 0.0).then(|| state.way[1] / state.way[0])?;
+        let Some(melt) = self.undercooled else { return Some(rows) };
+        let s = self.undercooling(melt, state);
+        let answer = if s < 1.0 { (1.0 - 0.5 * s) / (1.0 - s) } else { f64::MAX };
+        Some(state.energy.imbalance().map_or(rows, |gap| rows.max(gap * answer)))
+    }
+
+    /// C (T_m − u) / Λ of the coldest place of a melt: at 1 what freezes there gives just the heat that warms the melt
+    /// up to melting.
+    pub fn undercooling(&self, melt: usize, state: &FrontState) -> f64 {
+        let coldest = state.u[melt].iter().copied().fold(self.material.melting, f64::min);
+        self.material.capacity[melt] * (self.material.melting - coldest) / self.material.latent_heat
+    }
+
     /// The longest step for which the explicit front is stable, as estimated from the temperatures at the front.
     pub fn limit(&self, state: &FrontState) -> f64 {
         match state.alone {

@@ -36,4 +36,4 @@ pub use exact::Similarity;
 pub use front::{Filter, Method};
 pub use material::Material;
 pub(crate) use solver::INITIAL;
-pub use solver::{Attempt, Front, FrontState, Problem, Sides, Stepping, Transfer};
+pub use solver::{Attempt, Front, FrontState, Problem, Side, Stepping, Transfer};

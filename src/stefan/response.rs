@@ -77,7 +77,7 @@ impl Response {
             }
         }
         // some heights are given
-        let given = |i: usize| front.held() && (i == 0 || i == n - 1) || bare[i].is_some();
+        let given = |i: usize| front.held_at(i) || bare[i].is_some();
         for (i, j) in (0..n).filter(|&i| given(i)).flat_map(|i| (0..n).map(move |j| (i, j))) {
             matrix[(i, j)] = if i == j { 1.0 } else { 0.0 };
         }

@@ -37,16 +37,14 @@ pub enum Stepping {
     Implicit,
 }
 
-/// Conditions on the left and the right side.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Sides {
+/// The condition on the left or the right side.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Side {
     /// No flux: mesh and temperatures are mirrored.
     #[default]
-    #[serde(alias = "no-flux")]
-    Neumann,
-    /// Temperatures and the height of the front are given: by the exact solution or by the problem.
-    Exact,
+    Insulated,
+    /// The problem gives temperatures and the height of the front.
+    Given,
     /// The problem gives what flows in.
     Flux,
 }
@@ -109,7 +107,7 @@ pub struct Front {
     /// How a step advances front and temperatures.
     pub stepping: Stepping,
     /// Conditions on the left and the right side.
-    pub sides: Sides,
+    pub sides: [Side; 2],
     /// The discrete Laplacian, of nine points.
     pub laplacian: Laplacian,
     /// Linear solvers of both phases.
@@ -152,11 +150,6 @@ impl FrontState {
     pub(super) fn fields(&self) -> Fields {
         Fields { h: self.front.clone(), u: self.u.clone(), alone: self.alone, bare: self.bare.clone() }
     }
-
-    /// The share of its way by which the front is in doubt, since rows near it are few; none before it has moved.
-    pub fn doubt(&self) -> Option<f64> {
-        (self.way[0] > 0.0).then(|| self.way[1] / self.way[0])
-    }
 }
 
 /// What a step comes to.
@@ -188,7 +181,7 @@ impl Front {
             transfer: Transfer::default(),
             filter: Filter::default(),
             stepping: Stepping::default(),
-            sides: Sides::default(),
+            sides: [Side::default(); 2],
             laplacian: Laplacian::default(),
             solvers: Default::default(),
             spent: Work::default(),
@@ -201,13 +194,20 @@ impl Front {
         if self.undercooled == Some(UPPER) { -self.material.latent_heat } else { self.material.latent_heat }
     }
 
-    pub(super) fn mirrored(&self) -> bool {
-        self.sides == Sides::Neumann
+    /// Whether the left and the right side are insulated.
+    pub(super) fn mirrored(&self) -> [bool; 2] {
+        self.sides.map(|side| side == Side::Insulated)
     }
 
-    /// Whether temperatures and the front are given on the sides.
-    pub(super) fn held(&self) -> bool {
-        self.sides == Sides::Exact
+    /// Whether temperatures and the front are given on the left and the right side.
+    pub(super) fn held(&self) -> [bool; 2] {
+        self.sides.map(|side| side == Side::Given)
+    }
+
+    /// Whether temperatures and the front are given at a column.
+    pub(super) fn held_at(&self, i: usize) -> bool {
+        let [left, right] = self.held();
+        left && i == 0 || right && i + 1 == self.columns.x().len()
     }
 
     /// The state at the start.
@@ -356,14 +356,11 @@ impl Front {
         Ok(h)
     }
 
-    /// Moves the ends of a front to where the exact one is at time `t`, if that is given on the sides.
+    /// Moves the ends of a front to where it is at time `t` on sides that give that.
     pub(super) fn hold_ends(&self, problem: &dyn Problem, h: &mut [f64], t: f64) {
-        if self.held() {
-            let last = h.len() - 1;
-            for i in [0, last] {
-                let walls = [LOWER, UPPER].map(|phase| self.columns.wall(phase)[i]);
-                h[i] = problem.side_front(self.columns.x()[i], walls, t).unwrap_or(h[i]);
-            }
+        for i in [0, h.len() - 1].into_iter().filter(|&i| self.held_at(i)) {
+            let walls = [LOWER, UPPER].map(|phase| self.columns.wall(phase)[i]);
+            h[i] = problem.side_front(self.columns.x()[i], walls, t).unwrap_or(h[i]);
         }
     }
 }

@@ -1,6 +1,8 @@
 use super::kind::{Kind, Running};
 use super::runner::{self, Begin};
-use super::{EquidistributionStudy, Header, MovingLine, MovingMesh, PoissonStudy, Source, StefanStudy, StudyKind};
+use super::{
+    EquidistributionStudy, Header, MovingLine, MovingMesh, PoissonStudy, Source, SpeciesStudy, StefanStudy, StudyKind,
+};
 use crate::error::{Act, Error, Failure, Result, Unfit};
 use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing};
 use crate::simulation::{Observer, Schedule};
@@ -19,8 +21,10 @@ pub enum Study {
     MovingLine(MovingLine),
     /// A study of kind `poisson`.
     Poisson(PoissonStudy),
-    /// A study of kind `stefan`.
+    /// A study of kind `stefan` with heat in two phases.
     Stefan(StefanStudy),
+    /// A study of kind `stefan` with species on a line.
+    Species(SpeciesStudy),
     /// A study of kind `equidistribution`.
     Equidistribution(EquidistributionStudy),
 }
@@ -33,6 +37,7 @@ macro_rules! each {
             Study::MovingLine($it) => $does,
             Study::Poisson($it) => $does,
             Study::Stefan($it) => $does,
+            Study::Species($it) => $does,
             Study::Equidistribution($it) => $does,
         }
     };
@@ -61,10 +66,18 @@ impl Study {
         struct PeekCells {
             cells: Vec<serde::de::IgnoredAny>,
         }
+        /// What only a front between species has.
+        #[derive(Deserialize)]
+        struct PeekSpecies {
+            #[serde(rename = "species")]
+            _species: toml::Value,
+        }
         let is_line = || source.parse::<PeekGrid>().is_ok_and(|peek| peek.grid.cells.len() == 1);
+        let has_species = || source.parse::<PeekSpecies>().is_ok();
         // whatever is wrong before the kind is known is told by the reader of the first kind
         match source.parse::<Peek>().map(|peek| peek.study.kind) {
             Ok(StudyKind::Poisson) => PoissonStudy::from_source(source).map(Self::Poisson),
+            Ok(StudyKind::Stefan) if has_species() => SpeciesStudy::from_source(source).map(Self::Species),
             Ok(StudyKind::Stefan) => StefanStudy::from_source(source).map(Self::Stefan),
             Ok(StudyKind::Equidistribution) => EquidistributionStudy::from_source(source).map(Self::Equidistribution),
             Ok(StudyKind::MovingMesh) if is_line() => MovingLine::from_source(source).map(Self::MovingLine),
@@ -83,10 +96,15 @@ impl Study {
             "then": generator.subschema_for::<MovingLine>(),
             "else": generator.subschema_for::<MovingMesh>(),
         });
+        let fronts = json!({
+            "if": { "required": ["species"] },
+            "then": generator.subschema_for::<SpeciesStudy>(),
+            "else": generator.subschema_for::<StefanStudy>(),
+        });
         let kinds = [
             (StudyKind::MovingMesh, moving),
             (StudyKind::Poisson, json!(generator.subschema_for::<PoissonStudy>())),
-            (StudyKind::Stefan, json!(generator.subschema_for::<StefanStudy>())),
+            (StudyKind::Stefan, fronts),
             (StudyKind::Equidistribution, json!(generator.subschema_for::<EquidistributionStudy>())),
         ];
         // the kind decides, so that an editor complains of what is wrong in it and not of four kinds

@@ -7,12 +7,11 @@ use super::front_run::{FrontCourse, FrontRun};
 use super::front_start;
 use super::kind::Kind;
 use super::mapped::{Ends, check_between, parse};
-use super::stefan::{ExactKind, FrontTime, StefanStudy};
+use super::stefan::{ExactKind, StefanStudy};
 use crate::error::{Error, Failure, Result};
 use crate::laplacian::Laplacian;
-use crate::setting::Auto;
 use crate::simulation::Schedule;
-use crate::stefan::{Columns, Front, FrontState, INITIAL, LOWER, Problem, Sides, UPPER};
+use crate::stefan::{Columns, Front, FrontState, INITIAL, LOWER, Problem, Side, UPPER};
 
 /// Bytes of memory that a run needs for each node: nodal arrays, the sparse matrix and its factors.
 const BYTES_PER_NODE: u128 = 6000;
@@ -113,7 +112,7 @@ impl Kind for StefanStudy {
             return Err(Error::invalid("laplacian.kind", "\"compact25\"", rule));
         }
         let given = self.given(front.material)?;
-        front.sides = given.sides(self.walls.is("exact"));
+        front.sides = given.sides(&self.walls);
         let schedule = self.schedule(&given).map_err(|error| error.within("time"))?;
         if let Given::Exact(solution, _) = &given
             && let Some([cx, cy]) = solution.source()
@@ -130,6 +129,7 @@ impl Kind for StefanStudy {
         self.check_formulas(&front, &given, [schedule.start(), schedule.end()])?;
         let state = front.start(&given, schedule.start()).map_err(|error| self.blame(error))?;
         self.check_temperatures(&front, &state)?;
+        self.check_undercooling(&front, &state)?;
         let frames = self.output.frames_of(&schedule)?;
         self.output.check()?;
         Ok(FrontRun::of(&self.study.name, front, given, (state, schedule), frames))
@@ -166,8 +166,7 @@ impl StefanStudy {
     }
 
     fn schedule(&self, given: &Given) -> Result<Schedule> {
-        let FrontTime { start, end, duration, step, report } = &self.time;
-        let from = match (given, start) {
+        let from = match (given, self.time.start) {
             (Given::Exact(_, _), Some(start)) => {
                 let rule = "the exact solution of [exact] starts at a time of its own; leave this out";
                 return Err(Error::invalid("start", start, rule));
@@ -175,20 +174,7 @@ impl StefanStudy {
             (Given::Exact(_, start), None) => *start,
             (Given::Formulas { .. }, start) => start.unwrap_or(0.0),
         };
-        let to = match (end, duration) {
-            (Some(end), None) => *end,
-            (None, Some(duration)) if *duration > 0.0 && duration.is_finite() => from + duration,
-            (None, Some(duration)) => return Err(Error::invalid("duration", duration, "must be above 0")),
-            (None, None) => return Err(Error::invalid("end", "not given", "give one of end and duration")),
-            (Some(_), Some(duration)) => {
-                return Err(Error::invalid("duration", duration, "goes not with end; leave one of them out"));
-            }
-        };
-        let report = if report.is_empty() { vec![to] } else { report.clone() };
-        match *step {
-            Auto::Value(step) => Schedule::new(from, to, step, report),
-            Auto::Auto => Schedule::automatic(from, to, report),
-        }
+        self.time.schedule(from)
     }
 
     /// Says which setting makes a start that no run can begin with.
@@ -218,18 +204,17 @@ impl StefanStudy {
     fn crosses_walls(&self, front: &Front, given: &Given, state: &FrontState) -> Option<String> {
         const STEP: f64 = 1e-6;
         const NOTICEABLE: f64 = 1e-3;
-        if front.sides != Sides::Neumann {
-            return None;
-        }
         let x = front.columns.x();
         let width = x[x.len() - 1] - x[0];
         let all = || state.u.iter().flatten();
         let range = all().fold(f64::MIN, |m, u| m.max(*u)) - all().fold(f64::MAX, |m, u| m.min(*u));
-        let sides = [(0, STEP), (x.len() - 1, -STEP)].into_iter().flat_map(|(i, step)| {
+        let ends = [(0, STEP), (x.len() - 1, -STEP)].into_iter().zip(front.sides);
+        let insulated = ends.filter(|(_, side)| *side == Side::Insulated).map(|(end, _)| end);
+        let places = insulated.flat_map(|(i, step)| {
             let walls = [LOWER, UPPER].map(|phase| front.columns.wall(phase)[i]);
             [walls[0], state.front[i], walls[1]].map(|y| ([x[i], y], step * width))
         });
-        let flow = sides.filter_map(|([x, y], step)| {
+        let flow = places.filter_map(|([x, y], step)| {
             let slope = (given.exact([x + step, y], state.t)? - given.exact([x, y], state.t)?) / step;
             Some((slope * width).abs())
         });

@@ -57,8 +57,8 @@ pub struct FrontFigures {
     pub mean: f64,
     /// Lowest and highest point of the front.
     pub range: [f64; 2],
-    /// The share of its way by which the front would be elsewhere if gradients at the front were taken over four rows
-    /// in place of three; none before it has moved.
+    /// The share of its way by which the front is in doubt: by gradients over four rows in place of three, in an
+    /// undercooled melt by the balance of energy, too; none before it has moved.
     pub doubt: Option<f64>,
     /// The share of the columns at which one phase reaches the wall of the other one.
     #[serde(default, skip_serializing_if = "none_of_it")]
@@ -95,7 +95,7 @@ impl FrontReport {
                     h.iter().copied().fold(f64::INFINITY, f64::min),
                     h.iter().copied().fold(f64::NEG_INFINITY, f64::max),
                 ],
-                doubt: state.doubt(),
+                doubt: front.doubt(state),
                 bare: state.bare.iter().flatten().count() as f64 / h.len() as f64,
                 error_linf: errors.map(|[front, _]| front),
             },

@@ -1,11 +1,11 @@
 //! Studies of kind `stefan`: the problem that formulas or an exact solution give.
 
 use super::mapped::{mistaken, parse};
-use super::stefan::{Centre, ExactFront, ExactKind, PhaseTable, StefanStudy};
+use super::stefan::{Centre, ExactFront, ExactKind, PhaseTable, StefanStudy, Walls};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use crate::physics::{Condition, Conditions};
-use crate::stefan::{Material, Problem, Sides, Similarity};
+use crate::physics::Condition;
+use crate::stefan::{Material, Problem, Side, Similarity};
 
 /// What holds on the wall of a phase.
 #[derive(Debug, Clone)]
@@ -44,8 +44,10 @@ pub(super) enum Given {
         front: Formula,
         initial: [Formula; 2],
         walls: [Wall; 2],
-        /// The left and the right side, where not both let nothing through, and an x between them.
-        sides: Option<([Wall; 2], f64)>,
+        /// The left and the right side, where they are not insulated.
+        sides: [Option<Wall>; 2],
+        /// An x between them.
+        middle: f64,
         melting: f64,
     },
     Exact(Similarity, f64),
@@ -117,8 +119,8 @@ impl Problem for Given {
     }
 
     fn side_flux(&self, side: usize, [x, y]: [f64; 2], u: f64, t: f64) -> Option<[f64; 2]> {
-        let Self::Formulas { sides: Some((sides, _)), .. } = self else { return None };
-        match &sides[side] {
+        let Self::Formulas { sides, .. } = self else { return None };
+        match sides[side].as_ref()? {
             Wall::Value(_) => None,
             Wall::Flux { value, by_u } => Some([value, by_u].map(|formula| formula.eval(&[u, x, y, t]))),
         }
@@ -138,18 +140,22 @@ impl Problem for Given {
 impl Given {
     /// The condition of the side at x.
     fn side_at(&self, x: f64) -> Option<&Wall> {
-        let Self::Formulas { sides: Some((sides, middle)), .. } = self else { return None };
-        Some(&sides[usize::from(x > *middle)])
+        let Self::Formulas { sides, middle, .. } = self else { return None };
+        sides[usize::from(x > *middle)].as_ref()
     }
 
-    /// What kind of condition the sides have.
-    pub(super) fn sides(&self, exact: bool) -> Sides {
-        match self {
-            Self::Exact(..) if exact => Sides::Exact,
-            Self::Formulas { sides: Some(([Wall::Value(_), _], _)), .. } => Sides::Exact,
-            Self::Formulas { sides: Some(_), .. } => Sides::Flux,
-            _ => Sides::Neumann,
-        }
+    /// What kind of condition the left and the right side have.
+    pub(super) fn sides(&self, walls: &Walls) -> [Side; 2] {
+        let kind = |side: usize| match self {
+            Self::Exact(..) if walls.is(side, "exact") => Side::Given,
+            Self::Exact(..) => Side::Insulated,
+            Self::Formulas { sides, .. } => match &sides[side] {
+                None => Side::Insulated,
+                Some(Wall::Value(_)) => Side::Given,
+                Some(Wall::Flux { .. }) => Side::Flux,
+            },
+        };
+        [kind(0), kind(1)]
     }
 }
 
@@ -211,12 +217,7 @@ impl StefanStudy {
     pub(super) fn given(&self, material: Material) -> Result<Given> {
         let phases = self.phases();
         if let Some(exact) = &self.exact {
-            if !["exact", "neumann"].iter().any(|word| self.walls.is(word))
-                && self.walls.sides != Conditions::All(Condition::NoFlux)
-            {
-                let rule = "with [exact] it is \"exact\" or \"neumann\"";
-                return Err(Error::invalid("walls.sides", "given", rule));
-            }
+            self.check_exact_sides()?;
             let written = |condition: &Option<Condition>| condition.as_ref().map(|_| "given".to_string());
             let quoted = |text: &Option<String>| text.as_ref().map(|text| format!("{text:?}"));
             let formulas = phases.iter().flat_map(|(name, phase)| {
@@ -230,10 +231,6 @@ impl StefanStudy {
             }
             let (solution, start) = exact.solution(material).map_err(|error| error.within("exact"))?;
             return Ok(Given::Exact(solution, start));
-        }
-        if self.walls.is("exact") {
-            let rule = "needs an exact solution; add [exact], or set it to \"neumann\"";
-            return Err(Error::invalid("walls.sides", "\"exact\"", rule));
         }
         let missing = |key: &str| Error::invalid(key, "not given", "add it, or an exact solution: [exact]");
         let read = |key: String, text: &Option<String>, variables: &[&str]| match text {
@@ -251,39 +248,36 @@ impl StefanStudy {
             front: read("domain.front".into(), &self.domain.front, &["x"])?,
             initial: [initial(lower)?, initial(upper)?],
             walls: [wall(lower)?, wall(upper)?],
-            sides: self.sides()?.map(|sides| (sides, 0.5 * (self.domain.x.0[0] + self.domain.x.0[1]))),
+            sides: self.sides()?,
+            middle: 0.5 * (self.domain.x.0[0] + self.domain.x.0[1]),
             melting: material.melting,
         })
     }
 
-    /// The left and the right side, unless both let nothing through.
-    fn sides(&self) -> Result<Option<[Wall; 2]>> {
-        if let Conditions::Each(each) = &self.walls.sides
-            && let Some(side) = each.keys().find(|side| !["left", "right"].contains(&side.as_str()))
-        {
-            let rule = "there is no such side; `bottom` and `top` are `boundary` of a phase";
-            return Err(Error::invalid(format!("walls.sides.{side}"), "given", rule));
-        }
-        let read = |side: usize| match self.walls.side(side) {
-            Some((key, Condition::Value(text))) if text == "neumann" => Wall::read(&key, &Condition::NoFlux),
-            Some((key, condition)) => Wall::read(&key, condition),
-            None => {
-                let rule = format!("not given for `{}`", ["left", "right"][side]);
-                Err(Error::invalid("walls.sides", rule, "needs `left` and `right`, or one condition for both"))
+    /// The left and the right side; none of one that is insulated.
+    fn sides(&self) -> Result<[Option<Wall>; 2]> {
+        let read = |(key, condition): (String, &Condition)| match condition {
+            Condition::NoFlux => Ok(None),
+            _ if condition.value() == Some("neumann") => Ok(None),
+            _ if condition.value() == Some("exact") => {
+                let rule = "needs an exact solution; add [exact], or set it to \"neumann\"";
+                Err(Error::invalid(key, "\"exact\"", rule))
             }
+            _ => Wall::read(&key, condition).map(Some),
         };
-        let sides = [read(0)?, read(1)?];
-        let insulated = |side: usize| match self.walls.side(side) {
-            Some((_, Condition::NoFlux)) => true,
-            Some((_, Condition::Value(text))) => text == "neumann",
-            _ => false,
-        };
-        match &sides {
-            _ if insulated(0) && insulated(1) => Ok(None),
-            [Wall::Value(_), Wall::Value(_)] | [Wall::Flux { .. }, Wall::Flux { .. }] => Ok(Some(sides)),
-            _ => {
-                let rule = "both sides need temperatures, or both fluxes, of which \"no-flux\" is one";
-                Err(Error::invalid("walls.sides", "a temperature and a flux", rule))
+        let [left, right] = self.walls.each()?;
+        Ok([read(left)?, read(right)?])
+    }
+
+    /// Refuses conditions that an exact solution does not have.
+    fn check_exact_sides(&self) -> Result<()> {
+        let insulated = |condition: &Condition| *condition == Condition::NoFlux;
+        let known = |condition: &Condition| matches!(condition.value(), Some("exact" | "neumann"));
+        match self.walls.each()?.into_iter().find(|(_, condition)| !insulated(condition) && !known(condition)) {
+            None => Ok(()),
+            Some((key, _)) => {
+                let rule = "with [exact] it is \"exact\" or \"neumann\"";
+                Err(Error::invalid(key, "given", rule))
             }
         }
     }

@@ -238,13 +238,18 @@ impl FrontRun {
         schedule.after(state.t, dt.min(longest))
     }
 
-    /// Warns of a front whose way depends on how many rows its gradients are taken from, and of a phase that was
-    /// waited for in vain.
+    /// Warns of a front whose way depends on how many rows there are.
     fn warn_at_end(&mut self) {
         const DOUBTFUL: f64 = 0.01;
-        let doubt = self.course.state.doubt().filter(|doubt| *doubt > DOUBTFUL);
+        let doubt = self.front.doubt(&self.course.state).filter(|doubt| *doubt > DOUBTFUL);
         let said = doubt.map(|doubt| {
-            let percent = 100.0 * doubt;
+            let (percent, [rows, way]) = (100.0 * doubt, [self.course.state.way[1], self.course.state.way[0]]);
+            if doubt > rows / way {
+                return format!(
+                    "the front may have gone too far or not far enough by {percent:.1} % of its way: growth into this \
+                     melt turns on the last per cent of the heat, and its balance misses more; raise grid.cells"
+                );
+            }
             format!(
                 "gradients at the front over four rows in place of three would change its way by {percent:.1} %: rows \
                  there are too few for the temperature; raise grid.cells or grid.grading"

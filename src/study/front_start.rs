@@ -3,7 +3,7 @@
 use super::front_given::{Given, Wall};
 use super::stefan::StefanStudy;
 use crate::error::{Error, Result};
-use crate::stefan::{Front, FrontState, LOWER, Problem, Sides, UPPER};
+use crate::stefan::{Front, FrontState, LOWER, Problem, Side, UPPER};
 
 /// Moments of a run at which formulas of its walls are looked at.
 const MOMENTS: usize = 512;
@@ -20,7 +20,7 @@ impl Given {
     /// Whether nothing depends on x, so far as the formulas between the walls go.
     pub(super) fn is_alike(&self) -> bool {
         match self {
-            Self::Formulas { sides: Some(_), .. } => false,
+            Self::Formulas { sides, .. } if sides.iter().any(Option::is_some) => false,
             Self::Formulas { front, initial, walls, .. } => {
                 let wall = |wall: &Wall| match wall {
                     Wall::Value(formula) => formula.depends_on(0),
@@ -107,7 +107,9 @@ impl StefanStudy {
     fn check_sides(&self, front: &Front, given: &Given, [start, end]: [f64; 2]) -> Result<()> {
         const HEIGHTS: usize = 16;
         let (x, melting) = (front.columns.x(), front.material.melting);
-        for (side, i) in [0, x.len() - 1].into_iter().enumerate().filter(|_| front.sides != Sides::Neumann) {
+        for (side, i) in
+            [0, x.len() - 1].into_iter().enumerate().filter(|(side, _)| front.sides[*side] != Side::Insulated)
+        {
             let walls @ [bottom, top] = [LOWER, UPPER].map(|phase| front.columns.wall(phase)[i]);
             let refused = |t: f64, said: String| {
                 let key = self.walls.side(side).map_or_else(|| "walls.sides".into(), |(key, _)| key);
@@ -122,13 +124,32 @@ impl StefanStudy {
                 if let Some(lost) = (0..=HEIGHTS).map(value).find(|value| !value.is_finite()) {
                     return refused(t, format!("is {lost}, and must be finite over the whole run,"));
                 }
-                if front.sides == Sides::Exact && given.side_front(x[i], walls, t).is_none() {
+                if front.sides[side] == Side::Given && given.side_front(x[i], walls, t).is_none() {
                     let rule = format!("never falls through the melting temperature {melting} from bottom to top");
                     return refused(t, rule);
                 }
             }
         }
         Ok(())
+    }
+
+    /// Refuses a melt so cold that what freezes cannot warm it up to melting: growth would have no finite speed.
+    pub(super) fn check_undercooling(&self, front: &Front, state: &FrontState) -> Result<()> {
+        let Some(melt) = front.undercooled.filter(|melt| state.alone.is_none_or(|alone| alone == *melt)) else {
+            return Ok(());
+        };
+        let s = front.undercooling(melt, state);
+        if s < 1.0 {
+            return Ok(());
+        }
+        let name = NAMES[melt];
+        let most = front.material.latent_heat / front.material.capacity[melt];
+        let rule = format!(
+            "is {s:.3} times latent heat over capacity, {most}, below melting: what freezes cannot warm this melt up \
+             to melting, and the front would run away; raise it, or the latent heat"
+        );
+        let text = [&self.phase.lower, &self.phase.upper][melt].initial.clone().unwrap_or_default();
+        Err(Error::invalid(format!("phase.{name}.initial"), format!("{text:?}"), rule))
     }
 
     /// Refuses phases that are farther on the wrong side of the melting temperature than on their own.

@@ -30,6 +30,10 @@ mod rest;
 mod runner;
 mod shape;
 mod source;
+mod species;
+mod species_checks;
+mod species_figures;
+mod species_run;
 mod stefan;
 mod together;
 mod uniform;
@@ -60,6 +64,9 @@ pub use poisson_run::{PoissonError, PoissonFigures, PoissonParts, PoissonRun, So
 pub use remedy::failures;
 pub use runner::{Begin, Finished, Stage};
 pub use source::Source;
+pub use species::{LawTable, Laws, SpeciesDomain, SpeciesGrid, SpeciesStudy, SpeciesTable};
+pub use species_figures::{Balance, FrontsReport, SpeciesReport, SpeciesSummary};
+pub use species_run::{SpeciesCourse, SpeciesRun};
 pub use stefan::{
     Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy,
     Walls,

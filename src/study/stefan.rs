@@ -4,8 +4,10 @@ use super::LaplacianTable;
 use super::common::{Header, Output};
 use super::data::DataTables;
 use super::mapped::Ends;
+use crate::error::{Error, Result};
 use crate::physics::{Condition, Conditions};
 use crate::setting::{Auto, fixed, pair};
+use crate::simulation::Schedule;
 use crate::stefan::{Filter, Method, Stepping, Transfer};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -113,7 +115,7 @@ pub struct PhaseTable {
     pub boundary: Option<Condition>,
 }
 
-fn wall_schema(_: &mut SchemaGenerator) -> Schema {
+pub(super) fn wall_schema(_: &mut SchemaGenerator) -> Schema {
     let flux = json_schema!({
         "type": "object", "properties": { "flux": { "type": ["string", "number"] } }, "required": ["flux"],
         "additionalProperties": false, "description": "What flows in: a formula of u, x, y and t."
@@ -196,9 +198,10 @@ fn read_filter<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Filter, D::
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Walls {
-    /// What holds on the left and the right side, for both or by `left` and `right`: no flux ("neumann" or "no-flux");
-    /// temperatures, a formula of x, y and t, with the front where they pass the melting temperature; `{ flux = "…" }`,
-    /// what flows in, a formula of u, x, y and t; or the exact solution ("exact", only with `[exact]`).
+    /// What holds on the left and the right side, for both or by `left` and `right`, each of its own kind: no flux
+    /// ("neumann" or "no-flux"); temperatures, a formula of x, y and t, with the front where they pass the melting
+    /// temperature; `{ flux = "…" }`, what flows in, a formula of u, x, y and t; or the exact solution ("exact", only
+    /// with `[exact]`).
     pub sides: Conditions,
 }
 
@@ -208,21 +211,41 @@ impl Default for Walls {
     }
 }
 
+/// Names of the sides.
+const NAMES: [&str; 2] = ["left", "right"];
+
 impl Walls {
     /// The condition of a side with its key, written as one of those of a formula.
     pub(super) fn side(&self, side: usize) -> Option<(String, &Condition)> {
         match &self.sides {
             Conditions::All(condition) => Some(("walls.sides".into(), condition)),
             Conditions::Each(each) => {
-                let name = ["left", "right"][side];
+                let name = NAMES[side];
                 Some((format!("walls.sides.{name}"), each.get(name)?))
             }
         }
     }
 
-    /// Whether this word holds for both sides.
-    pub(super) fn is(&self, word: &str) -> bool {
-        matches!(&self.sides, Conditions::All(Condition::Value(text)) if text == word)
+    /// The conditions of the left and the right side with their keys.
+    pub(super) fn each(&self) -> Result<[(String, &Condition); 2]> {
+        if let Conditions::Each(each) = &self.sides
+            && let Some(side) = each.keys().find(|side| !NAMES.contains(&side.as_str()))
+        {
+            let rule = "there is no such side; `bottom` and `top` are `boundary` of a phase";
+            return Err(Error::invalid(format!("walls.sides.{side}"), "given", rule));
+        }
+        let of = |side: usize| {
+            self.side(side).ok_or_else(|| {
+                let rule = format!("not given for `{}`", NAMES[side]);
+                Error::invalid("walls.sides", rule, "needs `left` and `right`, or one condition for both")
+            })
+        };
+        Ok([of(0)?, of(1)?])
+    }
+
+    /// Whether a side has this word.
+    pub(super) fn is(&self, side: usize, word: &str) -> bool {
+        self.side(side).is_some_and(|(_, condition)| condition.value() == Some(word))
     }
 }
 
@@ -311,4 +334,25 @@ pub struct FrontTime {
     /// Times at which `summary.json` reports; the end where none are given.
     #[serde(default)]
     pub report: Vec<f64>,
+}
+
+impl FrontTime {
+    /// The times of all steps of a run that starts at `from`.
+    pub(super) fn schedule(&self, from: f64) -> Result<Schedule> {
+        let Self { end, duration, step, report, .. } = self;
+        let to = match (end, duration) {
+            (Some(end), None) => *end,
+            (None, Some(duration)) if *duration > 0.0 && duration.is_finite() => from + duration,
+            (None, Some(duration)) => return Err(Error::invalid("duration", duration, "must be above 0")),
+            (None, None) => return Err(Error::invalid("end", "not given", "give one of end and duration")),
+            (Some(_), Some(duration)) => {
+                return Err(Error::invalid("duration", duration, "goes not with end; leave one of them out"));
+            }
+        };
+        let report = if report.is_empty() { vec![to] } else { report.clone() };
+        match *step {
+            Auto::Value(step) => Schedule::new(from, to, step, report),
+            Auto::Auto => Schedule::automatic(from, to, report),
+        }
+    }
 }
