@@ -156,7 +156,7 @@ fn a_front_on_too_few_rows_is_in_doubt() {
         let summary = study.run(&out.path().join("run"), Begin::Anew, &mut []).unwrap().summary;
         let doubt = summary.figures.reports[0].front.doubt.unwrap();
         println!("{rows}: {doubt:e} {:?}", summary.warnings);
-        let warned = summary.warnings.iter().any(|said| said.contains("rows there are too few"));
+        let warned = summary.warnings.iter().any(|said| said.contains("raise grid.cells"));
         assert!(warned == doubtful && (doubt > 0.01) == doubtful, "{rows}: {doubt:e}");
     }
 }

@@ -83,7 +83,7 @@ fn a_core_shrinks_as_the_quasi_steady_solution_does() {
 /// The study of the directory, by automatic steps: within 2e-4 of t = τ (1 − 3r² + 2r³).
 #[test]
 fn the_shrinking_core_of_the_studies_is_right_by_default() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/shrinking-core.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join("shrinking-core.toml");
     let Study::Species(study) = Study::from_source(&Source::read(&file).unwrap()).unwrap() else {
         panic!("of another kind")
     };

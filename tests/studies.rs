@@ -397,7 +397,8 @@ fn every_study_is_tested() {
         include_str!("data_sheets.rs"),
         include_str!("curved.rs"),
         include_str!("equidistribution.rs"),
-        include_str!("published_lines.rs")
+        include_str!("published_lines.rs"),
+        include_str!("species.rs")
     );
     for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies")).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();

@@ -91,15 +91,6 @@ class Viewer {
         this.draw();
     }
 
-    /** Takes data of the same meshes with other frames; who saw the last one sees the new last one. */
-    extend(data, arrays) {
-        const follows = !this.playing && this.at >= this.last;
-        Object.assign(this, { data, arrays, ranges: {} });
-        this.stages.forEach((stage, m) => (stage.mesh = data.meshes[m]));
-        if (this.controls.time) this.controls.time.max = this.last;
-        this.show(follows ? this.last : this.at);
-    }
-
     play(on) {
         const { play } = this.controls;
         if (!play || on === this.playing) return;

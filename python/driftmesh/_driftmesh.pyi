@@ -27,9 +27,6 @@ __all__ = [
     "schwarz",
     "transfer",
     "uniform",
-    "viewer_data",
-    "viewer_data_of",
-    "viewer_files",
 ]
 
 VERSION: str
@@ -113,10 +110,3 @@ def schwarz(
 ]: ...
 def program(words: list[str]) -> int: ...
 def write_examples(directory: Path) -> list[Path]: ...
-def viewer_data(directory: Path) -> str | None: ...
-def viewer_data_of(
-    frames: list[tuple[float, _Floats, _Floats, list[tuple[str, _Floats]]]],
-    corners: list[list[float]] | None,
-    periodic: tuple[bool, bool],
-) -> str | None: ...
-def viewer_files(line: bool, clock: str) -> tuple[str, str]: ...

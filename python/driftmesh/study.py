@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.axes import Axes
 
-    from .widget import View
-
 
 @dataclass(frozen=True, eq=False)
 class Fronts:
@@ -199,7 +197,6 @@ def run(
     progress: bool = False,
     resume: bool = False,
     threads: int | None = None,
-    view: View | None = None,
 ) -> Run:
     """Runs a study.
 
@@ -213,7 +210,6 @@ def run(
             without interruption. Without a checkpoint the run begins at its start. A complete one is opened, or goes on
             to a later end where ``time.end`` is later now.
         threads: Number of threads; all cores where nothing is said. The results have the same bits for any number.
-        view: A :class:`driftmesh.widget.View`, which shows the frames of the run in a notebook as they are written.
 
     Raises:
         driftmesh.StudyError: A mistake in the study. The message shows its line with a caret and, for a key that does
@@ -248,35 +244,15 @@ def run(
     if not resume:
         _warn_of_unfinished(directory)
     # an exception leaves the bar where it is
-    with _bar(name, progress) as bar:
-        told = _told(bar, view, directory)
+    with _bar(name, progress) as told:
         try:
             error, ended = _driftmesh.run(*given, assignments, directory, resume, number, told)
         except MeshError as failure:
             error, ended = failure, True
-        finally:
-            if view is not None and (directory / "summary.json").is_file():
-                view.watch(directory)
-                view.flush()
         _raise(error, ended, directory)
     result = load(directory)
     _warn(result)
     return result
-
-
-def _told(bar: _Told | None, view: View | None, directory: Path) -> _Told | None:
-    """What is told of each step: the progress bar, and the view once it can read the directory of this run."""
-    if view is None:
-        return bar
-    view.watch(directory)
-
-    def told(share: float, t: float, step: int) -> None:
-        if bar is not None:
-            bar(share, t, step)
-        if (directory / "run.pvd").is_file():
-            view.update()
-
-    return told
 
 
 def _warn_of_unfinished(directory: Path) -> None:

@@ -13,7 +13,6 @@ mod program;
 mod stencils;
 mod study;
 mod threads;
-mod viewer;
 
 use pyo3::prelude::*;
 
@@ -33,8 +32,6 @@ mod _driftmesh {
     use super::stencils::{edges, poisson, quarters};
     #[pymodule_export]
     use super::study::{check, run};
-    #[pymodule_export]
-    use super::viewer::{viewer_data, viewer_data_of, viewer_files};
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

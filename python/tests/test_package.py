@@ -31,7 +31,6 @@ MODULES = [
     "quality",
     "remap",
     "study",
-    "widget",
 ]
 
 

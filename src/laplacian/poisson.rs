@@ -242,7 +242,9 @@ pub fn outward(mesh: &Mesh<2>, index: usize, (axis, upper): (usize, bool)) -> [f
         true => (at((i + n - 1) % n), at((i + 1) % n)),
         false => (at(i.max(1) - 1), at((i + 1).min(n - 1))),
     };
-    let t = [after[0] - before[0], after[1] - before[1]];
+    // at the seam of a periodic axis one of them is the image of a node at the other end
+    let turns = f64::from(u8::from(lattice.periodic()[along] && (i == 0 || i + 1 == n)));
+    let t: [f64; 2] = std::array::from_fn(|c| after[c] - before[c] + turns * mesh.jump()[along][c]);
     // rotating the tangent by a right angle points outward on the upper side of axis 0 and on the lower one of axis 1,
     // unless the mesh is mirrored
     let sign = if (axis == 0) == upper { 1.0 } else { -1.0 };
@@ -273,16 +275,31 @@ fn derivative(
         true => [nodes[d] - 1, 0, 1].map(|k| (node[d] + k) % nodes[d]),
         false => [0, 1, 2].map(|k| (node[d].max(1) - 1).min(nodes[d] - 3) + k),
     });
-    let mut points = [index; 9];
-    let all = (0..9).map(|p| lattice.index([around[0][p / 3], around[1][p % 3]])).filter(|&p| p != index);
-    points[1..].iter_mut().zip(all).for_each(|(point, p)| *point = p);
-    let away = points.map(|p| [x[p][0] - x[index][0], x[p][1] - x[index][1]]);
+    // from the node to one of these, which at the seam of a periodic axis is an image
+    let jump = mesh.jump();
+    let turns = |d: usize, k: usize| match wraps[d] {
+        true if node[d] + k == 0 => -1.0,
+        true if node[d] + k > nodes[d] => 1.0,
+        _ => 0.0,
+    };
+    let away_to = |k: [usize; 2]| -> [f64; 2] {
+        let p = lattice.index([around[0][k[0]], around[1][k[1]]]);
+        std::array::from_fn(|c| {
+            let turned = turns(0, k[0]) * jump[0][c] + turns(1, k[1]) * jump[1][c];
+            x[p][c] - x[index][c] + turned
+        })
+    };
+    let (mut points, mut away) = ([index; 9], [[0.0; 2]; 9]);
+    let all = (0..9).map(|p| [p / 3, p % 3]).map(|k| (lattice.index([around[0][k[0]], around[1][k[1]]]), away_to(k)));
+    let all = all.filter(|(p, _)| *p != index);
+    points[1..].iter_mut().zip(&mut away[1..]).zip(all).for_each(|((point, way), to)| (*point, *way) = to);
     let h = away.iter().flatten().fold(0.0_f64, |h, d| h.max(d.abs()));
     let cell: [[f64; 2]; 2] = std::array::from_fn(|d| {
         let [from, to] = [0, 2].map(|k| {
             let mut end = node;
             end[d] = around[d][k];
-            x[lattice.index(end)]
+            let x = x[lattice.index(end)];
+            [0, 1].map(|c| x[c] + turns(d, k) * jump[d][c])
         });
         [0, 1].map(|c| 0.5 * (to[c] - from[c]))
     });

@@ -6,7 +6,6 @@ use std::path::Path;
 /// A frame of a run: a mesh, and the fields on it.
 #[derive(Debug, Clone)]
 pub struct Frame {
-    /// Time, or the number of an iteration.
     pub t: f64,
     /// Number of cells along both axes; 0 along the second axis of a line.
     pub cells: [usize; 2],

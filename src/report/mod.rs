@@ -13,10 +13,7 @@ use crate::error::Result;
 use crate::output::{Canvas, Picture, write_file};
 use crate::parallel::join;
 use files::RunFiles;
-pub use frame::Frame;
-pub use page::MODULE as WIDGET_MODULE;
 use std::path::{Path, PathBuf};
-pub use viewer::data_of as viewer_data_of;
 
 /// A report that was written.
 #[derive(Debug, Clone)]
@@ -44,25 +41,6 @@ pub fn build(directory: &Path) -> Result<Built> {
         animation::still(&mut run)?;
     }
     of(run, directory)
-}
-
-/// What the viewer of the report shows of a run, as JSON; nothing where it has no frames yet.
-///
-/// The run may be finished, interrupted or still going on.
-///
-/// # Errors
-/// [`Error::NotARun`](crate::Error::NotARun) for any other directory.
-pub fn viewer_data(directory: &Path) -> Result<Option<String>> {
-    Ok(viewer::Viewer::of(&mut RunFiles::read(directory)?).map(|viewer| viewer.data))
-}
-
-/// A page with nothing but the viewer of the report, of a mesh or a line, for a frame of a notebook
-///
-/// Its messages to its parent are `driftmeshReady` and `driftmeshHeight`; it shows what it is told as `driftmesh`, the
-/// text of [`viewer_data`] or [`viewer_data_of`]. `clock` is what numbers the frames: "t", "iteration" or "" for none.
-/// [`WIDGET_MODULE`] is the module of a widget that has this page.
-pub fn viewer_page(line: bool, clock: &'static str) -> String {
-    page::widget(line, clock)
 }
 
 fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {

@@ -8,12 +8,6 @@ use serde_json::Value;
 
 /// Files of `assets/report` that make up the page.
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
-/// The viewer on a page.
-const VIEWER: &str = include_str!("../../assets/report/viewer.html");
-/// A page with nothing but the viewer.
-const WIDGET: &str = include_str!("../../assets/report/widget.html");
-/// The module that shows such a page in a notebook.
-pub const MODULE: &str = include_str!("../../assets/report/widget.js");
 const STYLE: &str =
     concat!(include_str!("../../assets/report/style.css"), include_str!("../../assets/report/viewer.css"));
 const SCRIPT: &str = concat!(
@@ -25,8 +19,6 @@ const SCRIPT: &str = concat!(
     include_str!("../../assets/report/line.js"),
     include_str!("../../assets/report/start.js"),
 );
-/// What follows the script in a frame of a notebook.
-const FRAMED: &str = include_str!("../../assets/report/framed.js");
 /// Pictures above this are left to the directory.
 const LARGE: u64 = 1 << 20;
 
@@ -131,25 +123,10 @@ pub fn render(run: &RunFiles, plots: Vec<Plot>, viewer: Option<&Viewer>) -> Stri
         style: STYLE,
         script: SCRIPT,
     };
-    filled("page.html", TEMPLATE, &page)
-}
-
-/// The page of a notebook, whose viewer waits for data with these properties.
-pub fn widget(line: bool, clock: &'static str) -> String {
-    #[derive(Serialize)]
-    struct Alone {
-        viewer: ViewerOnPage<'static>,
-        style: &'static str,
-        script: String,
-    }
-    let viewer = ViewerOnPage { data: "", line, moves: !clock.is_empty(), clock, thinned: None };
-    filled("widget.html", WIDGET, &Alone { viewer, style: STYLE, script: [SCRIPT, FRAMED].concat() })
-}
-
-fn filled(name: &str, template: &str, page: &impl Serialize) -> String {
-    let mut environment = Environment::new();
-    environment.add_template("viewer.html", VIEWER).expect("the viewer is a template");
-    environment.render_named_str(name, template, minijinja::value::Serde(page)).expect("the template fits the page")
+    let environment = Environment::new();
+    environment
+        .render_named_str("page.html", TEMPLATE, minijinja::value::Serde(&page))
+        .expect("the template fits the page")
 }
 
 /// Pictures that the run drew itself; the mesh only where no viewer shows it.

@@ -36,9 +36,15 @@ impl Viewer {
     pub fn of(run: &mut RunFiles) -> Option<Self> {
         let counts = [0, 1].map(|series| run.series[series].frames.len());
         let first = (0..counts[0]).find_map(|place| run.frames(0, &[place]).pop())?;
-        let meshes = if counts[1] > 0 { 2 } else { 1 };
-        let (stride, size) = stride(&first, meshes * counts[0].min(2), meshes);
-        let share = BUDGET as f64 / (size * counts[0].max(counts[1]) as f64);
+        // bytes of a frame without compression
+        let arrays = (2 + first.fields.len() + first.cell_fields.len()) * if counts[1] > 0 { 2 } else { 1 };
+        let size = |stride: usize| {
+            let nodes: usize = first.cells.iter().map(|n| n.div_ceil(stride) + 1).product();
+            (3 * nodes * arrays) as f64 * TEXT
+        };
+        let least = counts[0].min(2) as f64;
+        let stride = (1..).find(|&stride| size(stride) * least <= BUDGET as f64).unwrap_or(1);
+        let share = BUDGET as f64 / (size(stride) * counts[0].max(counts[1]) as f64);
         let mut packed = Packed::of(run, counts, share, stride)?;
         // the compression reached so far tells about how many more frames fit
         let mut guess = ROOM * share * BUDGET as f64 / packed.bytes() as f64;
@@ -71,65 +77,6 @@ impl Viewer {
         run.notes.extend(thinned.clone());
         let data = packed.json(run).to_string().replace('<', "\\u003c");
         Some(Self { data, line: first.cells[1] == 0, moves: shown > 1, clock: clock(run), thinned })
-    }
-}
-
-/// How many mesh lines apart those are that fit `least` times into the budget, and the bytes of so many meshes then,
-/// without compression.
-fn stride(first: &Frame, least: usize, meshes: usize) -> (usize, f64) {
-    let arrays = 2 + first.fields.len() + first.cell_fields.len();
-    let size = |stride: usize| {
-        let nodes: usize = first.cells.iter().map(|n| n.div_ceil(stride) + 1).product();
-        (3 * nodes * arrays) as f64 * TEXT
-    };
-    let stride = (1..).find(|&stride| size(stride) * least as f64 <= BUDGET as f64).unwrap_or(1);
-    (stride, size(stride) * meshes as f64)
-}
-
-/// The data of the viewer for frames of one lattice with the same fields, over a box that wraps around or over the
-/// smallest box around them; nothing where there is no frame. Where they would be larger than the budget, frames are
-/// left out evenly, and then mesh lines.
-pub fn data_of(frames: &[Frame], corners: Option<[[f64; 2]; 2]>, periodic: [bool; 2]) -> Option<String> {
-    let first = frames.first()?;
-    let (stride, size) = stride(first, frames.len().min(2), 1);
-    let kept: Vec<Frame> = spread(frames.len(), BUDGET as f64 / (size * frames.len() as f64))
-        .into_iter()
-        .map(|k| frames[k].clone())
-        .collect();
-    let mut ends = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-    for x in kept.iter().flat_map(|frame| &frame.x) {
-        ends = [[0, 1].map(|d| ends[0][d].min(x[d])), [0, 1].map(|d| ends[1][d].max(x[d]))];
-    }
-    let packed = PackedSeries::of(&kept, stride);
-    let mut mesh = packed.json;
-    (mesh["name"], mesh["cuts"], mesh["data"]) = ("".into(), json!([[], []]), packed.data.into());
-    let about = About { periodic, between: "subdomains", clock: "t" };
-    Some(about.page(first.cells, stride, corners.unwrap_or(ends), vec![mesh]).to_string())
-}
-
-/// What is said of all frames.
-struct About {
-    periodic: [bool; 2],
-    /// What the cuts are.
-    between: &'static str,
-    clock: &'static str,
-}
-
-impl About {
-    fn page(&self, cells: [usize; 2], stride: usize, [lower, upper]: [[f64; 2]; 2], meshes: Vec<Value>) -> Value {
-        let maps = [("viridis", colorous::VIRIDIS), ("cividis", colorous::CIVIDIS)].map(|(name, map)| {
-            let colours = (0..256).map(|k| format!("{:x}", map.eval_rational(k, 256))).collect::<String>();
-            json!({ "name": name, "colours": colours })
-        });
-        json!({
-            "cells": cells, "stride": stride,
-            "lower": lower, "extent": [upper[0] - lower[0], upper[1] - lower[1]],
-            "periodic": self.periodic,
-            "between": self.between,
-            "line": cells[1] == 0,
-            "clock": self.clock,
-            "maps": maps, "meshes": meshes,
-        })
     }
 }
 
@@ -203,9 +150,19 @@ impl Packed {
             json["data"] = mesh.data.as_str().into();
             json
         });
-        let between = if run.front().is_some() { "front" } else { "subdomains" };
-        let about = About { periodic: [run.wraps(0), run.wraps(1)], between, clock: clock(run) };
-        about.page(self.first.cells, self.stride, [lower, upper], meshes.collect())
+        let maps = [("viridis", colorous::VIRIDIS), ("cividis", colorous::CIVIDIS)].map(|(name, map)| {
+            let colours = (0..256).map(|k| format!("{:x}", map.eval_rational(k, 256))).collect::<String>();
+            json!({ "name": name, "colours": colours })
+        });
+        json!({
+            "cells": self.first.cells, "stride": self.stride,
+            "lower": lower, "extent": [upper[0] - lower[0], upper[1] - lower[1]],
+            "periodic": [run.wraps(0), run.wraps(1)],
+            "between": if run.front().is_some() { "front" } else { "subdomains" },
+            "line": line,
+            "clock": clock(run),
+            "maps": maps, "meshes": meshes.collect::<Vec<_>>(),
+        })
     }
 }
 
