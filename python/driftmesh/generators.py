@@ -276,7 +276,7 @@ class MeshGenerator:
         core = self._core()
         if isinstance(core, Kind):
             if u is None:
-                raise ValueError(f"`u` is None, but the monitor {self.monitor} looks at it")
+                raise ValueError(f"`u` is None, but the monitor {self.monitor!r} looks at it")
             name = "u" if start is None else "u0"
             values = finite(name, u, mesh.shape)
         elif callable(core):

@@ -126,8 +126,9 @@ class Poisson:
             factors = splu(matrix)
         except RuntimeError:
             raise LinearStalled(_SINGULAR) from None
+        transposed: Any = factors.solve
         inverse = LinearOperator(
-            matrix.shape, factors.solve, rmatvec=lambda v: factors.solve(v, "T"), dtype=np.float64
+            matrix.shape, factors.solve, rmatvec=lambda v: transposed(v, "T"), dtype=np.float64
         )
         if norm(matrix, 1) * onenormest(inverse) > ILL_CONDITIONED:
             raise LinearStalled(_SINGULAR)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Fronts:
-    """The front between two phases at every step of a run.
+    """The front between two phases at every step of a run; see :attr:`Run.fronts` for an example.
 
     Attributes:
         t: Times of the steps, shape (steps + 1,).
@@ -103,6 +103,8 @@ class Run:
     @cached_property
     def fronts(self) -> Fronts:
         """The front of a study of kind ``stefan`` as a curve over x at every step, from ``front.csv``.
+
+        ``plt.plot(run.fronts.x, run.fronts.y[-1])`` draws where it ends.
 
         Raises:
             ValueError: The run has none. Of species on a line the places are columns of ``history``.
