@@ -63,7 +63,8 @@ end = END
 fn a_core_shrinks_as_the_quasi_steady_solution_does() {
     let diffusion = |r: f64| 4.0 * (r * r / 2.0 - r.powi(3) / 3.0);
     let reaction = |r: f64| 4.0 * (r + 1.5 * r * r - r.powi(3)) / 3.0;
-    let cases: [(&str, &str, fn(f64) -> f64); 2] = [
+    type Case = (&'static str, &'static str, fn(f64) -> f64);
+    let cases: [Case; 2] = [
         ("0.0", "gas_shell_flux/solid_core", diffusion),
         ("{ flux = \"-3*gas\" }", "-3*gas_shell/solid_core", reaction),
     ];

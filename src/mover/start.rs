@@ -98,8 +98,7 @@ where
 }
 
 /// Time steps in τ with which a mesh does not turn back from step to step on what `values` are on a mesh: the given τ
-/// is made longer until it does not, and then [`SURE`] times as long. Nothing where no τ of less than [`LONGEST`] steps
-/// will do.
+/// is made longer until it does not, and then half as long again. Nothing where no τ of less than 1000 steps will do.
 ///
 /// The equation has the given τ, in time steps of length `dt`.
 pub fn steps_to_rest<const D: usize>(
