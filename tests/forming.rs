@@ -1,6 +1,6 @@
 //! Layers that form or get thinner where they are, out of data that equal cells resolve: the mesh follows them.
 
-use crate::runs::line;
+use crate::runs::{distance, line};
 use driftmesh::study::MovingRun;
 
 fn l_inf(run: &MovingRun<1>) -> f64 {
@@ -43,5 +43,38 @@ fn a_layer_that_gets_thinner_is_followed() {
     for step in [0.1, 0.02, 0.002] {
         let error = error(48, &format!("step = {step}"));
         assert!(error < 1.5e-3, "steps of {step}: {error:e}");
+    }
+}
+
+/// Small data that a reaction makes grow, u_t = 5(u − u³) + 1e-5 u_xx, become layers where they change sign: at places
+/// that symmetry keeps, and tanh(500(x − x₀)) in the end. The mesh reaches them on any number of cells, though equal
+/// cells resolve the data at first, and a layer is there before one of them sees it.
+#[test]
+fn layers_that_a_reaction_makes_of_small_data_are_reached() {
+    let middles = |n: usize| (0..n).map(|k| (k as f64 + 0.5) / n as f64).collect::<Vec<f64>>();
+    let all = [("0.1*tanh(4*(x - 0.37))", 1.0, vec![0.37]), ("0.02*cos(3*pi*x)", -1.0, middles(3))];
+    for (initial, sign, places) in all {
+        let exact = |x: f64| places.iter().map(|at| (500.0 * (x - at)).tanh()).product::<f64>() * sign;
+        for (cells, allowed) in [(40, 2e-3), (60, 1e-3), (81, 5e-4), (120, 2e-4), (161, 2e-4), (240, 2e-4)] {
+            let run = line(&format!(
+                r#"
+                [grid]
+                cells = [{cells}]
+                [time]
+                start = 0.0
+                end = 3.0
+                [pde]
+                kind = "formula"
+                unknowns = ["u"]
+                diffusivity = {{ u = "1e-5" }}
+                source = {{ u = "5*(u - u^3)" }}
+                initial = {{ u = "{initial}" }}
+                boundary = {{ u = "no-flux" }}
+                "#
+            ));
+            let error = distance(&run, 0, exact);
+            println!("{initial}, {cells} cells: {error:.1e}");
+            assert!(error < allowed, "{initial}, {cells} cells: {error:e}");
+        }
     }
 }

@@ -1,27 +1,11 @@
 //! Limited fluxes: no new extrema, whatever the mesh does; and bounds.
 
-use crate::runs::{HEAD, line, plane};
+use crate::runs::{HEAD, distance, line, plane};
 use driftmesh::study::{Kind, MovingLine, MovingRun, Source};
 
 /// The least and the largest value of an unknown.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], u| [l.min(u), h.max(u)])
-}
-
-/// ∫|u − exact| over the line, u linear between its nodes.
-fn distance(run: &MovingRun<1>, unknown: usize, exact: impl Fn(f64) -> f64) -> f64 {
-    let state = run.state.as_ref().unwrap();
-    let x: Vec<f64> = state.mesh.x().iter().map(|[x]| *x).collect();
-    let u: Vec<f64> = state.u.component(unknown).collect();
-    let mut sum = 0.0;
-    for (x, u) in x.windows(2).zip(u.windows(2)) {
-        for k in 0..20 {
-            let share = (k as f64 + 0.5) / 20.0;
-            let at = x[0] + share * (x[1] - x[0]);
-            sum += (u[0] + share * (u[1] - u[0]) - exact(at)).abs() * (x[1] - x[0]) / 20.0;
-        }
-    }
-    sum
 }
 
 /// A front passes an unknown that only sits there: its range stays, and it is as near to its data as where the mesh

@@ -337,6 +337,13 @@ def _values(u: Any, start: Mesh, on: Mesh) -> Any:
 
 def _relaxation(relaxation: Relaxation, prediction: float | None) -> Relaxation:
     """τ and γ as a study writes them."""
+    if isinstance(relaxation, Mapping):
+        unknown = [key for key in relaxation if key not in ("steps", "prediction")]
+        if unknown or "steps" not in relaxation:
+            raise ValueError(
+                f'`relaxation` is {dict(relaxation)}, but must be "auto", a time, {{"steps": …}} or '
+                '{"steps": …, "prediction": …}'
+            )
     if prediction is None:
         return relaxation
     if not isinstance(relaxation, Mapping):

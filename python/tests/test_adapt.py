@@ -143,6 +143,8 @@ def folded():
         (lambda g, m: MeshGenerator(Given()).density(m, m.x), r"density is 0.0 at index \(0, 0\)"),
         (lambda g, m: MeshGenerator(prediction=0.2), "`prediction` is 0.2, but needs relaxation"),
         (lambda g, m: MeshGenerator(relaxation={"steps": 30}, prediction=0.9), "relaxation.prediction"),
+        (lambda g, m: MeshGenerator(relaxation={"step": 20}), "`relaxation` is {'step': 20}, but must be"),
+        (lambda g, m: MeshGenerator(relaxation={}), "`relaxation` is {}, but must be"),
         (lambda g, m: MeshGenerator(relaxation={"steps": 3, "prediction": 0.1}, prediction=0.2), "has one, too"),
         (lambda g, m: MeshGenerator(safety={"halvings": 3}), "`safety` has the key 'halvings'"),
         (lambda g, m: MeshGenerator(safety={"substeps": 0}), "safety.substeps"),

@@ -28,6 +28,9 @@ pub(crate) struct Need {
 }
 
 impl Need {
+    /// On equal cells, whatever the mesh is.
+    pub const OF_EQUAL_CELLS: Self = Self { kept: 1.0 };
+
     /// On a mesh.
     pub fn on<const D: usize>(mesh: &Mesh<D>) -> Self
     where

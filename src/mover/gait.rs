@@ -65,7 +65,8 @@ const MUCH_FASTER: f64 = 0.9;
 const GOES_STRAIGHT_ON: f64 = 0.9;
 /// Smallest and largest number of time steps in a τ that the mover chooses.
 const STEPS: [f64; 2] = [15.0, 1e5];
-/// Corrections below this share of the shortest edge are the error of the mesh equation's solver, and change nothing.
+/// Corrections below this share of the shortest edge are the error of the mesh equation's solver: they change nothing,
+/// and have no direction that the next one could go on in or turn back from.
 const SOLVED_TO: f64 = 1e-2;
 /// In a step that is longer than this multiple of the last one, nodes go no farther at the learnt velocity than in a
 /// step of this multiple. A step after one that was done in halves is twice as long as these.
@@ -148,9 +149,9 @@ impl<const D: usize> Gait<D> {
             (0..D).for_each(|d| v[d] = share * (v[d] + gain * e[d] / dt));
         }
         let mut steps = self.steps;
-        let most = correction.iter().map(|e| length(*e)).fold(0.0, larger);
+        let [most, before] = [&correction, &self.correction].map(|e| e.iter().map(|e| length(*e)).fold(0.0, larger));
         let edge = mesh.shortest_edge();
-        let c = if most > SOLVED_TO * edge { cosine(&correction, &self.correction) } else { 0.0 };
+        let c = if most.min(before) > SOLVED_TO * edge { cosine(&correction, &self.correction) } else { 0.0 };
         let turned = c < TURNS_BACK && most > SEEN * edge;
         let unrest = REMEMBERED * self.unrest + if turned { 1.0 - REMEMBERED } else { 0.0 };
         if chooses {

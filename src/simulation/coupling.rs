@@ -1,4 +1,5 @@
-use super::{Record, Schedule, Simulation, State, growth, journey, shocks, timed};
+use super::journey::{self, Way};
+use super::{Record, Schedule, Simulation, State, growth, shocks, timed};
 use crate::density::Monitor;
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Cells, Density, Field, Mesh, check_unfolded};
@@ -154,16 +155,16 @@ where
     let predicted = timed(&mut record.seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
     // a mesh whose way nobody has set goes no faster than is good for the solution
     let guarded = mover.equation.relaxation == Relaxation::Auto && !physics.is_given();
-    type Round<const D: usize> = (Mesh<D>, Field, Option<Vec<f64>>, Density, f64);
+    type Round<const D: usize> = (Mesh<D>, Field, Option<Vec<f64>>, Density, Way);
     let mut latest: Option<Round<D>> = None;
     for _ in 0..coupling.iterations {
         let mixed = state.gait.mixed(&rho, mover.equation.relaxation);
         let moved = coupling.move_mesh(mover, &predicted, &mixed, stride, record)?;
         work += moved.work;
         interface = moved.interface;
-        let (mesh, share) = match guarded {
+        let (mesh, way) = match guarded {
             true => held_back(state, &predicted, moved.mesh, dt, schedule),
-            false => (moved.mesh, 1.0),
+            false => (moved.mesh, Way::WHOLE),
         };
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
         let seconds = &mut record.seconds;
@@ -171,37 +172,37 @@ where
         work += cost;
         rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
         let settled = latest.as_ref().is_some_and(|(last, ..)| coupling.same(last, &mesh));
-        latest = Some((mesh, u, errors, mixed, share));
+        latest = Some((mesh, u, errors, mixed, way));
         if settled {
             break;
         }
     }
-    let (mesh, u, errors, mixed, share) = latest.expect("a coupling has at least one iteration");
-    let gait = mover.learn(&state.gait, &predicted, &mesh, (mixed, followed), Stride { share, ..stride });
-    let own_change = if guarded { journey::own_change(state, &mesh, &u, dt) } else { 0.0 };
+    let (mesh, u, errors, mixed, way) = latest.expect("a coupling has at least one iteration");
+    let gait = mover.learn(&state.gait, &predicted, &mesh, (mixed, followed), Stride { share: way.share, ..stride });
+    let own_change = if guarded { journey::own_change(state, &mesh, &u, way.harm, dt) } else { 0.0 };
     let state = State { t, step: state.step + 1, mesh, u, rho, gait, own_change };
     Ok(Advanced { state, work, interface, errors })
 }
 
-/// The mesh moved only as far as [`journey::allowed`] says, and that share of the way.
+/// The mesh moved only as far as [`journey::allowed`] says, and that way.
 fn held_back<const D: usize>(
     state: &State<D>,
     predicted: &Predicted<D>,
     mesh: Mesh<D>,
     dt: f64,
     schedule: &Schedule,
-) -> (Mesh<D>, f64)
+) -> (Mesh<D>, Way)
 where
     Mesh<D>: Cells<D>,
 {
     let from = &predicted.mesh;
-    let share = journey::allowed(state, from, &mesh, dt, schedule.end() - schedule.start());
-    if share == 1.0 {
-        return (mesh, 1.0);
+    let way = journey::allowed(state, from, &mesh, dt, schedule.end() - schedule.start());
+    if way.share == 1.0 {
+        return (mesh, way);
     }
-    match from.between(&mesh, share) {
-        Ok(held) if check_unfolded(&held).is_ok() => (held, share),
-        _ => (from.clone(), 0.0),
+    match from.between(&mesh, way.share) {
+        Ok(held) if check_unfolded(&held).is_ok() => (held, way),
+        _ => (from.clone(), Way::NONE),
     }
 }
 

@@ -15,13 +15,26 @@ const OF_UNIFORM: f64 = 0.25;
 const OF_CHANGE: f64 = 0.2;
 /// The same where equal cells do not resolve the unknown, as when a layer forms: it gets thinner while the mesh is on
 /// its way, and a mesh that is too slow never arrives.
-const WHERE_UNRESOLVED: f64 = 0.5;
-/// Equal cells begin not to resolve an unknown where its steepest slope, over the length of one, is the first of these
-/// shares of its range, and do not from the second on.
-const UNRESOLVED: [f64; 2] = [0.25, 0.4];
+const WHERE_UNRESOLVED: f64 = 1.0;
 /// Linear interpolation of a layer that changes by the share g of its range over a cell has an error of this times g²,
 /// as a share of the range.
 const INTERPOLATION: f64 = 0.2;
+
+/// How far a mesh goes, and what that does to the solution.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Way {
+    /// The share of the way that it goes.
+    pub share: f64,
+    /// The largest error that this adds to an unknown, as a share of its range.
+    pub harm: f64,
+}
+
+impl Way {
+    /// All of the way, of which nobody asks what it does.
+    pub const WHOLE: Self = Self { share: 1.0, harm: 0.0 };
+    /// None of the way.
+    pub const NONE: Self = Self { share: 0.0, harm: 0.0 };
+}
 
 /// The share of the way of the mesh, from where it is predicted to where the mesh equation takes it, that keeps the
 /// error that it adds to the solution within a budget: 1 for all of the way
@@ -41,11 +54,11 @@ const INTERPOLATION: f64 = 0.2;
 ///
 /// E₀ and E are the errors with which equal cells and this mesh interpolate the unknown, estimated from its largest
 /// change over a cell, so that over a run the error stays below a quarter of the one of equal cells. U is what the
-/// solution changes by itself in a unit of time, of which a mesh that follows may add the share c: from 0.2 to 0.5, the
-/// worse equal cells resolve the unknown. n is the [`Need`], which is 0 where equal cells resolve all unknowns. The
-/// last term is for the way back to equal cells, where these have become better than this mesh; there E and E₀ from
-/// second differences along the lattice count, too, which see wide cells at the crest of a wave.
-pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> f64
+/// solution changes by itself in a unit of time, of which a mesh that follows may add the share c: from 0.2 where equal
+/// cells resolve the unknown to 1 where they do not. n is the [`Need`], which is 0 where equal cells resolve all
+/// unknowns. The last term is for the way back to equal cells, where these have become better than this mesh; there E
+/// and E₀ from second differences along the lattice count, too, which see wide cells at the crest of a wave.
+pub(super) fn allowed<const D: usize>(state: &State<D>, from: &Mesh<D>, to: &Mesh<D>, dt: f64, span: f64) -> Way
 where
     Mesh<D>: Cells<D>,
 {
@@ -72,7 +85,7 @@ where
     // one unknown that equal cells do not resolve is reason enough to hurry
     let need = Need::on(&state.mesh);
     let hurry = unknowns.iter().fold(0.0, |m, (_, _, over_cell)| larger(m, need.by_slopes(*over_cell)));
-    let mut share = 1.0_f64;
+    let mut way = Way::WHOLE;
     for (values, range, over_cell) in unknowns {
         let u: Vec<f64> = padded(lattice, values.as_chunks::<1>().0, [[0.0]; D]).into_flattened();
         let mut second = vec![[0.0; D]; u.len()];
@@ -87,17 +100,18 @@ where
             .map(|(k, area)| (0..D).map(|d| off(k, d) - off(k - strides[d], d)).sum::<f64>() / area);
         let harm = harms.fold(0.0, larger) / range;
         let jump = largest_step(lattice, &values) / range;
-        let unresolved = ((over_cell - UNRESOLVED[0]) / (UNRESOLVED[1] - UNRESOLVED[0])).clamp(0.0, 1.0);
+        let unresolved = Need::OF_EQUAL_CELLS.by_slopes(over_cell);
         let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
         let [here, equal] = of_bends(places, &patch, &u, h);
         let excess = (INTERPOLATION * jump * jump - uniform).max((here - equal) / range).max(0.0);
         let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + of_change * hurry * state.own_change * dt + excess;
+        way.harm = larger(way.harm, harm);
         if harm > budget {
-            share = share.min(budget / harm);
+            way.share = way.share.min(budget / harm);
         }
     }
-    share
+    Way { harm: way.share * way.harm, ..way }
 }
 
 /// The largest errors h² |u''|/8 of linear interpolation along the lattice, from padded values: with the longer of the
@@ -123,8 +137,12 @@ where
     [here, equal]
 }
 
-/// The largest change of an unknown at a fixed place in a step, as a share of its range, over the length of the step.
-pub(super) fn own_change<const D: usize>(before: &State<D>, mesh: &Mesh<D>, u: &Field, dt: f64) -> f64
+/// What the solution changes by itself in a unit of time: the largest change of an unknown at a fixed place in a step,
+/// as a share of its range, less the `harm` that moving the nodes did in it
+///
+/// The equation repairs that harm, and what it repairs is a change, too. A mesh that may add a share of all changes
+/// would add the more, the more it adds.
+pub(super) fn own_change<const D: usize>(before: &State<D>, mesh: &Mesh<D>, u: &Field, harm: f64, dt: f64) -> f64
 where
     Mesh<D>: Cells<D>,
 {
@@ -132,7 +150,8 @@ where
         let range = range(u, c).max(range(&before.u, c));
         if range > 0.0 { change(before, mesh, u, c) / range } else { 0.0 }
     };
-    (0..u.components()).map(share).fold(0.0, f64::max) / dt
+    let all = (0..u.components()).map(share).fold(0.0, f64::max);
+    (all - harm).max(0.0) / dt
 }
 
 /// The largest change of an unknown at a fixed place, past which the nodes move.

@@ -65,7 +65,7 @@ pub struct State<const D: usize = 2> {
     /// The mover's memory of the last steps: velocity of the nodes, τ, and how the mesh was going.
     pub gait: Gait<D>,
     /// How fast the solution changes by itself: the largest change at a fixed place in the last step, as a share of its
-    /// range, over the time that it took; 0 before the first step.
+    /// range and less what moving the nodes did, over the time that it took; 0 before the first step.
     pub own_change: f64,
 }
 

@@ -21,3 +21,19 @@ pub fn plane(text: &str) -> MovingRun {
     assert!(failure.is_none(), "{failure:?}");
     run
 }
+
+/// ∫|u − exact| over the line, u linear between its nodes.
+pub fn distance(run: &MovingRun<1>, unknown: usize, exact: impl Fn(f64) -> f64) -> f64 {
+    let state = run.state.as_ref().unwrap();
+    let x: Vec<f64> = state.mesh.x().iter().map(|[x]| *x).collect();
+    let u: Vec<f64> = state.u.component(unknown).collect();
+    let mut sum = 0.0;
+    for (x, u) in x.windows(2).zip(u.windows(2)) {
+        for k in 0..20 {
+            let share = (k as f64 + 0.5) / 20.0;
+            let at = x[0] + share * (x[1] - x[0]);
+            sum += (u[0] + share * (u[1] - u[0]) - exact(at)).abs() * (x[1] - x[0]) / 20.0;
+        }
+    }
+    sum
+}
