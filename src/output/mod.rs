@@ -11,6 +11,7 @@ mod figure;
 mod frames;
 mod given;
 mod history;
+pub mod names;
 mod picture;
 mod rows;
 mod sheet;

@@ -195,7 +195,7 @@ where
     Mesh<D>: Cells<D>,
 {
     let from = &predicted.mesh;
-    let share = journey::allowed(state, from, &mesh, dt, schedule.end() - schedule.start());
+    let share = journey::allowed(state, from, &mesh, dt, schedule.span());
     if share == 1.0 {
         return (mesh, 1.0);
     }

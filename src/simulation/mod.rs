@@ -345,7 +345,7 @@ where
             step: state.step,
             dt,
             steps: self.schedule.steps(),
-            share: (state.t - self.schedule.start()) / (self.schedule.end() - self.schedule.start()),
+            share: self.schedule.share(state.t),
             smallest: quality.min_scaled_jacobian,
             seconds: clock.seconds(),
             nodes: in_plane(&state.mesh).map_or(&[], Mesh::x),

@@ -172,6 +172,16 @@ impl Schedule {
         self.intervals.last().map_or(self.start, |i| i.0)
     }
 
+    /// Length of the run.
+    pub fn span(&self) -> f64 {
+        self.end() - self.start
+    }
+
+    /// The share of the run that is done at a time, from 0 at the start to 1 at the end.
+    pub fn share(&self, t: f64) -> f64 {
+        (t - self.start) / self.span()
+    }
+
     /// Number of steps; none where the solution decides.
     pub fn steps(&self) -> Option<usize> {
         (!self.is_automatic()).then(|| self.intervals.last().map_or(0, |i| i.1))

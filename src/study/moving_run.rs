@@ -9,7 +9,7 @@ use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
 use crate::kept::{Kept, check_nodal};
 use crate::output::{
-    Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Spent, Summary, final_arrays, moment,
+    Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Spent, Summary, final_arrays, moment, names,
 };
 use crate::simulation::{
     Checkpoint, Course, Event, Keeper, Observer, Record, Report, Retries, Scene, Schedule, Seconds, Simulation,
@@ -112,7 +112,8 @@ where
             Some(state) => state,
             None => {
                 let start = self.study.start(&self.simulation, &mut self.record, &mut stage.observers())?;
-                self.history = stage.directory.map(|to| History::create(&to.path().join(HISTORY))).transpose()?;
+                self.history =
+                    stage.directory.map(|to| History::create(&to.path().join(names::HISTORY))).transpose()?;
                 start
             }
         };
@@ -140,7 +141,7 @@ where
         mover.generator.resume(mesh.parameters(), &found.kept)?;
         self.meshes = Meshes::resume(&self.study, &mesh, &found.kept)?;
         let Checkpoint { record, course, kept, .. } = found;
-        self.history = directory.map(|to| History::resume(&to.join(HISTORY), &kept)).transpose()?;
+        self.history = directory.map(|to| History::resume(&to.join(names::HISTORY), &kept)).transpose()?;
         (self.state, self.record, self.course) = (Some(state), record, Some(course));
         Ok((self.spent(), kept))
     }
@@ -211,12 +212,9 @@ where
 #[derive(Deserialize)]
 pub struct MovingCheckpoint<const D: usize = 2>(Checkpoint<D>);
 
-/// Where the history of a run is.
-const HISTORY: &str = "history.csv";
-
 /// Leaves the arrays of a line and a plot of its first unknown.
 fn leave_line(name: &str, scene: &Scene, directory: &RunDirectory) -> Result<()> {
-    directory.write("final.npz", &final_arrays(scene))?;
+    directory.write(names::ARRAYS, &final_arrays(scene))?;
     let curves = scene.nodal.iter().filter_map(|(name, values)| match values {
         Values::Scalars(values) => {
             let points = scene.points.iter().zip(values).map(|(x, u)| [x[0], *u]).collect();
@@ -231,7 +229,7 @@ fn leave_line(name: &str, scene: &Scene, directory: &RunDirectory) -> Result<()>
         curves: curves.collect(),
         ..Figure::default()
     };
-    figure.draw().write(directory.path(), "mesh")
+    figure.draw().write(directory.path(), names::MESH)
 }
 
 /// Keeps the meshes at the times of reports, where `[compare]` gives something to compare them with.

@@ -1,8 +1,7 @@
 //! Studies of kind `stefan` with `[species]`: what is refused, and what runs.
 
-use super::common::{Header, Output, StudyKind};
-use super::data::DataTables;
-use super::kind::Kind;
+use super::common::StudyKind;
+use super::kind::{Kind, common_tables};
 use super::mapped::{mistaken, parse};
 use super::species::{SpeciesStudy, SpeciesTable};
 use super::species_run::SpeciesRun;
@@ -20,17 +19,7 @@ impl Kind for SpeciesStudy {
 
     const KIND: StudyKind = StudyKind::Stefan;
 
-    fn common(&self) -> (&Header, &Output) {
-        (&self.study, &self.output)
-    }
-
-    fn data(&self) -> &DataTables {
-        &self.data
-    }
-
-    fn data_mut(&mut self) -> &mut DataTables {
-        &mut self.data
-    }
+    common_tables!();
 
     fn resolve(&mut self) -> Result<()> {
         self.begin()?;
