@@ -1,4 +1,4 @@
-use super::{Density, MAX_SMOOTHING, Monitor, smooth};
+use super::{Density, Monitor, check_smoothing, smooth};
 use crate::error::{Error, Failure, Result};
 use crate::geometry::{Mesh, check_length};
 use crate::numerics::difference::Metrics;
@@ -74,10 +74,7 @@ impl Arclength {
     /// [`Error::Invalid`] where the strength is negative or not finite, or the smoothing beyond all reason.
     pub fn check(&self) -> Result<()> {
         self.strength.check()?;
-        if self.smoothing > MAX_SMOOTHING {
-            return Err(Error::invalid("smoothing", self.smoothing, format!("must be at most {MAX_SMOOTHING} passes")));
-        }
-        Ok(())
+        check_smoothing(self.smoothing)
     }
 }
 

@@ -1,5 +1,5 @@
-use super::{Density, MAX_SMOOTHING, Monitor, Strength, smooth};
-use crate::error::{Error, Failure, Result};
+use super::{Density, Monitor, Strength, check_smoothing, smooth};
+use crate::error::{Failure, Result};
 use crate::geometry::{Cells, Mesh, check_length};
 use crate::numerics::difference::Metrics;
 use crate::numerics::{larger, sum};
@@ -56,13 +56,10 @@ impl Curvature {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the strength is negative or not finite, or the smoothing beyond all reason.
+    /// [`Error::Invalid`](crate::Error::Invalid) where the strength is negative or not finite, or the smoothing beyond all reason.
     pub fn check(&self) -> Result<()> {
         self.strength.check()?;
-        if self.smoothing > MAX_SMOOTHING {
-            return Err(Error::invalid("smoothing", self.smoothing, format!("must be at most {MAX_SMOOTHING} passes")));
-        }
-        Ok(())
+        check_smoothing(self.smoothing)
     }
 
     /// α from |H|² at the nodes.
