@@ -19,6 +19,7 @@ mod summary;
 mod ticks;
 mod vtu;
 
+pub use crate::stopwatch::Spent;
 pub use arrays::final_arrays;
 pub use checkpoints::CheckpointsAt;
 pub(crate) use checkpoints::{Behind, Checkpoints, Resumed};
@@ -35,6 +36,6 @@ pub use history::History;
 pub(crate) use picture::Canvas;
 pub use picture::Picture;
 pub(crate) use rows::Rows;
-pub use summary::{Ended, Failed, Figures, Parallel, Spent, Summary};
+pub use summary::{Ended, Failed, Figures, Parallel, Summary};
 pub(crate) use ticks::moment;
 pub(crate) use vtu::structured;

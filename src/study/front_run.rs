@@ -2,7 +2,7 @@
 
 use super::front_figures::{FrontReport, Row};
 use super::front_given::Given;
-use super::fronts::{Attempted, Controller, Fronts, Progress, View};
+use super::fronts::{Controller, Fronts, Progress, View};
 use super::time_loop::TimeLoop;
 use crate::error::{Moment, Result, Unfit};
 use crate::geometry::{Mesh, quality};
@@ -84,9 +84,8 @@ impl Fronts for TwoPhase {
         check_nodal("energy", &[[start, now, inflow, inflow_by_differences, moved, state.way[0], state.way[1]]], 1)
     }
 
-    fn attempt(&mut self, state: &FrontState, t: f64) -> Result<Attempted<FrontState>> {
-        let Attempt { state, work, error, event } = self.front.attempt(&self.given, state, t)?;
-        Ok(Attempted { state, work, error, event })
+    fn attempt(&mut self, state: &FrontState, t: f64) -> Result<Attempt> {
+        self.front.attempt(&self.given, state, t)
     }
 
     fn step_length(&self, state: &FrontState, chosen: Option<f64>, halvings: i32, _span: f64) -> f64 {

@@ -3,8 +3,7 @@
 use crate::error::{Moment, Result, Unfit};
 use crate::output::{Picture, Rows, RunDirectory};
 use crate::simulation::Scene;
-use crate::stefan::PhaseEvent;
-use crate::work::Work;
+use crate::stefan::Attempt;
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
@@ -81,7 +80,7 @@ pub trait Fronts: Sized {
     ///
     /// # Errors
     /// [`Error::Failed`], for which an automatic step is halved.
-    fn attempt(&mut self, state: &Self::State, t: f64) -> Result<Attempted<Self::State>>;
+    fn attempt(&mut self, state: &Self::State, t: f64) -> Result<Attempt<Self::State>>;
 
     /// Length of the next automatic step in a run of length `span`. The controller has `chosen` one, except before the
     /// first step; the last steps that failed were halved `halvings` times.
@@ -133,19 +132,6 @@ pub trait Fronts: Sized {
     fn doubt(&self, _state: &Self::State) -> Option<String> {
         None
     }
-}
-
-/// What a step comes to.
-#[derive(Debug, Clone)]
-pub struct Attempted<S> {
-    /// The state after it.
-    pub state: S,
-    /// Its cost.
-    pub work: Work,
-    /// Its estimated error, where there is one.
-    pub error: Option<f64>,
-    /// A phase that has appeared or vanished.
-    pub event: Option<PhaseEvent>,
 }
 
 /// What a row of a table says beside the state.

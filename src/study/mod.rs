@@ -52,7 +52,7 @@ pub use equidistribution::{
 pub use examples::write_examples;
 pub use front_figures::{FrontError, FrontFigures, FrontParts, FrontReport, FrontSummary};
 pub use front_run::{FrontRun, TwoPhase};
-pub use fronts::{Attempted, Controller, Fronts, Progress, View};
+pub use fronts::{Controller, Fronts, Progress, View};
 pub use kind::{Kind, Running, SpentBy};
 pub use line_figures::{LineFigures, LineParts, LineQuality, LineWork, NumberedIterate, PerStep, Rate, StepRow};
 pub use line_run::{Evolution, LineRun};
@@ -61,7 +61,7 @@ pub use memory::check_memory;
 pub use moving_mesh::{
     Compare, Domain, Grid, MeshForm, MeshTable, MovingLine, MovingMesh, MovingStudy, StartMesh, Stepper, Time,
 };
-pub use moving_run::{MovingFigures, MovingParts, MovingRun};
+pub use moving_run::{MovingFigures, MovingRun};
 pub use poisson::{Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonStudy, Sides, SolverKind, SolverTable};
 pub use poisson_run::{PoissonError, PoissonFigures, PoissonParts, PoissonRun, Solved, StencilReport};
 pub use remedy::failures;

@@ -9,10 +9,10 @@ use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
 use crate::kept::{Kept, check_nodal};
 use crate::output::{
-    Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Spent, Summary, final_arrays, moment, names,
+    Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Summary, final_arrays, moment, names,
 };
 use crate::simulation::{
-    Checkpoint, Course, Event, Keeper, Observer, Record, Report, Retries, Scene, Schedule, Seconds, Simulation,
+    Checkpoint, Course, Event, Keeper, MovingParts, Observer, Record, Report, Retries, Scene, Schedule, Simulation,
     Snapshot, State, Values, WorkTotal,
 };
 use serde::{Deserialize, Serialize};
@@ -27,19 +27,6 @@ pub struct MovingFigures {
     pub safety: Retries,
     /// One entry for each time of `time.report` that was reached.
     pub reports: Vec<Report>,
-}
-
-/// Seconds of a moving mesh, by part.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct MovingParts {
-    /// Computing the density.
-    pub monitor: f64,
-    /// Estimating interface values.
-    pub interface: f64,
-    /// Solving the mesh equation, `interface` not included.
-    pub mesh: f64,
-    /// Solving the physics.
-    pub pde: f64,
 }
 
 impl Figures for MovingFigures {
@@ -143,7 +130,7 @@ where
         let Checkpoint { record, course, kept, .. } = found;
         self.history = directory.map(|to| History::resume(&to.join(names::HISTORY), &kept)).transpose()?;
         (self.state, self.record, self.course) = (Some(state), record, Some(course));
-        Ok((self.spent(), kept))
+        Ok((self.record.seconds, kept))
     }
 
     pub(super) fn last_scene(&self) -> Result<Vec<Scene>> {
@@ -158,11 +145,6 @@ where
             Some(scene) => leave_line(&self.study.study.name, scene, directory),
             None => Ok(()),
         }
-    }
-
-    fn spent(&self) -> SpentBy<Self> {
-        let Seconds { wall, cpu, monitor, interface, mesh, pde, output } = self.record.seconds;
-        Spent { wall, cpu, parts: MovingParts { monitor, interface, mesh, pde }, output }
     }
 }
 
@@ -200,7 +182,7 @@ where
     fn tell(&self, summary: &mut Summary<MovingFigures>) {
         let Record { work, safety, reports, warnings, .. } = self.record.clone();
         summary.figures = MovingFigures { work, safety, reports };
-        (summary.seconds, summary.warnings) = (self.spent(), warnings);
+        (summary.seconds, summary.warnings) = (self.record.seconds, warnings);
     }
 
     fn warn(&mut self, warnings: Vec<String>) {

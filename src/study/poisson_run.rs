@@ -2,7 +2,7 @@
 
 use super::kind::{Running, SpentBy};
 use super::poisson::{PoissonStudy, SolverKind};
-use super::poisson_sides::Given;
+use super::poisson_sides::{Given, finite};
 use super::runner::Stage;
 use crate::error::{Failure, Result, Unfit};
 use crate::formula::Program;
@@ -268,11 +268,6 @@ fn values(mesh: &Mesh<2>, exact: &Program<2, 5>) -> Result<Vec<f64>, Failure> {
     let mut out = vec![[0.0; 5]; mesh.x().len()];
     exact.eval_each(mesh.x(), &[], &mut out);
     let u: Vec<f64> = out.into_iter().map(|[u, ..]| u).collect();
-    match u.iter().position(|u| !u.is_finite()) {
-        None => Ok(u),
-        Some(k) => {
-            let at = mesh.node_place(k);
-            Err(Failure::Formula { what: "exact.u".into(), value: u[k], at, given: Vec::new() })
-        }
-    }
+    (0..u.len()).try_for_each(|k| finite(mesh, k, "exact.u", u[k]))?;
+    Ok(u)
 }

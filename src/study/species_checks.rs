@@ -2,7 +2,7 @@
 
 use super::common::StudyKind;
 use super::kind::{Kind, common_tables};
-use super::mapped::{mistaken, parse};
+use super::mapped::parse;
 use super::species::{SpeciesStudy, SpeciesTable};
 use super::species_run::SpeciesRun;
 use crate::error::{Error, Failure, Result};
@@ -233,5 +233,5 @@ impl SpeciesStudy {
 fn rate(key: &str, text: &str, names: &[String]) -> Result<Rate> {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let formula = parse(key, text, &names)?;
-    Rate::new(formula).map_err(|mistake| mistaken(key, text, mistake))
+    Rate::new(formula).map_err(|mistake| mistake.of(key, text))
 }

@@ -1,12 +1,13 @@
 //! Studies of kind `stefan` with `[species]`: how they run.
 
-use super::fronts::{Attempted, Controller, Fronts, Progress, View};
+use super::fronts::{Controller, Fronts, Progress, View};
 use super::species_figures::{SpeciesReport, heads, row};
 use super::time_loop::TimeLoop;
 use crate::error::{Moment, Result, Unfit};
 use crate::output::{Curve, Figure, Picture, Rows, RunDirectory, Scale, final_arrays, names};
 use crate::simulation::{Scene, Values};
-use crate::species::{Species, SpeciesAttempt, SpeciesState};
+use crate::species::{Species, SpeciesState};
+use crate::stefan::Attempt;
 
 /// The first automatic step, as a share of the run.
 const FIRST: f64 = 1e-5;
@@ -41,9 +42,9 @@ impl Fronts for Species {
         }
     }
 
-    fn attempt(&mut self, state: &SpeciesState, t: f64) -> Result<Attempted<SpeciesState>> {
-        let SpeciesAttempt { state, work, error } = Species::attempt(self, state, t)?;
-        Ok(Attempted { state, work, error: Some(error), event: None })
+    fn attempt(&mut self, state: &SpeciesState, t: f64) -> Result<Attempt<SpeciesState>> {
+        let (state, work, error) = Species::attempt(self, state, t)?;
+        Ok(Attempt { state, work, error: Some(error), event: None })
     }
 
     fn step_length(&self, _state: &SpeciesState, chosen: Option<f64>, _halvings: i32, span: f64) -> f64 {

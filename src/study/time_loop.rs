@@ -1,14 +1,14 @@
 //! Studies of kind `stefan`: the one time loop of all problems with fronts.
 
 use super::front_figures::{FrontParts, FrontReport, FrontSummary};
-use super::fronts::{Attempted, Fronts, Progress, View};
+use super::fronts::{Fronts, Progress, View};
 use super::kind::{Running, SpentBy};
 use super::runner::Stage;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::{Kept, check_nodal};
 use crate::output::{FramesAt, Picture, Rows, RunDirectory, Spent, Summary, names};
 use crate::simulation::{Event, Scene, Schedule, Snapshot, WorkTotal, timed};
-use crate::stefan::{FrontState, PhaseEvent};
+use crate::stefan::{Attempt, FrontState, PhaseEvent};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -155,7 +155,7 @@ impl<F: Fronts> Running for TimeLoop<F> {
             let Self { problem, course, .. } = self;
             let Moment { t: before, step } = F::moment(&course.state);
             let dt = t - before;
-            let Attempted { state, work, error, event } =
+            let Attempt { state, work, error, event } =
                 match timed(&mut course.seconds.parts.pde, || problem.attempt(&course.state, t)) {
                     Err(Error::Failed { .. }) if self.may_halve(dt, halvings) => {
                         halvings += 1;
