@@ -2,12 +2,11 @@
 
 use crate::terminal::moment;
 use driftmesh::meshing::Interface;
-use driftmesh::output::{Figures, Summary};
-use driftmesh::simulation::{Retries, WorkTotal};
+use driftmesh::output::Summary;
+use driftmesh::simulation::Retries;
 use driftmesh::study::{
-    EquidistributionStudy, FrontParts, FrontSummary, Kind, LineFigures, MovingFigures, MovingLine, MovingMesh,
-    NumberedIterate, PoissonFigures, PoissonStudy, Running, SpeciesReport, SpeciesStudy, StefanStudy,
-    UniformEquivalent,
+    EquidistributionStudy, FrontSummary, Kind, LineFigures, MovingFigures, MovingLine, MovingMesh, NumberedIterate,
+    PoissonFigures, PoissonStudy, Running, SpeciesReport, SpeciesStudy, StefanStudy, UniformEquivalent,
 };
 
 /// What is said of a run in a few lines.
@@ -116,12 +115,15 @@ impl Told for StefanStudy {
                 figure(report.step_limit)
             );
         }
-        let work = summary.figures.work;
+        let (work, s) = (summary.figures.work, summary.seconds);
         text += &format!("work     {} steps, {} linear solves", work.steps, work.work.linear_solves);
         if work.work.newton_iterations > 0 {
             text += &format!(", {} Newton iterations", work.work.newton_iterations);
         }
-        text + "\n" + &front_seconds(summary)
+        text + &format!(
+            "\nseconds  {:.2} (pde {:.2}, output {:.2}), {} threads",
+            s.wall, s.parts.pde, s.output, summary.parallel.threads
+        )
     }
 
     fn left(summary: &Summary<FrontSummary>) -> String {
@@ -152,12 +154,18 @@ impl Told for SpeciesStudy {
                 text += &format!("{time:>8} {:19} {}\n", front.unwrap_or_default(), total.unwrap_or_default());
             }
         }
-        let WorkTotal { steps, rejected_steps, work } = summary.figures.work;
-        text += &format!(
-            "work     {steps} steps, {rejected_steps} rejected, {} Newton iterations\n",
-            work.newton_iterations
-        );
-        text + &front_seconds(summary)
+        let (work, s) = (summary.figures.work, summary.seconds);
+        text + &format!(
+            "work     {} steps, {} rejected, {} Newton iterations\n\
+             seconds  {:.2} (pde {:.2}, output {:.2}), {} threads",
+            work.steps,
+            work.rejected_steps,
+            work.work.newton_iterations,
+            s.wall,
+            s.parts.pde,
+            s.output,
+            summary.parallel.threads
+        )
     }
 
     fn left(summary: &Summary<FrontSummary<SpeciesReport>>) -> String {
@@ -282,16 +290,6 @@ fn cost(summary: &Summary<MovingFigures>) -> String {
         "mesh {:.2}, pde {:.2}, monitor {:.2}, output {:.2}), {} threads",
         s.parts.mesh, s.parts.pde, s.parts.monitor, s.output, summary.parallel.threads
     )
-}
-
-/// Seconds of fronts.
-fn front_seconds<R>(summary: &Summary<FrontSummary<R>>) -> String
-where
-    FrontSummary<R>: Figures<Parts = FrontParts>,
-{
-    let s = summary.seconds;
-    let threads = summary.parallel.threads;
-    format!("seconds  {:.2} (pde {:.2}, output {:.2}), {threads} threads", s.wall, s.parts.pde, s.output)
 }
 
 fn last_good(step: usize) -> String {

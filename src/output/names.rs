@@ -1,4 +1,4 @@
-//! Names of the files in the directory of a run; what has no other name is removed by no run.
+//! Names of the files in the directory of a run. A run that replaces another removes files of these names alone.
 
 /// What every run says of itself, as JSON.
 pub const SUMMARY: &str = "summary.json";
@@ -33,7 +33,7 @@ pub const DENSITY: &str = "density";
 pub const CONVERGENCE: &str = "convergence";
 /// The front over time.
 pub const FRONT: &str = "front";
-/// Pictures, each as SVG and PNG: those above, and the plots of a report.
+/// Pictures: those above, and the plots of a report.
 pub const PICTURES: [&str; 12] = [
     MESH,
     DENSITY,
@@ -48,7 +48,7 @@ pub const PICTURES: [&str; 12] = [
     "steps",
     "temperature",
 ];
-/// Endings of the two files of a picture.
+/// Every picture is there in each of these formats, by which the names of its files end.
 pub const PICTURE_FORMATS: [&str; 2] = ["svg", "png"];
 
 /// Tables and frames, which a run adds to as it goes on.

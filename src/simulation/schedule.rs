@@ -172,12 +172,12 @@ impl Schedule {
         self.intervals.last().map_or(self.start, |i| i.0)
     }
 
-    /// Length of the run.
+    /// Length of the run, end − start.
     pub fn span(&self) -> f64 {
         self.end() - self.start
     }
 
-    /// The share of the run that is done at a time, from 0 at the start to 1 at the end.
+    /// The share of the run that is done at time t, (t − start)/(end − start).
     pub fn share(&self, t: f64) -> f64 {
         (t - self.start) / self.span()
     }

@@ -79,23 +79,23 @@ pub trait Fronts: Sized {
     /// What a step to time `t` would come to.
     ///
     /// # Errors
-    /// [`Error::Failed`], for which an automatic step is halved.
+    /// [`Error::Failed`](crate::Error::Failed), for which an automatic step is halved.
     fn attempt(&mut self, state: &Self::State, t: f64) -> Result<Attempt<Self::State>>;
 
     /// Length of the next automatic step in a run of length `span`. The controller has `chosen` one, except before the
-    /// first step; the last steps that failed were halved `halvings` times.
+    /// first step that has an estimated error; so many `halvings` of a step that failed came before.
     fn step_length(&self, state: &Self::State, chosen: Option<f64>, halvings: i32, span: f64) -> f64;
 
     /// Writes what the tables have above their first row.
     ///
     /// # Errors
-    /// [`Error::Unwritable`].
+    /// [`Error::Unwritable`](crate::Error::Unwritable).
     fn write_heads(&self, tables: &mut [Rows]) -> Result<()>;
 
     /// What is shown of a state; adds a row to each table.
     ///
     /// # Errors
-    /// [`Error::Unwritable`]; [`Error::Failed`] where there is no mesh.
+    /// [`Error::Unwritable`](crate::Error::Unwritable); [`Error::Failed`](crate::Error::Failed) where there is no mesh.
     fn view<'a>(
         &'a self,
         state: &'a Self::State,
@@ -106,7 +106,7 @@ pub trait Fronts: Sized {
     /// The state as what can be drawn and written.
     ///
     /// # Errors
-    /// [`Error::Failed`] where there is no mesh.
+    /// [`Error::Failed`](crate::Error::Failed) where there is no mesh.
     fn scene(&self, state: &Self::State) -> Result<Scene>;
 
     /// Fronts over time, each with its time.
@@ -115,7 +115,7 @@ pub trait Fronts: Sized {
     /// Writes arrays that the runner does not write.
     ///
     /// # Errors
-    /// [`Error::Unwritable`].
+    /// [`Error::Unwritable`](crate::Error::Unwritable).
     fn leave(&self, _state: &Self::State, _directory: &RunDirectory) -> Result<()> {
         Ok(())
     }
@@ -155,4 +155,32 @@ pub struct View<'a, R> {
     pub nodes: Vec<[f64; 2]>,
     /// What can be drawn and written of it.
     pub scene: Box<dyn Fn() -> Scene + 'a>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By cube roots: an error of 8 ε asks for .9/2 of the step, one of ε/1000 for 9 of them, of which two are granted.
+    #[test]
+    fn the_next_step_aims_at_the_tolerance() {
+        let controller = Controller { tolerance: 1e-6, root: f64::cbrt, halvings: 6 };
+        let judged = |error: f64, rejected: usize, before: Option<f64>| {
+            let mut next = before;
+            (controller.judge(0.1, error, rejected, &mut next), next.unwrap())
+        };
+        for (error, rejected, before, good, next) in [
+            (8e-6, 0, None, false, 0.045),
+            (1e-9, 0, None, true, 0.2),
+            (1.0, 0, None, false, 0.02),
+            // taken as it is at last
+            (8e-6, REJECTIONS, None, true, 0.045),
+            // cut short by a report, where whole steps were longer
+            (1e-6, 0, Some(0.7), true, 0.7),
+            (8e-6, 0, Some(0.7), false, 0.045),
+        ] {
+            let found = judged(error, rejected, before);
+            assert!(found.0 == good && (found.1 - next).abs() < 1e-12, "{error:e} {rejected} {before:?}: {found:?}");
+        }
+    }
 }
