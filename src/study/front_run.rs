@@ -138,11 +138,11 @@ impl Fronts for TwoPhase {
         draw_curves(&format!("{title}, the front over time"), "t", x, fronts, ends[0], ends[1])
     }
 
-    fn written(&self, directory: &Path) -> Result<Option<Vec<(f64, Vec<f64>)>>, Unfit> {
+    fn written(&self, directory: &Path) -> Result<Vec<(f64, Vec<f64>)>, Unfit> {
         let rows = Rows::numbers(directory, names::FRONTS)?;
         let heights: Vec<[f64; 1]> = rows.iter().flatten().map(|height| [*height]).collect();
         check_nodal(names::FRONTS, &heights, rows.len() * (self.front.columns.x().len() + 1))?;
-        Ok(Some(rows.iter().map(|row| (row[0], row[1..].to_vec())).collect()))
+        Ok(rows.iter().map(|row| (row[0], row[1..].to_vec())).collect())
     }
 
     /// A front is in doubt whose way depends on how many rows there are.

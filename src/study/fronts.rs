@@ -120,12 +120,12 @@ pub trait Fronts: Sized {
         Ok(())
     }
 
-    /// All fronts up to now with their times, from the tables of a run; none where the loop keeps all of them.
+    /// All fronts up to now with their times, from the tables of a run whose picture shows only some.
     ///
     /// # Errors
     /// [`Unfit`] where the table is not there.
-    fn written(&self, _directory: &Path) -> Result<Option<Vec<(f64, Vec<f64>)>>, Unfit> {
-        Ok(None)
+    fn written(&self, _directory: &Path) -> Result<Vec<(f64, Vec<f64>)>, Unfit> {
+        Ok(Vec::new())
     }
 
     /// Why the last state may be wrong although nothing failed.

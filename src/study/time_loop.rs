@@ -215,12 +215,15 @@ impl<F: Fronts> Running for TimeLoop<F> {
 
     /// Chooses the fronts of the picture from all of them, as a run to this end would have.
     fn lengthen(&mut self, directory: &Path) -> Result<(), Unfit> {
-        if let Some(written) = self.problem.written(directory)? {
-            self.course.fronts.clear();
-            for (t, front) in written {
-                if is_pictured(F::PICTURED, self.course.fronts.len(), self.schedule.share(t)) {
-                    self.course.fronts.push((t, front));
-                }
+        if F::PICTURED.is_none() {
+            return Ok(());
+        }
+        let written = self.problem.written(directory)?;
+        let fronts = &mut self.course.fronts;
+        fronts.clear();
+        for (t, front) in written {
+            if is_pictured(F::PICTURED, fronts.len(), self.schedule.share(t)) {
+                fronts.push((t, front));
             }
         }
         Ok(())
