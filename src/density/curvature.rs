@@ -56,7 +56,8 @@ impl Curvature {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`](crate::Error::Invalid) where the strength is negative or not finite, or the smoothing beyond all reason.
+    /// [`Error::Invalid`](crate::Error::Invalid) where the strength is negative or not finite, or the smoothing beyond
+    /// all reason.
     pub fn check(&self) -> Result<()> {
         self.strength.check()?;
         check_smoothing(self.smoothing)

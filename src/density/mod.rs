@@ -97,7 +97,7 @@ impl MonitorKind {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`](crate::Error::Invalid).
+    /// [`Error::Invalid`].
     pub fn check(&self) -> Result<()> {
         self.cells().map_or(Ok(()), CellSizes::check)?;
         match self {
@@ -141,7 +141,7 @@ impl MonitorKind {
     /// The monitor for an equation of these unknowns, ready to use.
     ///
     /// # Errors
-    /// [`Error::Formula`](crate::Error::Formula) where `of` is no formula of the unknowns, x, y and t.
+    /// [`Error::Formula`] where `of` is no formula of the unknowns, x, y and t.
     pub fn into_monitor<const D: usize>(self, unknowns: &[String]) -> Result<Box<dyn Monitor<D>>>
     where
         Mesh<D>: Cells<D>,

@@ -79,8 +79,8 @@ impl Species {
     /// ```
     ///
     /// with d = 1 − 1/√2, where v are the amounts in the cells and the volumes up to the faces. Returns the state, the
-    /// cost, and the estimated error: the larger one of the fronts', as a share of the line, and of the concentrations',
-    /// as shares of the largest ones.
+    /// cost, and the estimated error: the larger one of the fronts', as a share of the line, and of the
+    /// concentrations', as shares of the largest ones.
     ///
     /// # Errors
     /// [`Failure::NewtonStalled`](crate::Failure::NewtonStalled), [`LinearStalled`](crate::Failure::LinearStalled),
