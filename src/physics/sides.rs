@@ -282,8 +282,8 @@ impl JsonSchema for Conditions {
             text,
             flux,
         ] });
-        let sides: serde_json::Map<String, serde_json::Value> =
-            SIDES.as_flattened().iter().map(|side| (side.to_string(), one.clone().to_value())).collect();
+        let mut sides = Schema::default();
+        SIDES.as_flattened().iter().for_each(|side| _ = sides.insert(side.to_string(), one.clone().to_value()));
         json_schema!({ "anyOf": [one, { "type": "object", "properties": sides, "additionalProperties": false }] })
     }
 }

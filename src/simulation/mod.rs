@@ -22,6 +22,7 @@ mod schedule;
 mod shocks;
 mod warnings;
 
+pub use crate::stopwatch::Spent;
 pub use benefit::Benefit;
 pub(crate) use checkpoint::{Checkpoint, Course, Keeper};
 pub use conserved::{Amount, Conserved};
