@@ -1,6 +1,6 @@
 use super::{Density, Monitor, check_smoothing, smooth};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Mesh, check_length};
+use crate::geometry::{Mesh, check_finite, check_length};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 use schemars::JsonSchema;
@@ -103,12 +103,7 @@ impl<const D: usize> Monitor<D> for Arclength {
         };
         let mut rho: Vec<f64> = slope2.into_iter().map(|s| (1.0 + alpha * s).sqrt()).collect();
         smooth(mesh.lattice(), &mut rho, self.smoothing)?;
-        match rho.iter().position(|r| !r.is_finite()) {
-            None => Ok(rho.into()),
-            Some(k) => {
-                let at = mesh.node_place(k);
-                Err(Failure::NonFinite { what: "the mesh density", value: rho[k], at })
-            }
-        }
+        check_finite(["the mesh density"], mesh, rho.as_chunks().0)?;
+        Ok(rho.into())
     }
 }

@@ -279,19 +279,3 @@ fn nodal<'a, const D: usize, const K: usize>(motion: Motion<'_, D>, u: &'a Field
     }
     Ok(nodes)
 }
-
-/// Refuses values that are not finite.
-fn check_finite<const D: usize, const K: usize>(
-    what: [&'static str; K],
-    mesh: &Mesh<D>,
-    values: &[[f64; K]],
-) -> Result<(), Failure> {
-    match values.as_flattened().iter().position(|v| !v.is_finite()) {
-        None => Ok(()),
-        Some(place) => {
-            let (k, c) = (place / K, place % K);
-            let at = mesh.node_place(k);
-            Err(Failure::NonFinite { what: what[c], value: values[k][c], at })
-        }
-    }
-}

@@ -6,7 +6,7 @@ use super::poisson_sides::{Given, finite};
 use super::runner::Stage;
 use crate::error::{Failure, Result, Unfit};
 use crate::formula::Program;
-use crate::geometry::{Mesh, node_areas};
+use crate::geometry::{Mesh, check_finite, node_areas};
 use crate::kept::Kept;
 use crate::laplacian::{Laplacian, Poisson, Stencils, diffusion, unchecked};
 use crate::numerics::{larger, sum};
@@ -137,10 +137,7 @@ impl PoissonStudy {
             SolverKind::Krylov => problem.iterate(&mesh, solved)?,
         };
         seconds.solve = clock.elapsed().as_secs_f64();
-        if let Some(k) = u.iter().position(|u| !u.is_finite()) {
-            let at = mesh.node_place(k);
-            return Err(Failure::NonFinite { what: "the solution", value: u[k], at }.into());
-        }
+        check_finite(["the solution"], &mesh, u.as_chunks().0)?;
         let error = exact.as_ref().map(|exact| PoissonError::of(&mesh, &u, exact));
         Ok(Solved { mesh, u, exact, stencils, error, work, seconds })
     }
