@@ -284,6 +284,9 @@ impl JsonSchema for Conditions {
         ] });
         let mut sides = Schema::default();
         SIDES.as_flattened().iter().for_each(|side| _ = sides.insert(side.to_string(), one.clone().to_value()));
-        json_schema!({ "anyOf": [one, { "type": "object", "properties": sides, "additionalProperties": false }] })
+        json_schema!({ "anyOf": [
+            one,
+            { "type": "object", "properties": sides.to_value(), "additionalProperties": false },
+        ] })
     }
 }
