@@ -50,9 +50,9 @@ fn row(n: usize, viscosity: f64, first: &mut Option<f64>) -> driftmesh::Result<(
     println!(
         "| {n}² | {node:.0} | {:.2} | {:.0} | {:.0} | {:.0} | {:.0} | {:.1} | {:.1} |",
         node / *first.get_or_insert(node),
-        of(spent.mesh - begun.mesh),
-        of(spent.pde - begun.pde),
-        of(spent.monitor - begun.monitor),
+        of(spent.parts.mesh - begun.parts.mesh),
+        of(spent.parts.pde - begun.parts.pde),
+        of(spent.parts.monitor - begun.parts.monitor),
         1e6 * begun.wall / nodes,
         a_step(record.work.work.newton_iterations),
         a_step(record.work.work.linear_iterations),

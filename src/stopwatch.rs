@@ -1,7 +1,22 @@
 //! Time that a run takes.
 
 use cpu_time::ProcessTime;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
+
+/// Seconds that a run took, over all its parts.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub struct Spent<P> {
+    /// Seconds by the clock.
+    pub wall: f64,
+    /// Processor seconds of all threads.
+    pub cpu: f64,
+    /// Seconds by what was computed.
+    #[serde(flatten)]
+    pub parts: P,
+    /// Seconds of watching and writing: progress, history, frames, pictures.
+    pub output: f64,
+}
 
 /// Wall-clock seconds, and processor seconds over all threads.
 pub(crate) struct Stopwatch {

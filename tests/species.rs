@@ -227,7 +227,7 @@ step = 0.05
         x.powi(3) / 3.0 + 0.5 * ((x * x / 3.0 - 2.0 / 27.0) * (3.0 * x).sin() + 2.0 * x / 9.0 * (3.0 * x).cos())
     };
     assert!((total.start / f(0.8) - 1.0).abs() < 1e-3, "{total:?}");
-    let (x, _, values) = run.species.profile(&run.course.state);
+    let (x, _, values) = run.problem.profile(&run.course.state);
     for (x, c) in x.iter().zip(&values[0]).filter(|([x], _)| *x < r) {
         assert!((c / (3.0 * total.content / r.powi(3)) - 1.0).abs() < 1e-3, "c = {c} at {x:?}");
     }

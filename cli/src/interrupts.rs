@@ -2,6 +2,7 @@
 
 use crate::terminal;
 use driftmesh::Result;
+use driftmesh::output::names;
 use driftmesh::simulation::{Event, Observer, Snapshot};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -46,7 +47,7 @@ pub fn outlive_file_limits() {
 pub fn command(standard_input: bool, out: &Path) -> String {
     let mut words = terminal::words();
     if standard_input {
-        let [study, out] = [&out.join("study.toml"), out].map(|path| path.to_string_lossy().into_owned());
+        let [study, out] = [&out.join(names::STUDY), out].map(|path| path.to_string_lossy().into_owned());
         words.truncate(1);
         words.extend(["run".into(), study, "--out".into(), out]);
     }

@@ -3,7 +3,7 @@ use crate::terminal::{self, Status};
 use crate::{StudyArgs, progress::Progress, tables::Told};
 use clap::Args;
 use driftmesh::Error;
-use driftmesh::output::{RunDirectory, Standing};
+use driftmesh::output::{RunDirectory, Standing, names};
 use driftmesh::ranks::Ranks;
 use driftmesh::simulation::Observer;
 use driftmesh::study::{Begin, Finished, Study};
@@ -111,7 +111,9 @@ impl Run {
             {
                 terminal::say(line);
             }
-            terminal::say_files(out, &FILES);
+            let pictures = [("picture", names::MESH), ("front", names::FRONT), ("history", names::CONVERGENCE)];
+            let pictures = pictures.map(|(label, name)| (label, format!("{name}.png")));
+            terminal::say_files(out, pictures.into_iter().chain([("report", names::REPORT.into())]));
             terminal::say(format_args!("run      {}", out.display()));
         }
         match failure {
@@ -142,7 +144,3 @@ fn unrepeated() -> Error {
                 its study: driftmesh run DIR/study.toml --out DIR --resume";
     Error::invalid("--resume", "given with -", rule)
 }
-
-/// Files that are named where they are there.
-const FILES: [(&str, &str); 4] =
-    [("picture", "mesh.png"), ("front", "front.png"), ("history", "convergence.png"), ("report", "report.html")];

@@ -6,7 +6,7 @@ use driftmesh::output::Summary;
 use driftmesh::simulation::Retries;
 use driftmesh::study::{
     EquidistributionStudy, FrontSummary, Kind, LineFigures, MovingFigures, MovingLine, MovingMesh, NumberedIterate,
-    PoissonFigures, PoissonStudy, Running, SpeciesStudy, SpeciesSummary, StefanStudy, UniformEquivalent,
+    PoissonFigures, PoissonStudy, Running, SpeciesReport, SpeciesStudy, StefanStudy, UniformEquivalent,
 };
 
 /// What is said of a run in a few lines.
@@ -132,7 +132,7 @@ impl Told for StefanStudy {
 }
 
 impl Told for SpeciesStudy {
-    fn table(summary: &Summary<SpeciesSummary>) -> String {
+    fn table(summary: &Summary<FrontSummary<SpeciesReport>>) -> String {
         let mut text = String::new();
         if !summary.figures.reports.is_empty() {
             text += "       t     front  velocity   species      content       inflow     consumed  imbalance\n";
@@ -168,7 +168,7 @@ impl Told for SpeciesStudy {
         )
     }
 
-    fn left(summary: &Summary<SpeciesSummary>) -> String {
+    fn left(summary: &Summary<FrontSummary<SpeciesReport>>) -> String {
         last_good(summary.figures.work.steps)
     }
 }

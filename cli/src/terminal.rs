@@ -62,7 +62,7 @@ pub fn ended(code: Status) -> Status {
 }
 
 /// Prints where the files of a run are, those that there are.
-pub fn say_files(out: &Path, files: &[(&str, &str)]) {
+pub fn say_files(out: &Path, files: impl Iterator<Item = (&'static str, String)>) {
     for (label, name) in files {
         let path = out.join(name);
         if path.is_file() {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -152,7 +152,27 @@ class WithCells(Kind):
 
 
 @dataclass(frozen=True)
-class Arclength(MonitorKind):
+class _WithStrength(MonitorKind):
+    """What monitors with a strength α have in common."""
+
+    _strength: ClassVar[float]
+    relative: float | None = None
+    absolute: float | None = None
+    smoothing: int = 2
+    gradient: Literal["central", "log", "safe"] = "central"
+
+    def __post_init__(self) -> None:
+        if self.relative is not None and self.absolute is not None:
+            raise ValueError(f"give `relative` or `absolute`, not both: {self.relative} and {self.absolute}")
+
+    def _table(self) -> dict[str, Any]:
+        relative = self._strength if self.relative is None and self.absolute is None else self.relative
+        strength = {"relative": relative, "absolute": self.absolute}
+        return {"kind": self.kind, "strength": strength, "smoothing": self.smoothing, "gradient": self.gradient}
+
+
+@dataclass(frozen=True)
+class Arclength(_WithStrength):
     """ρ = √(1 + α|∇u|²), smoothed.
 
     Args:
@@ -171,21 +191,11 @@ class Arclength(MonitorKind):
     """
 
     kind = "arclength"
-    relative: float | None = None
-    absolute: float | None = None
-    smoothing: int = 2
-    gradient: Literal["central", "log", "safe"] = "central"
-
-    def __post_init__(self) -> None:
-        _refuse_both(self.relative, self.absolute)
-
-    def _table(self) -> dict[str, Any]:
-        strength = _strength(self.relative, self.absolute, 30.0)
-        return {"kind": self.kind, "strength": strength, "smoothing": self.smoothing, "gradient": self.gradient}
+    _strength = 30.0
 
 
 @dataclass(frozen=True)
-class Curvature(MonitorKind):
+class Curvature(_WithStrength):
     """ρ = (1 + α |H|²)^(1/(d + 4)), smoothed, H being the second derivatives of u in d dimensions.
 
     It spreads the L² error of linear interpolation evenly: cells of width 1/ρ have the same h^(d + 4) |H|². Monitors of
@@ -212,27 +222,7 @@ class Curvature(MonitorKind):
     """
 
     kind = "curvature"
-    relative: float | None = None
-    absolute: float | None = None
-    smoothing: int = 2
-    gradient: Literal["central", "log", "safe"] = "central"
-
-    def __post_init__(self) -> None:
-        _refuse_both(self.relative, self.absolute)
-
-    def _table(self) -> dict[str, Any]:
-        strength = _strength(self.relative, self.absolute, 1.0)
-        return {"kind": self.kind, "strength": strength, "smoothing": self.smoothing, "gradient": self.gradient}
-
-
-def _refuse_both(relative: float | None, absolute: float | None) -> None:
-    if relative is not None and absolute is not None:
-        raise ValueError(f"give `relative` or `absolute`, not both: {relative} and {absolute}")
-
-
-def _strength(relative: float | None, absolute: float | None, default: float) -> dict[str, float | None]:
-    """α as a study writes it."""
-    return {"relative": default if relative is None and absolute is None else relative, "absolute": absolute}
+    _strength = 1.0
 
 
 @dataclass(frozen=True)

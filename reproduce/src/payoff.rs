@@ -74,7 +74,7 @@ impl Method {
     /// Runs it once; none where the run fails.
     fn run(self, task: Task, cells: usize) -> Result<Option<(Run, f64)>> {
         let (MovingRun { record, .. }, failure) = self.study(task, cells)?.compute()?;
-        let spent = record.seconds;
+        let spent = record.seconds.parts;
         let seconds = spent.mesh + spent.pde + spent.monitor + spent.interface;
         let steps = record.work.steps.max(record.work.work.substeps);
         let l_inf = record.reports.last().and_then(|report| report.error).map(|error| error.linf);

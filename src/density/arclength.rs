@@ -1,6 +1,6 @@
-use super::{Density, MAX_SMOOTHING, Monitor, smooth};
+use super::{Density, Monitor, check_smoothing, smooth};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{Mesh, check_length};
+use crate::geometry::{Mesh, check_finite, check_length};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 use schemars::JsonSchema;
@@ -74,10 +74,7 @@ impl Arclength {
     /// [`Error::Invalid`] where the strength is negative or not finite, or the smoothing beyond all reason.
     pub fn check(&self) -> Result<()> {
         self.strength.check()?;
-        if self.smoothing > MAX_SMOOTHING {
-            return Err(Error::invalid("smoothing", self.smoothing, format!("must be at most {MAX_SMOOTHING} passes")));
-        }
-        Ok(())
+        check_smoothing(self.smoothing)
     }
 }
 
@@ -106,12 +103,7 @@ impl<const D: usize> Monitor<D> for Arclength {
         };
         let mut rho: Vec<f64> = slope2.into_iter().map(|s| (1.0 + alpha * s).sqrt()).collect();
         smooth(mesh.lattice(), &mut rho, self.smoothing)?;
-        match rho.iter().position(|r| !r.is_finite()) {
-            None => Ok(rho.into()),
-            Some(k) => {
-                let at = mesh.node_place(k);
-                Err(Failure::NonFinite { what: "the mesh density", value: rho[k], at })
-            }
-        }
+        check_finite(["the mesh density"], mesh, rho.as_chunks().0)?;
+        Ok(rho.into())
     }
 }

@@ -1,6 +1,6 @@
-use super::{Density, MAX_SMOOTHING, Monitor, Strength, smooth};
-use crate::error::{Error, Failure, Result};
-use crate::geometry::{Cells, Mesh, check_length};
+use super::{Density, Monitor, Strength, check_smoothing, smooth};
+use crate::error::{Failure, Result};
+use crate::geometry::{Cells, Mesh, check_finite, check_length};
 use crate::numerics::difference::Metrics;
 use crate::numerics::{larger, sum};
 
@@ -56,13 +56,11 @@ impl Curvature {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the strength is negative or not finite, or the smoothing beyond all reason.
+    /// [`Error::Invalid`](crate::Error::Invalid) where the strength is negative or not finite, or the smoothing beyond
+    /// all reason.
     pub fn check(&self) -> Result<()> {
         self.strength.check()?;
-        if self.smoothing > MAX_SMOOTHING {
-            return Err(Error::invalid("smoothing", self.smoothing, format!("must be at most {MAX_SMOOTHING} passes")));
-        }
-        Ok(())
+        check_smoothing(self.smoothing)
     }
 
     /// α from |H|² at the nodes.
@@ -104,13 +102,8 @@ where
         let alpha = self.alpha::<D>(&areas, &curved2);
         let mut rho: Vec<f64> = curved2.into_iter().map(|h| (1.0 + alpha * h).powf(power::<D>())).collect();
         smooth(mesh.lattice(), &mut rho, self.smoothing)?;
-        match rho.iter().position(|r| !r.is_finite()) {
-            None => Ok(rho.into()),
-            Some(k) => {
-                let at = mesh.node_place(k);
-                Err(Failure::NonFinite { what: "the mesh density", value: rho[k], at })
-            }
-        }
+        check_finite(["the mesh density"], mesh, rho.as_chunks().0)?;
+        Ok(rho.into())
     }
 }
 

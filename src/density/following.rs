@@ -1,5 +1,5 @@
 use super::{Density, Monitor};
-use crate::error::{Error, Failure, Result};
+use crate::error::{Failure, Result};
 use crate::formula::{Formula, Program};
 use crate::geometry::{Field, Mesh};
 
@@ -18,13 +18,7 @@ impl<const D: usize> Following<D> {
     pub fn new(monitor: Box<dyn Monitor<D>>, of: &str, unknowns: &[String]) -> Result<Self> {
         let names = unknowns.iter().map(String::as_str).take(PLACES - 1 - D);
         let variables: Vec<&str> = ["x", "y", "z"].into_iter().take(D).chain(names).chain(["t"]).collect();
-        let formula = Formula::parse(of, &variables).map_err(|mistake| Error::Formula {
-            key: "of".into(),
-            text: of.into(),
-            at: mistake.at,
-            message: mistake.message,
-            help: mistake.help,
-        })?;
+        let formula = Formula::parse(of, &variables).map_err(|mistake| mistake.of("of", of))?;
         Ok(Self { monitor, of: Program::new([&formula]), unknowns: variables.len() - 1 - D })
     }
 }

@@ -1,5 +1,5 @@
-use super::{Density, MAX_SMOOTHING, Monitor, smooth};
-use crate::error::{Error, Failure, Result};
+use super::{Density, Monitor, check_smoothing, smooth};
+use crate::error::{Failure, Result};
 use crate::geometry::{Mesh, check_length, check_positive};
 
 /// The first unknown, or what is followed in its place, is the density itself: a prescribed ρ, or a depth of water
@@ -15,12 +15,9 @@ impl Given {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the smoothing is beyond all reason.
+    /// [`Error::Invalid`](crate::Error::Invalid) where the smoothing is beyond all reason.
     pub fn check(&self) -> Result<()> {
-        if self.smoothing > MAX_SMOOTHING {
-            return Err(Error::invalid("smoothing", self.smoothing, format!("must be at most {MAX_SMOOTHING} passes")));
-        }
-        Ok(())
+        check_smoothing(self.smoothing)
     }
 }
 

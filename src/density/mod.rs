@@ -25,7 +25,7 @@ pub use root_gradient::RootGradient;
 pub use smoothing::smooth;
 pub use tables::{ArclengthTable, CurvatureTable, GivenTable, RootGradientTable};
 
-use crate::error::{Failure, Result};
+use crate::error::{Error, Failure, Result};
 pub use crate::geometry::Density;
 use crate::geometry::{Cells, Field, Mesh};
 use crate::kind::kinds;
@@ -36,6 +36,14 @@ use limited::Limited;
 /// Largest number of passes of the filter over a density that a study may set: more leave nothing of it on any lattice
 /// that fits a machine.
 const MAX_SMOOTHING: usize = 1000;
+
+/// Refuses more passes than these.
+fn check_smoothing(passes: usize) -> Result<()> {
+    match passes <= MAX_SMOOTHING {
+        true => Ok(()),
+        false => Err(Error::invalid("smoothing", passes, format!("must be at most {MAX_SMOOTHING} passes"))),
+    }
+}
 
 /// Where a mesh should be fine, decided from the solution on the mesh it has.
 pub trait Monitor<const D: usize = 2>: Send {
@@ -89,7 +97,7 @@ impl MonitorKind {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`](crate::Error::Invalid).
+    /// [`Error::Invalid`].
     pub fn check(&self) -> Result<()> {
         self.cells().map_or(Ok(()), CellSizes::check)?;
         match self {
@@ -133,7 +141,7 @@ impl MonitorKind {
     /// The monitor for an equation of these unknowns, ready to use.
     ///
     /// # Errors
-    /// [`Error::Formula`](crate::Error::Formula) where `of` is no formula of the unknowns, x, y and t.
+    /// [`Error::Formula`] where `of` is no formula of the unknowns, x, y and t.
     pub fn into_monitor<const D: usize>(self, unknowns: &[String]) -> Result<Box<dyn Monitor<D>>>
     where
         Mesh<D>: Cells<D>,

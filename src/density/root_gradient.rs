@@ -2,7 +2,7 @@ use super::jump::jump;
 use super::need::{Need, bends, between};
 use super::{Density, Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
-use crate::geometry::{Cells, Field, Lattice, Mesh, check_length, dot, strides};
+use crate::geometry::{Cells, Field, Lattice, Mesh, check_finite, check_length, dot, strides};
 use crate::numerics::{ends, larger, sum};
 use std::borrow::Cow;
 
@@ -115,11 +115,7 @@ impl RootGradient {
         }
         let mut axes = axes.into_iter().map(|roots| along(mesh, roots, most, contrast));
         let axes: [Vec<f64>; D] = std::array::from_fn(|_| axes.next().expect("one for each axis"));
-        let bad = |rho: &Vec<f64>| rho.iter().position(|rho| !rho.is_finite()).map(|k| (k, rho[k]));
-        if let Some((k, value)) = axes.iter().find_map(bad) {
-            let at = domain.node_place(k);
-            return Err(Failure::NonFinite { what: "the mesh density", value, at });
-        }
+        axes.iter().try_for_each(|rho| check_finite(["the mesh density"], domain, rho.as_chunks().0))?;
         Ok(Density::of_axes(axes).expect("one value a node each"))
     }
 }

@@ -42,6 +42,7 @@ mod tests;
 pub use program::Program;
 pub use table::{Interpolation, Table, with_tables};
 
+use crate::error::Error;
 use graph::{Graph, Node};
 use std::fmt;
 use std::ops::Range;
@@ -67,6 +68,12 @@ pub struct Mistake {
 }
 
 impl Mistake {
+    /// The error of a setting with this text.
+    pub(crate) fn of(self, key: &str, text: &str) -> Error {
+        let Self { message, at, help } = self;
+        Error::Formula { key: key.into(), text: text.into(), at, message, help }
+    }
+
     fn new(at: Range<usize>, message: impl Into<String>) -> Self {
         Self { message: message.into(), at, help: None }
     }

@@ -1,8 +1,8 @@
 //! Folded cells, in any number of dimensions.
 
-use super::Mesh;
 use super::determinant::determinant;
 use super::lattice::strides;
+use super::{Mesh, check_finite};
 use crate::error::Failure;
 
 /// Refuses a mesh with a node that is not finite or a cell that is folded
@@ -27,11 +27,7 @@ use crate::error::Failure;
 /// # Ok::<(), driftmesh::Error>(())
 /// ```
 pub fn check_unfolded<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
-    if let Some(k) = mesh.x().iter().position(|x| !x.iter().all(|v| v.is_finite())) {
-        let value = mesh.x()[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
-        let at = mesh.node_place(k);
-        return Err(Failure::NonFinite { what: "the mesh", value, at });
-    }
+    check_finite(["the mesh"; D], mesh, mesh.x())?;
     if mesh.chart().is_some() {
         check_unfolded(mesh.parameters())?;
     }

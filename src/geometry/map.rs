@@ -1,7 +1,7 @@
 //! Maps of the unit square into the plane.
 
-use crate::error::{Error, Result};
-use crate::formula::{Formula, Mistake};
+use crate::error::Result;
+use crate::formula::Formula;
 use std::fmt;
 
 /// A smooth map of the unit square into the plane, that is one to one inside.
@@ -55,11 +55,6 @@ impl Map for Turned {
     }
 }
 
-fn mistaken(key: &str, formula: &Formula, mistake: Mistake) -> Error {
-    let Mistake { message, at, help } = mistake;
-    Error::Formula { key: key.into(), text: formula.text().into(), at, message, help }
-}
-
 /// A map given by formulas of two parameters.
 #[derive(Debug)]
 pub struct FormulaMap {
@@ -71,10 +66,10 @@ impl FormulaMap {
     /// The map with these x and y, formulas of the two parameters.
     ///
     /// # Errors
-    /// [`Error::Formula`] where a derivative is too long.
+    /// [`Error::Formula`](crate::Error::Formula) where a derivative is too long.
     pub fn new(x: [Formula; 2]) -> Result<Self> {
         let slope =
-            |d: usize, c: usize| x[c].derivative(d).map_err(|mistake| mistaken(["map.x", "map.y"][c], &x[c], mistake));
+            |d: usize, c: usize| x[c].derivative(d).map_err(|mistake| mistake.of(["map.x", "map.y"][c], x[c].text()));
         let slopes = [[slope(0, 0)?, slope(0, 1)?], [slope(1, 0)?, slope(1, 1)?]];
         Ok(Self { x, slopes })
     }
@@ -103,10 +98,10 @@ impl BetweenCurves {
     /// Between `bottom` and `top`, formulas of x.
     ///
     /// # Errors
-    /// [`Error::Formula`] where a derivative is too long.
+    /// [`Error::Formula`](crate::Error::Formula) where a derivative is too long.
     pub fn new(x: [f64; 2], curves: [Formula; 2]) -> Result<Self> {
         let slope =
-            |c: usize| curves[c].derivative(0).map_err(|mistake| mistaken(["bottom", "top"][c], &curves[c], mistake));
+            |c: usize| curves[c].derivative(0).map_err(|mistake| mistake.of(["bottom", "top"][c], curves[c].text()));
         let slopes = [slope(0)?, slope(1)?];
         Ok(Self { x, curves, slopes })
     }

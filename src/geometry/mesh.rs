@@ -1,4 +1,4 @@
-use super::{Chart, Lattice, lattice::diagonal, lattice::strides, nodal::check_length};
+use super::{Chart, Lattice, lattice::diagonal, lattice::strides, nodal::check_finite, nodal::check_length};
 use crate::error::{Error, Failure, NodePlace, Result};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -201,13 +201,10 @@ impl<const D: usize> Mesh<D> {
     /// the first position that is not finite.
     pub fn moved(&self, x: Vec<[f64; D]>) -> Result<Self, Failure> {
         check_length(&self.lattice, "the mesh", x.len())?;
-        if let Some(k) = x.iter().position(|x| !x.iter().all(|v| v.is_finite())) {
-            let value = x[k].into_iter().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
-            let at = NodePlace::new(self.lattice.node(k), x[k]);
-            return Err(Failure::NonFinite { what: "the mesh", value, at });
-        }
         let Self { lattice, lower, upper, .. } = *self;
-        Ok(Self { lattice, lower, upper, x, charted: None })
+        let moved = Self { lattice, lower, upper, x, charted: None };
+        check_finite(["the mesh"; D], &moved, &moved.x)?;
+        Ok(moved)
     }
 
     /// This mesh on a lattice of other `cells`: the same map from the computational domain, linear between the nodes of

@@ -40,7 +40,7 @@ pub(crate) use lattice::{diagonal, strides};
 pub use map::{BetweenCurves, FormulaMap, Map};
 pub use mesh::Mesh;
 pub(crate) use mesh::first_two;
-pub(crate) use nodal::{check_length, check_positive};
+pub(crate) use nodal::{check_finite, check_length, check_positive};
 pub use patch::Patch;
 pub use points::{Degree, Interpolator, Place};
 pub use quality::Quality;

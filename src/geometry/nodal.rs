@@ -15,6 +15,22 @@ pub(crate) fn check_length<const D: usize>(
     }
 }
 
+/// Refuses values that are not finite, K for each node, by the names of these.
+pub(crate) fn check_finite<const D: usize, const K: usize>(
+    what: [&'static str; K],
+    mesh: &Mesh<D>,
+    values: &[[f64; K]],
+) -> Result<(), Failure> {
+    match values.as_flattened().iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(place) => {
+            let (k, c) = (place / K, place % K);
+            let at = mesh.node_place(k);
+            Err(Failure::NonFinite { what: what[c], value: values[k][c], at })
+        }
+    }
+}
+
 /// Refuses an array whose length is not the number of nodes, and values that are not finite or not above 0.
 pub(crate) fn check_positive<const D: usize>(
     mesh: &Mesh<D>,

@@ -1,4 +1,4 @@
-use super::{Cells, DualCells, Mesh, check_unfolded, padded};
+use super::{Cells, DualCells, Mesh, check_finite, check_unfolded, padded};
 use crate::error::Failure;
 use crate::parallel::map;
 
@@ -105,13 +105,12 @@ where
         });
         (mesh, cells) = (next_mesh, next);
     }
-    let finished = |(u, range): (Vec<f64>, [f64; 2])| match (u.iter().position(|u| !u.is_finite()), unit(range)) {
-        (None, 1.0) => Ok(u),
-        (None, unit) => Ok(u.into_iter().map(|u| (u / unit).clamp(range[0], range[1])).collect()),
-        (Some(k), _) => {
-            let (what, value, at) = ("the carried field", u[k], to.node_place(k));
-            Err(Failure::NonFinite { what, value, at })
-        }
+    let finished = |(u, range): (Vec<f64>, [f64; 2])| {
+        check_finite(["the carried field"], to, u.as_chunks().0)?;
+        Ok(match unit(range) {
+            1.0 => u,
+            unit => u.into_iter().map(|u| (u / unit).clamp(range[0], range[1])).collect(),
+        })
     };
     fields.into_iter().zip(ranges).map(finished).collect()
 }

@@ -1,6 +1,7 @@
 //! Checkpoints: a run that ends early goes on from the last one, to the same bits.
 
 use super::directory::{remove, sync_directory, write_file};
+use super::names;
 use crate::error::{Error, Result, Unfit};
 use crate::kept::encoded;
 use crate::simulation::{Checkpoint, Keeper, Past, Schedule};
@@ -128,18 +129,13 @@ impl Behind {
 }
 
 impl Checkpoints {
-    /// The newest and the one before, written in turns.
-    pub(crate) const NAMES: [&str; 2] = ["checkpoint.0", "checkpoint.1"];
-    /// That after the last step, which stays: from there a run goes on to a later end.
-    pub(crate) const LAST: &str = "final.state";
-
     /// The checkpoints of a run; `study` is the resolved study.
     ///
     /// # Errors
     /// [`Error::Unreadable`] where the study is no TOML.
     pub fn new(directory: &Path, at: CheckpointsAt, study: &str) -> Result<Self> {
         let study = numbers(study)
-            .map_err(|reason| Error::Unreadable { path: directory.join("study.toml"), reason: reason.to_string() })?;
+            .map_err(|reason| Error::Unreadable { path: directory.join(names::STUDY), reason: reason.to_string() })?;
         Ok(Self {
             directory: directory.into(),
             at,
@@ -158,12 +154,12 @@ impl Checkpoints {
             // what is no file may wait for somebody to write
             path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok() && head == MAGIC
         };
-        Self::NAMES.into_iter().any(|name| begins(directory.join(name)))
+        names::CHECKPOINTS.into_iter().any(|name| begins(directory.join(name)))
     }
 
     /// Removes them: the run is over.
     pub(crate) fn remove(&self) -> Result<()> {
-        Self::NAMES.into_iter().try_for_each(|name| remove(&self.directory.join(name)))
+        names::CHECKPOINTS.into_iter().try_for_each(|name| remove(&self.directory.join(name)))
     }
 
     /// Whether one is to be written after a step.
@@ -183,7 +179,7 @@ impl Checkpoints {
         if self.newest.0 == Some(step) {
             return Ok(());
         }
-        self.write_as(Self::NAMES[self.next], step, content)?;
+        self.write_as(names::CHECKPOINTS[self.next], step, content)?;
         self.next = 1 - self.next;
         Ok(())
     }
@@ -194,7 +190,7 @@ impl Checkpoints {
     /// [`Error::Unwritable`].
     pub(crate) fn write_last(&mut self, step: usize, content: &impl Serialize) -> Result<()> {
         if !self.ended {
-            self.write_as(Self::LAST, step, content)?;
+            self.write_as(names::LAST_CHECKPOINT, step, content)?;
             self.ended = true;
         }
         Ok(())
@@ -226,7 +222,7 @@ impl Checkpoints {
     ) -> Result<Option<Resumed<T>>> {
         let mut refused = Vec::new();
         let mut found = Vec::new();
-        for name in Self::NAMES.into_iter().chain([Self::LAST]) {
+        for name in names::CHECKPOINTS.into_iter().chain([names::LAST_CHECKPOINT]) {
             match self.found(name) {
                 Ok(None) => {}
                 Ok(Some(one)) => found.push(one),
@@ -237,7 +233,7 @@ impl Checkpoints {
         for Found { name, behind, content, sealed } in found {
             match decoded(&content).and_then(|content| take_up(content, &behind)) {
                 Ok(taken) => {
-                    self.next = usize::from(name == Self::NAMES[0]);
+                    self.next = usize::from(name == names::CHECKPOINTS[0]);
                     self.newest = (Some(behind.step), Instant::now());
                     let words = |(path, unfit): (PathBuf, Unfit)| {
                         format!("{} was left out: {unfit}; the run went on from {name}", path.display())
@@ -258,7 +254,7 @@ impl Checkpoints {
             Err(error) => Err(Unfit::Damaged(error.to_string())),
             Ok(bytes) => {
                 let sealed = opened(&bytes)?;
-                let (behind, content) = meant(sealed, &self.study, name == Self::LAST)?;
+                let (behind, content) = meant(sealed, &self.study, name == names::LAST_CHECKPOINT)?;
                 Ok(Some(Found { name, behind, content, sealed: sealed.to_vec() }))
             }
         }
@@ -278,7 +274,7 @@ impl Checkpoints {
     /// The file that is to blame, with what is wrong: [`Unfit::Study`] with the first key that differs, or
     /// [`Unfit::Missing`].
     pub(crate) fn behind(&self, text: &str) -> Result<Option<Behind>, (&'static str, Unfit)> {
-        let of_study = |unfit: Unfit| ("study.toml", unfit);
+        let of_study = |unfit: Unfit| (names::STUDY, unfit);
         let was = numbers(text).map_err(|error| of_study(Unfit::Damaged(error.message().into())))?;
         if unlike(&was, &self.study).is_none() {
             return Ok(None);
@@ -286,10 +282,10 @@ impl Checkpoints {
         if let Some(unfit) = unlike(&unended(&was), &unended(&self.study)) {
             return Err(of_study(unfit));
         }
-        match self.found(Self::LAST) {
+        match self.found(names::LAST_CHECKPOINT) {
             Ok(Some(found)) => Ok(Some(found.behind)),
-            Ok(None) => Err((Self::LAST, Unfit::Missing)),
-            Err(unfit) => Err((Self::LAST, unfit)),
+            Ok(None) => Err((names::LAST_CHECKPOINT, Unfit::Missing)),
+            Err(unfit) => Err((names::LAST_CHECKPOINT, unfit)),
         }
     }
 }

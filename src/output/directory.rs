@@ -1,5 +1,5 @@
+use super::{Checkpoints, names};
 use crate::error::{Error, Result};
-use crate::output::Checkpoints;
 use serde::Serialize;
 use std::fs::File;
 use std::io::Write;
@@ -18,47 +18,6 @@ pub struct RunDirectory {
 
 /// Present and locked while a run writes.
 const LOCK: &str = "run.lock";
-
-/// Everything that a run may write, beside its frames.
-const OURS: [&str; 35] = [
-    Checkpoints::LAST,
-    "summary.json",
-    "study.toml",
-    "history.csv",
-    "run.pvd",
-    "compare.pvd",
-    "final.npz",
-    "final.vts",
-    "report.html",
-    "animation.gif",
-    "mesh.png",
-    "mesh.svg",
-    "convergence.png",
-    "convergence.svg",
-    "density.png",
-    "density.svg",
-    "front.csv",
-    "front.png",
-    "front.svg",
-    "error.png",
-    "error.svg",
-    "quality.png",
-    "quality.svg",
-    "contraction.png",
-    "contraction.svg",
-    "temperature.png",
-    "temperature.svg",
-    "energy.png",
-    "energy.svg",
-    "front-error.png",
-    "front-error.svg",
-    "front-position.png",
-    "front-position.svg",
-    "steps.png",
-    "steps.svg",
-];
-/// Folders of frames: of the run, and of the one that it is compared with.
-const FRAMES: [&str; 2] = ["frames", "compare"];
 
 impl RunDirectory {
     /// Refuses a directory that [`RunDirectory::claim`] would refuse, touching nothing.
@@ -104,14 +63,10 @@ impl RunDirectory {
         Ok(Self { path: path.into(), lock })
     }
 
-    /// Tables and frames, which a run adds to as it goes on.
-    const GROWING: [&str; 4] = ["history.csv", "front.csv", "run.pvd", FRAMES[0]];
-
     /// Removes what only a run that ended writes, and leaves checkpoints and what the run adds to.
     pub(crate) fn clear_ended(&self) -> Result<()> {
-        self.clear_but(
-            &[&["summary.json", "study.toml", Checkpoints::LAST], &Self::GROWING[..], &Checkpoints::NAMES].concat(),
-        )
+        let checkpoints = [&names::CHECKPOINTS[..], &[names::LAST_CHECKPOINT]].concat();
+        self.clear_but(&[&[names::SUMMARY, names::STUDY], &names::GROWING[..], &checkpoints].concat())
     }
 
     /// Removes what an earlier run wrote, and nothing else.
@@ -124,17 +79,17 @@ impl RunDirectory {
 
     fn clear_but(&self, keep: &[&str]) -> Result<()> {
         let path = &self.path;
-        let kept = |name: &&str| !keep.contains(name);
-        let folders = FRAMES.into_iter().filter(kept).map(|folder| std::fs::read_dir(path.join(folder)));
-        let frames = folders.flatten().flatten().flatten().map(|entry| entry.path());
-        let old_frames = frames.filter(|frame| is_frame(frame));
-        let files = OURS.into_iter().chain(Checkpoints::NAMES);
-        let parts = files.clone().map(|name| part(&path.join(name)));
-        for old in files.filter(kept).map(|name| path.join(name)).chain(parts).chain(old_frames) {
+        let is_kept = |name: &str| keep.contains(&name);
+        let folders = [names::FRAMES[0], names::COMPARED[0]].into_iter().filter(|folder| !is_kept(folder));
+        let frames = folders.flat_map(|folder| std::fs::read_dir(path.join(folder))).flatten().flatten();
+        let old_frames = frames.map(|entry| entry.path()).filter(|frame| is_frame(frame));
+        let files = names::files().filter(|name| !is_kept(name)).map(|name| path.join(name));
+        let parts = names::files().map(|name| part(&path.join(name)));
+        for old in files.chain(parts).chain(old_frames) {
             remove(&old)?;
         }
         // only an empty folder goes; what is not ours keeps it
-        let _ = std::fs::remove_dir(path.join(FRAMES[1]));
+        let _ = std::fs::remove_dir(path.join(names::COMPARED[0]));
         Ok(())
     }
 
@@ -146,14 +101,14 @@ impl RunDirectory {
     /// How far the run in a directory came.
     pub fn standing(path: &Path) -> Standing {
         let there = |name: &str| path.join(name).exists();
-        if Checkpoints::NAMES.into_iter().any(there) {
+        if names::CHECKPOINTS.into_iter().any(there) {
             return Standing::Unfinished;
         }
         match summary(path) {
             // a run that was killed while it wrote its report has left its lock
             Some(summary) if summary["status"] == "completed" && !there(LOCK) => Standing::Complete,
             // after its last step, or while it goes on behind that to a later end
-            _ if there(Checkpoints::LAST) => Standing::Unfinished,
+            _ if there(names::LAST_CHECKPOINT) => Standing::Unfinished,
             _ => Standing::Nothing,
         }
     }
@@ -184,7 +139,7 @@ impl RunDirectory {
     pub fn write_summary(&self, summary: &impl Serialize) -> Result<()> {
         let mut text = serde_json::to_string_pretty(summary).expect("a summary is plain data");
         text.push('\n');
-        self.write("summary.json", text.as_bytes())
+        self.write(names::SUMMARY, text.as_bytes())
     }
 }
 
@@ -222,14 +177,14 @@ fn wrote(path: &Path) -> bool {
     }
     // study.toml comes second: a disk may have been full then
     summary(path).is_some_and(|summary| {
-        let started = summary["status"] == "running" || path.join("study.toml").is_file();
+        let started = summary["status"] == "running" || path.join(names::STUDY).is_file();
         started && summary["schema"].is_u64() && summary["study"].is_string()
     })
 }
 
 /// `summary.json`, if it can be read.
 fn summary(path: &Path) -> Option<serde_json::Value> {
-    serde_json::from_str(&std::fs::read_to_string(path.join("summary.json")).ok()?).ok()
+    serde_json::from_str(&std::fs::read_to_string(path.join(names::SUMMARY)).ok()?).ok()
 }
 
 /// The name that a file has until it is complete.

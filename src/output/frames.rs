@@ -1,5 +1,5 @@
 use super::directory::is_frame;
-use super::vtu;
+use super::{names, vtu};
 use crate::error::{Error, Result, Unfit};
 use crate::geometry::Lattice;
 use crate::kept::Kept;
@@ -129,12 +129,12 @@ struct KeptFrames {
 impl Frames {
     /// Starts the series in a run directory, of a mesh with this number of subdomains along each axis.
     pub fn create(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Self {
-        Self::named(directory, at, subdomains, ["frames", "run.pvd"])
+        Self::named(directory, at, subdomains, names::FRAMES)
     }
 
     /// Starts the series of the run that this one is compared with: `compare/*.vtu` and `compare.pvd`.
     pub fn of_reference(directory: &Path, at: FramesAt, subdomains: [usize; 2]) -> Self {
-        Self::named(directory, at, subdomains, ["compare", "compare.pvd"])
+        Self::named(directory, at, subdomains, names::COMPARED)
     }
 
     fn named(directory: &Path, at: FramesAt, subdomains: [usize; 2], names: [&'static str; 2]) -> Self {

@@ -1,4 +1,5 @@
 use super::directory::write_file;
+use super::names;
 use crate::error::Result;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use resvg::{tiny_skia, usvg};
@@ -32,7 +33,7 @@ impl Picture {
     /// # Errors
     /// [`Error::Unwritable`](crate::Error::Unwritable).
     pub fn write(&self, directory: &Path, name: &str) -> Result<()> {
-        let [svg, png] = ["svg", "png"].map(|ending| directory.join(format!("{name}.{ending}")));
+        let [svg, png] = names::PICTURE_FORMATS.map(|format| directory.join(format!("{name}.{format}")));
         std::thread::scope(|scope| {
             let svg = scope.spawn(|| write_file(&svg, self.svg.as_bytes()));
             let png = write_file(&png, &self.png);

@@ -1,4 +1,5 @@
 use crate::error::{Error, Result, Unfit};
+use crate::kept::Kept;
 use serde::Serialize;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Its file holds whole rows, also where the run is killed, or the disk full.
 #[derive(Debug)]
-pub(crate) struct Rows {
+pub struct Rows {
     path: PathBuf,
     file: File,
     /// Length of the file.
@@ -32,12 +33,20 @@ impl Rows {
         Self { path: path.into(), file, length, waiting: table(length == 0), unwritten: Vec::new() }
     }
 
-    /// Goes on behind the rows that a checkpoint knows of; later ones are dropped.
+    /// Goes on behind the rows that a checkpoint knows of by the name of their file.
+    ///
+    /// # Errors
+    /// [`Unfit`] where they are not there.
+    pub fn resume(directory: &Path, name: &str, kept: &Kept) -> Result<Self, Unfit> {
+        Self::reopen(&directory.join(name), kept.get(name)?)
+    }
+
+    /// Goes on behind the rows of a file that was `length` bytes long; later ones are dropped.
     ///
     /// # Errors
     /// [`Unfit`] where they are not there.
     pub fn reopen(path: &Path, length: u64) -> Result<Self, Unfit> {
-        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let file = name(path);
         let beside = |reason: String| Unfit::Beside { file: file.clone(), reason };
         let open = || -> std::io::Result<Result<File, Unfit>> {
             let mut rows = File::options().read(true).write(true).open(path)?;
@@ -57,6 +66,21 @@ impl Rows {
         };
         let file = open().unwrap_or_else(|error| Err(beside(error.to_string())))?;
         Ok(Self::of(path, file, length))
+    }
+
+    /// All rows of a file below its heads, which hold numbers only.
+    ///
+    /// # Errors
+    /// [`Unfit`] where they are not there, or hold something else.
+    pub fn numbers(directory: &Path, file: &str) -> Result<Vec<Vec<f64>>, Unfit> {
+        let beside = |reason: String| Unfit::Beside { file: file.into(), reason };
+        let mut rows = csv::Reader::from_path(directory.join(file)).map_err(|error| beside(error.to_string()))?;
+        let row = |row: csv::Result<csv::StringRecord>| -> Result<Vec<f64>, Unfit> {
+            let row = row.map_err(|error| beside(error.to_string()))?;
+            let number = |entry: &str| entry.parse().map_err(|_| beside(format!("{entry:?} is no number")));
+            row.iter().map(number).collect()
+        };
+        rows.records().map(row).collect()
     }
 
     /// Adds a row; the first one of a struct has the names of its fields above it.
@@ -102,6 +126,19 @@ impl Rows {
         self.file.sync_data().map_err(Error::unwritable(&self.path))?;
         Ok(self.length)
     }
+
+    /// Keeps what [`resume`](Self::resume) needs, with all rows on the disk.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn keep(&mut self, kept: &mut Kept) -> Result<()> {
+        kept.put(&name(&self.path), &self.sync()?);
+        Ok(())
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 impl Drop for Rows {

@@ -1,6 +1,7 @@
 use crate::error::{Error, Failure};
 use crate::ranks::Ranks;
-use serde::{Deserialize, Serialize};
+use crate::stopwatch::Spent;
+use serde::Serialize;
 
 /// `summary.json`: what runs of all kinds of studies say, and the figures of one kind.
 #[derive(Debug, Clone, Serialize)]
@@ -71,20 +72,6 @@ pub enum Ended {
     Error(Failed),
     /// `failure`, of kinds whose `error` is, or could be taken for, an error of the solution.
     Failure(Failed),
-}
-
-/// Seconds that a run took, over all its parts.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub struct Spent<P> {
-    /// Seconds by the clock.
-    pub wall: f64,
-    /// Processor seconds of all threads.
-    pub cpu: f64,
-    /// Seconds by what was computed.
-    #[serde(flatten)]
-    pub parts: P,
-    /// Seconds of watching and writing: progress, history, frames, pictures.
-    pub output: f64,
 }
 
 /// A failure in `summary.json`.

@@ -2,13 +2,11 @@
 
 use super::finite_volumes::{Crossing, FiniteVolumes, Law};
 use super::prescribed::evaluate;
-use super::{
-    BurgersFlux, FormulaPde, Motion, Physics, Prescribed, StartAndSide, Stepper, check_finite, formula, nodal,
-};
+use super::{BurgersFlux, FormulaPde, Motion, Physics, Prescribed, StartAndSide, Stepper, formula, nodal};
 use crate::elementary::exp;
 use crate::error::{Error, Failure, Result};
 use crate::formula::Program;
-use crate::geometry::{DualCells, Field, Mesh};
+use crate::geometry::{DualCells, Field, Mesh, check_finite};
 use crate::kind::kinds;
 use crate::numerics::linear::RobustLine;
 use crate::work::Work;

@@ -25,8 +25,8 @@ pub(crate) use sides::SIDES;
 pub use sides::{Condition, Conditions};
 pub use uniform::UniformBurgers;
 
-use crate::error::{Error, Failure, Result};
-use crate::formula::{Formula, Mistake};
+use crate::error::{Failure, Result};
+use crate::formula::Formula;
 use crate::geometry::{Cells, Field, Mesh, node_areas};
 use crate::kind::kinds;
 use crate::numerics::sum;
@@ -193,7 +193,7 @@ impl PdeKind {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] or [`Error::Formula`].
+    /// [`Error::Invalid`](crate::Error::Invalid) or [`Error::Formula`](crate::Error::Formula).
     pub fn check(&self) -> Result<()> {
         match self {
             Self::Burgers(burgers) => burgers.check(),
@@ -257,19 +257,14 @@ pub struct StartAndSide<'a> {
 /// Parses a formula of place, in D dimensions, and time: of x, y and t, or of x and t.
 ///
 /// # Errors
-/// [`Error::Formula`] with the key.
+/// [`Error::Formula`](crate::Error::Formula) with the key.
 pub fn formula<const D: usize>(key: &str, text: &str) -> Result<Formula> {
     let names: Vec<&str> = AXES[..D].iter().copied().chain(["t"]).collect();
-    Formula::parse(text, &names).map_err(|mistake| mistaken(key, text, mistake))
+    Formula::parse(text, &names).map_err(|mistake| mistake.of(key, text))
 }
 
 /// Names of the axes in formulas.
 const AXES: [&str; 2] = ["x", "y"];
-
-fn mistaken(key: &str, text: &str, mistake: Mistake) -> Error {
-    let Mistake { message, at, help } = mistake;
-    Error::Formula { key: key.into(), text: text.into(), at, message, help }
-}
 
 /// The values of a solution at the start of a step, K for each node. Solution and both meshes must have the same
 /// lattice.
@@ -283,20 +278,4 @@ fn nodal<'a, const D: usize, const K: usize>(motion: Motion<'_, D>, u: &'a Field
         return Err(Failure::WrongLength { what: "the solution", found: nodes.len(), expected });
     }
     Ok(nodes)
-}
-
-/// Refuses values that are not finite.
-fn check_finite<const D: usize, const K: usize>(
-    what: [&'static str; K],
-    mesh: &Mesh<D>,
-    values: &[[f64; K]],
-) -> Result<(), Failure> {
-    match values.as_flattened().iter().position(|v| !v.is_finite()) {
-        None => Ok(()),
-        Some(place) => {
-            let (k, c) = (place / K, place % K);
-            let at = mesh.node_place(k);
-            Err(Failure::NonFinite { what: what[c], value: values[k][c], at })
-        }
-    }
 }

@@ -37,7 +37,7 @@ impl Prescribed {
         match (&self.u, &self.rho) {
             (Some(u), None) => {
                 let f = formula::<D>("u", u)?;
-                let slopes = (0..D).map(|d| f.derivative(d).map_err(|mistake| super::mistaken("u", u, mistake)));
+                let slopes = (0..D).map(|d| f.derivative(d).map_err(|mistake| mistake.of("u", u)));
                 let slopes: Vec<Formula> = slopes.collect::<Result<_>>()?;
                 let gradient = Program::new(std::array::from_fn(|d| &slopes[d]));
                 Ok(PrescribedField::Solution { u: Program::new([&f]), gradient })

@@ -1,6 +1,6 @@
 //! What holds on the sides of the domain for an equation given by formulas.
 
-use super::{AXES, formula, mistaken};
+use super::{AXES, formula};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
 use crate::setting::Text;
@@ -161,8 +161,8 @@ impl Flux {
     fn read<const D: usize>(key: &str, text: &str, unknowns: &[String]) -> Result<Self> {
         let names: Vec<&str> =
             AXES[..D].iter().copied().chain(unknowns.iter().map(String::as_str)).chain(["t"]).collect();
-        let value = Formula::parse(text, &names).map_err(|mistake| mistaken(key, text, mistake))?;
-        let slope = |c| value.derivative(D + c).map_err(|mistake| mistaken(key, text, mistake));
+        let value = Formula::parse(text, &names).map_err(|mistake| mistake.of(key, text))?;
+        let slope = |c| value.derivative(D + c).map_err(|mistake| mistake.of(key, text));
         let slopes = (0..unknowns.len()).map(slope).collect::<Result<_>>()?;
         Ok(Self { value, slopes })
     }
@@ -282,8 +282,11 @@ impl JsonSchema for Conditions {
             text,
             flux,
         ] });
-        let sides: serde_json::Map<String, serde_json::Value> =
-            SIDES.as_flattened().iter().map(|side| (side.to_string(), one.clone().to_value())).collect();
-        json_schema!({ "anyOf": [one, { "type": "object", "properties": sides, "additionalProperties": false }] })
+        let mut sides = Schema::default();
+        SIDES.as_flattened().iter().for_each(|side| _ = sides.insert(side.to_string(), one.clone().to_value()));
+        json_schema!({ "anyOf": [
+            one,
+            { "type": "object", "properties": sides.to_value(), "additionalProperties": false },
+        ] })
     }
 }

@@ -2,7 +2,7 @@ use super::files::RunFiles;
 use super::frame::Frame;
 use super::viewer::clock;
 use crate::error::{Error, Result};
-use crate::output::{COLOURS, Canvas, Curve, Figure, Picture, Scale, svg, write_file};
+use crate::output::{COLOURS, Canvas, Curve, Figure, Picture, Scale, names, svg, write_file};
 use crate::simulation::{Scene, Values};
 use gif::{Encoder, Repeat};
 use std::collections::HashMap;
@@ -32,7 +32,7 @@ const FRONT: [[u8; 3]; 2] = [[213, 94, 0], [234, 174, 128]];
 
 /// Writes `animation.gif`: the mesh over the first unknown, with the same colours in all frames.
 pub fn write(run: &mut RunFiles) -> Result<()> {
-    let path = run.directory.join("animation.gif");
+    let path = run.directory.join(names::ANIMATION);
     let count = run.series[0].frames.len();
     let shown: Vec<usize> = (0..count).step_by(count.div_ceil(MOST).max(1)).chain(count.checked_sub(1)).collect();
     let mut places = shown;
@@ -110,7 +110,7 @@ pub fn still(run: &mut RunFiles) -> Result<()> {
     }
     let frames = run.frames(0, &[last]);
     let picture = drawing(run, &frames).map(|draw| Picture::of(&draw(&frames[0]), &mut Canvas::default()));
-    picture.map_or(Ok(()), |picture| picture.write(&run.directory, "mesh"))
+    picture.map_or(Ok(()), |picture| picture.write(&run.directory, names::MESH))
 }
 
 /// Draws the first field over a line, through all nodes.

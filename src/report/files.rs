@@ -1,6 +1,6 @@
 use super::frame::{Frame, attribute};
 use crate::error::{Error, Result};
-use crate::output::{Checkpoints, RunDirectory, Standing};
+use crate::output::{Checkpoints, RunDirectory, Standing, names};
 use crate::parallel::map;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ impl RunFiles {
     /// Reads everything but the frames.
     pub fn read(directory: &Path) -> Result<Self> {
         let not_a_run = |reason: String| Error::NotARun { path: directory.into(), reason };
-        let text = match std::fs::read_to_string(directory.join("summary.json")) {
+        let text = match std::fs::read_to_string(directory.join(names::SUMMARY)) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound && directory.is_dir() => {
                 return Err(not_a_run("it has no summary.json".into()));
@@ -55,7 +55,7 @@ impl RunFiles {
             Err(error) => return Err(not_a_run(format!("its summary.json cannot be read: {error}"))),
         };
         let mut notes = Vec::new();
-        let study_text = std::fs::read_to_string(directory.join("study.toml")).unwrap_or_else(|error| {
+        let study_text = std::fs::read_to_string(directory.join(names::STUDY)).unwrap_or_else(|error| {
             notes.push(format!("study.toml is left out: {error}"));
             String::new()
         });
@@ -63,8 +63,8 @@ impl RunFiles {
             notes.push("study.toml is no TOML file".into());
             toml::Table::new()
         });
-        let history = history(&directory.join("history.csv"), &mut notes);
-        let series = ["run.pvd", "compare.pvd"].map(|name| Series::read(&directory.join(name)));
+        let history = history(&directory.join(names::HISTORY), &mut notes);
+        let series = [names::FRAMES, names::COMPARED].map(|[_, index]| Series::read(&directory.join(index)));
         if study.contains_key("compare") && series[1].frames.is_empty() {
             notes.push("the mesh of [compare] is not here: it is computed after the run itself".into());
         }

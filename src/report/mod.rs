@@ -10,7 +10,7 @@ mod tables;
 mod viewer;
 
 use crate::error::Result;
-use crate::output::{Canvas, Picture, write_file};
+use crate::output::{Canvas, Picture, names, write_file};
 use crate::parallel::join;
 use files::RunFiles;
 use std::path::{Path, PathBuf};
@@ -68,7 +68,7 @@ fn of(mut run: RunFiles, directory: &Path) -> Result<Built> {
         animation::write(&mut run)?;
     }
     let html = page::render(&run, drawn, viewer.as_ref());
-    let path = directory.join("report.html");
+    let path = directory.join(names::REPORT);
     write_file(&path, html.as_bytes())?;
     Ok(Built { path, bytes: html.len(), notes: run.notes })
 }

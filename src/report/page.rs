@@ -1,6 +1,7 @@
 use super::files::RunFiles;
 use super::tables::{self, Part, Table};
 use super::viewer::Viewer;
+use crate::output::names;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use minijinja::Environment;
 use serde::Serialize;
@@ -134,10 +135,10 @@ fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
     // that of a line shows the paths of its nodes
     let line = run.word("kind") == "equidistribution";
     let candidates = [
-        ("mesh", if line { "The nodes" } else { "The mesh" }, line || !viewed),
-        ("density", "The density", true),
-        ("convergence", "Convergence", true),
-        ("front", "The front over time", true),
+        (names::MESH, if line { "The nodes" } else { "The mesh" }, line || !viewed),
+        (names::DENSITY, "The density", true),
+        (names::CONVERGENCE, "Convergence", true),
+        (names::FRONT, "The front over time", true),
     ];
     let formats = [("svg", "image/svg+xml"), ("png", "image/png")];
     let picture = |(name, title, wanted): (&str, &'static str, bool)| {
@@ -147,7 +148,7 @@ fn pictures(run: &RunFiles, viewed: bool) -> Vec<Shown> {
             let bytes = small.then(|| std::fs::read(&path).ok()).flatten()?;
             Some(Shown {
                 title,
-                mapped: !line && ["mesh", "front"].contains(&name),
+                mapped: !line && [names::MESH, names::FRONT].contains(&name),
                 source: format!("data:{mime};base64,{}", STANDARD.encode(bytes)),
             })
         })

@@ -160,3 +160,12 @@ fn curve(name: &str, t: &Column, column: &Column, scale: Scale) -> Curve {
     }
     Curve { name: name.into(), points, plain: true, ..Curve::default() }.outlined()
 }
+
+#[cfg(test)]
+mod tests {
+    /// Of other names a plot would stay when another run replaces this one.
+    #[test]
+    fn plots_are_among_the_pictures_of_a_run() {
+        super::GROUPS.iter().for_each(|group| assert!(crate::output::names::PICTURES.contains(&group.name)));
+    }
+}

@@ -1,6 +1,6 @@
+use super::Record;
 use super::checkpoint::Course;
-use super::{Record, Seconds};
-use crate::stopwatch::Stopwatch;
+use crate::stopwatch::{Spent, Stopwatch};
 
 /// The time that a run takes, over all its parts.
 pub(super) struct Clock {
@@ -12,7 +12,7 @@ pub(super) struct Clock {
 impl Clock {
     pub fn start(course: Option<&Course>, record: &Record) -> Self {
         let before = course.map_or(0.0, |course| course.seconds);
-        let Seconds { wall, cpu, .. } = record.seconds;
+        let Spent { wall, cpu, .. } = record.seconds;
         Self { all: Stopwatch::start().after([wall, cpu]), steps: Stopwatch::start().after([before, 0.0]) }
     }
 
@@ -23,6 +23,6 @@ impl Clock {
     /// The record with the time up to now.
     pub fn counted(&self, record: &Record) -> Record {
         let [wall, cpu] = self.all.elapsed();
-        Record { seconds: Seconds { wall, cpu, ..record.seconds }, ..record.clone() }
+        Record { seconds: Spent { wall, cpu, ..record.seconds }, ..record.clone() }
     }
 }

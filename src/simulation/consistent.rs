@@ -24,7 +24,7 @@ where
         if !instantaneous.contains(&true) {
             return;
         }
-        let (count, dt) = (state.u.components(), MOMENT * (self.schedule.end() - self.schedule.start()));
+        let (count, dt) = (state.u.components(), MOMENT * self.schedule.span());
         let mut u = state.u.clone();
         for _ in 0..ROUNDS {
             let motion = Motion { t: state.t, dt, old: &state.mesh, new: &state.mesh };

@@ -75,7 +75,7 @@ impl Coupling {
     where
         Mesh<D>: Cells<D>,
     {
-        let seconds = &mut record.seconds;
+        let seconds = &mut record.seconds.parts;
         let (mut retries, mut work, mut parts) = (Retries::default(), Work::default(), stride.parts);
         let mut moved = timed(&mut seconds.mesh, || mover.relax(predicted, rho, stride, &mut retries));
         while let (true, Ok(coarse)) = (self.doubles() && 2 * parts <= self.mesh_steps, &moved) {
@@ -152,7 +152,8 @@ where
     let mut interface: Option<Interface> = None;
     let mut rho = state.rho.clone();
     let followed = state.u.values().to_vec();
-    let predicted = timed(&mut record.seconds.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
+    let predicted =
+        timed(&mut record.seconds.parts.mesh, || mover.predict(&state.mesh, &state.gait, &followed, stride))?;
     // a mesh whose way nobody has set goes no faster than is good for the solution
     let guarded = mover.equation.relaxation == Relaxation::Auto && !physics.is_given();
     type Round<const D: usize> = (Mesh<D>, Field, Option<Vec<f64>>, Density, Way);
@@ -167,7 +168,7 @@ where
             false => (moved.mesh, Way::WHOLE),
         };
         let motion = Motion { t: state.t, dt, old: &state.mesh, new: &mesh };
-        let seconds = &mut record.seconds;
+        let seconds = &mut record.seconds.parts;
         let (u, cost, errors) = timed(&mut seconds.pde, || stepped(physics.as_mut(), motion, &state.u, estimated))?;
         work += cost;
         rho = timed(&mut seconds.monitor, || density(physics.as_ref(), monitor.as_ref(), t, &mesh, &u))?;
@@ -196,7 +197,7 @@ where
     Mesh<D>: Cells<D>,
 {
     let from = &predicted.mesh;
-    let way = journey::allowed(state, from, &mesh, dt, schedule.end() - schedule.start());
+    let way = journey::allowed(state, from, &mesh, dt, schedule.span());
     if way.share == 1.0 {
         return (mesh, way);
     }

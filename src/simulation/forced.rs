@@ -95,7 +95,7 @@ impl Forced {
         if self.most.is_empty() {
             return None;
         }
-        let run = simulation.schedule.end() - simulation.schedule.start();
+        let run = simulation.schedule.span();
         let missed = Missed::in_step(simulation, before, after, run);
         let unknowns = self.most.len();
         let extent = before.mesh.extent().into_iter().fold(0.0, f64::max);

@@ -22,13 +22,14 @@ mod schedule;
 mod shocks;
 mod warnings;
 
+pub use crate::stopwatch::Spent;
 pub use benefit::Benefit;
 pub(crate) use checkpoint::{Checkpoint, Course, Keeper};
 pub use conserved::{Amount, Conserved};
 use coupling::Advanced;
 pub use coupling::Coupling;
 pub use observer::{Event, Moving, Observer, Snapshot};
-pub use record::{ErrorNorms, Record, Report, Seconds, WorkTotal};
+pub use record::{ErrorNorms, MovingParts, Record, Report, WorkTotal};
 pub use safety::{Retries, Safety};
 pub use scene::{Scene, Values};
 pub(crate) use schedule::Past;
@@ -257,7 +258,7 @@ where
 
     /// What the loop carries from step to step, before the first.
     fn begin(&mut self, state: &State<D>, at_start: AtStart, record: &mut Record) -> Result<Course> {
-        timed(&mut record.seconds.pde, || {
+        timed(&mut record.seconds.parts.pde, || {
             let (mut pace, forced) = (Pace::new(self, state)?, Forced::of(self, state));
             pace.foresee(forced.sizes(&state.mesh));
             Ok(Course { at_start, pace, forced, seconds: 0.0 })
@@ -275,7 +276,7 @@ where
         let moment = Some(Moment { t, step: state.step + 1 });
         let next = course.pace.step(self, state, (t, dt), record);
         let Some(next) = next.map_err(|failure| Error::Failed { failure, moment })? else { return Ok(None) };
-        let hidden = timed(&mut record.seconds.pde, || course.forced.hidden(self, state, &next.state));
+        let hidden = timed(&mut record.seconds.parts.pde, || course.forced.hidden(self, state, &next.state));
         match hidden {
             Some(_) if course.pace.shorten(dt) => {
                 record.work.rejected_steps += 1;
@@ -345,7 +346,7 @@ where
             step: state.step,
             dt,
             steps: self.schedule.steps(),
-            share: (state.t - self.schedule.start()) / (self.schedule.end() - self.schedule.start()),
+            share: self.schedule.share(state.t),
             smallest: quality.min_scaled_jacobian,
             seconds: clock.seconds(),
             nodes: in_plane(&state.mesh).map_or(&[], Mesh::x),

@@ -207,7 +207,7 @@ impl Free {
         if let Some(first) = first {
             return Ok(free(first, first));
         }
-        let longest = (simulation.schedule.end() - simulation.schedule.start()) / FEWEST;
+        let longest = simulation.schedule.span() / FEWEST;
         let mut trial = TRIAL * longest;
         let mut number = 1;
         loop {

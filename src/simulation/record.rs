@@ -3,7 +3,7 @@
 use super::{Benefit, Conserved, Retries};
 use crate::geometry::{Comparison, Quality};
 use crate::meshing::Interface;
-use crate::stopwatch::Stopwatch;
+use crate::stopwatch::{Spent, Stopwatch};
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub struct Record {
     /// How far nodes went: the sum over all steps of the longest way of a node.
     pub travelled: f64,
     /// Where the time went.
-    pub seconds: Seconds,
+    pub seconds: Spent<MovingParts>,
     /// One report for each time asked for.
     pub reports: Vec<Report>,
     /// What the last step knows about the interfaces between subdomains.
@@ -38,23 +38,17 @@ impl Record {
     }
 }
 
-/// Seconds by part.
+/// Seconds of a moving mesh, by part.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub struct Seconds {
-    /// Seconds by the clock.
-    pub wall: f64,
-    /// Processor seconds of all threads.
-    pub cpu: f64,
-    /// Seconds of computing the density.
+pub struct MovingParts {
+    /// Computing the density.
     pub monitor: f64,
-    /// Seconds of estimating interface values.
+    /// Estimating interface values.
     pub interface: f64,
-    /// Seconds of solving the mesh equation, `interface` not included.
+    /// Solving the mesh equation, `interface` not included.
     pub mesh: f64,
-    /// Seconds of solving the physics.
+    /// Solving the physics.
     pub pde: f64,
-    /// Seconds of observers: history, frames, progress.
-    pub output: f64,
 }
 
 /// Steps and their cost.

@@ -172,6 +172,16 @@ impl Schedule {
         self.intervals.last().map_or(self.start, |i| i.0)
     }
 
+    /// Length of the run, end − start.
+    pub fn span(&self) -> f64 {
+        self.end() - self.start
+    }
+
+    /// The share of the run that is done at time t, (t − start)/(end − start).
+    pub fn share(&self, t: f64) -> f64 {
+        (t - self.start) / self.span()
+    }
+
     /// Number of steps; none where the solution decides.
     pub fn steps(&self) -> Option<usize> {
         (!self.is_automatic()).then(|| self.intervals.last().map_or(0, |i| i.1))

@@ -19,7 +19,7 @@ mod step;
 
 pub use names::Names;
 pub use rate::Rate;
-pub use step::{SpeciesAttempt, SpeciesState, Total};
+pub use step::{SpeciesState, Total};
 
 use crate::physics::Coordinates;
 

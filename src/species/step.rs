@@ -49,18 +49,6 @@ pub struct SpeciesState {
     pub totals: Vec<Total>,
 }
 
-/// What a step comes to.
-#[derive(Debug, Clone)]
-pub struct SpeciesAttempt {
-    /// The state after it.
-    pub state: SpeciesState,
-    /// Its cost.
-    pub work: Work,
-    /// Its estimated error: the larger one of the fronts', as a share of the line, and of the concentrations', as
-    /// shares of the largest ones.
-    pub error: f64,
-}
-
 impl Species {
     /// The state at the start, with fronts at these places.
     ///
@@ -90,7 +78,9 @@ impl Species {
     /// v¹ = vⁿ + d Δt v'(tⁿ + d Δt, v¹)      v* = vⁿ + (1/d − 1)(v¹ − vⁿ)      vⁿ⁺¹ = v* + d Δt v'(tⁿ⁺¹, vⁿ⁺¹)
     /// ```
     ///
-    /// with d = 1 − 1/√2, where v are the amounts in the cells and the volumes up to the faces.
+    /// with d = 1 − 1/√2, where v are the amounts in the cells and the volumes up to the faces. Returns the state, the
+    /// cost, and the estimated error: the larger one of the fronts', as a share of the line, and of the
+    /// concentrations', as shares of the largest ones.
     ///
     /// # Errors
     /// [`Failure::NewtonStalled`](crate::Failure::NewtonStalled), [`LinearStalled`](crate::Failure::LinearStalled),
@@ -98,7 +88,7 @@ impl Species {
     ///
     /// # Source
     /// Alexander, *Diagonally implicit Runge–Kutta methods for stiff ODEs*, SIAM J. Numer. Anal. 14 (1977).
-    pub fn attempt(&self, state: &SpeciesState, t: f64) -> Result<SpeciesAttempt> {
+    pub fn attempt(&self, state: &SpeciesState, t: f64) -> Result<(SpeciesState, Work, f64)> {
         let mut work = Work::default();
         let (from, whole) = (state.t, t - state.t);
         let dt = IMPLICIT * whole;
@@ -121,7 +111,7 @@ impl Species {
         let contents = self.contents(&z, t);
         totals.iter_mut().zip(contents).for_each(|(total, content)| total.content = content);
         let error = self.error([&state.z, &middle, &z]);
-        Ok(SpeciesAttempt { state: SpeciesState { t, step: state.step + 1, z, totals }, work, error })
+        Ok((SpeciesState { t, step: state.step + 1, z, totals }, work, error))
     }
 
     /// By how much the end of a step differs from the straight line through its start and its middle, less what the

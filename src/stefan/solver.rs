@@ -154,13 +154,13 @@ impl FrontState {
 
 /// What a step comes to.
 #[derive(Debug, Clone)]
-pub struct Attempt {
+pub struct Attempt<S = FrontState> {
     /// The state after it.
-    pub state: FrontState,
+    pub state: S,
     /// Its cost.
     pub work: Work,
-    /// Of an implicit step its estimated error: the larger one of the front's, as a share of its distance from the
-    /// nearer wall, and of the temperature's, as a share of its range.
+    /// Its estimated error, where there is one: of an implicit step of a [`Front`] the larger one of the front's, as a
+    /// share of its distance from the nearer wall, and of the temperature's, as a share of its range.
     pub error: Option<f64>,
     /// A phase that has appeared or vanished.
     pub event: Option<PhaseEvent>,

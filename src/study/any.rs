@@ -4,7 +4,7 @@ use super::{
     EquidistributionStudy, Header, MovingLine, MovingMesh, PoissonStudy, Source, SpeciesStudy, StefanStudy, StudyKind,
 };
 use crate::error::{Act, Error, Failure, Result, Unfit};
-use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing};
+use crate::output::{Checkpoints, CheckpointsAt, RunDirectory, Standing, names};
 use crate::simulation::{Observer, Schedule};
 use schemars::generate::SchemaSettings;
 use serde::Deserialize;
@@ -140,7 +140,7 @@ impl Study {
         if standing != Standing::Complete {
             return Ok(standing);
         }
-        let path = directory.join("study.toml");
+        let path = directory.join(names::STUDY);
         let text = std::fs::read_to_string(&path)
             .map_err(|error| Error::Unreadable { path: path.clone(), reason: error.to_string() })?;
         let checkpoints = Checkpoints::new(directory, CheckpointsAt::default(), &self.to_toml())?;
@@ -149,7 +149,7 @@ impl Study {
             None => Ok(Standing::Complete),
             Some(behind) => {
                 let followed = behind.followed_by(self.schedule()?.as_mut());
-                followed.map(|_| Standing::Shorter).map_err(|unfit| refused(("study.toml", unfit)))
+                followed.map(|_| Standing::Shorter).map_err(|unfit| refused((names::STUDY, unfit)))
             }
         }
     }

@@ -1,13 +1,13 @@
 //! Studies of kind `stefan`: what is refused, what is doubtful, and what runs.
 
-use super::common::{Header, Output, StudyKind};
-use super::data::DataTables;
+use super::common::StudyKind;
 use super::front_given::Given;
-use super::front_run::{FrontCourse, FrontRun};
+use super::front_run::{FrontRun, TwoPhase};
 use super::front_start;
-use super::kind::Kind;
+use super::kind::{Kind, common_tables};
 use super::mapped::{Ends, check_between, parse};
 use super::stefan::{ExactKind, StefanStudy};
+use super::time_loop::FrontCourse;
 use crate::error::{Error, Failure, Result};
 use crate::laplacian::Laplacian;
 use crate::simulation::Schedule;
@@ -23,17 +23,7 @@ impl Kind for StefanStudy {
 
     const KIND: StudyKind = StudyKind::Stefan;
 
-    fn common(&self) -> (&Header, &Output) {
-        (&self.study, &self.output)
-    }
-
-    fn data(&self) -> &DataTables {
-        &self.data
-    }
-
-    fn data_mut(&mut self) -> &mut DataTables {
-        &mut self.data
-    }
+    common_tables!();
 
     /// Refuses a start that no run can begin with, too.
     fn resolve(&mut self) -> Result<()> {
@@ -48,7 +38,7 @@ impl Kind for StefanStudy {
     }
 
     fn warnings(&self) -> Result<Vec<String>> {
-        let FrontRun { front, given, course: FrontCourse { state, .. }, .. } = &self.begin()?;
+        let FrontRun { problem: TwoPhase { front, given }, course: FrontCourse { state, .. }, .. } = &self.begin()?;
         if let Given::Exact(..) = given {
             return Ok(self.crosses_walls(front, given, state).into_iter().collect());
         }
@@ -132,7 +122,7 @@ impl Kind for StefanStudy {
         self.check_undercooling(&front, &state)?;
         let frames = self.output.frames_of(&schedule)?;
         self.output.check()?;
-        Ok(FrontRun::of(&self.study.name, front, given, (state, schedule), frames))
+        Ok(FrontRun::of(&self.study.name, TwoPhase { front, given }, (state, schedule), frames))
     }
 }
 

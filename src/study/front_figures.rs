@@ -1,34 +1,38 @@
-//! Studies of kind `stefan`: what a run finds, and the tables that it leaves.
+//! Studies of kind `stefan`: what a run finds, and the rows of its tables.
 
-use crate::error::{Result, Unfit};
+use super::fronts::Progress;
 use crate::geometry::Quality;
-use crate::kept::Kept;
-use crate::output::{Figures, Rows};
+use crate::output::Figures;
 use crate::simulation::WorkTotal;
 use crate::stefan::{Front, FrontState, PhaseEvent, Problem};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
-/// What `summary.json` says of a front.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct FrontSummary {
+/// What `summary.json` says of fronts, with reports of type `R`.
+#[derive(Debug, Clone, Serialize)]
+pub struct FrontSummary<R = FrontReport> {
     /// Steps and their cost.
     pub work: WorkTotal,
     /// One entry for each time of `time.report` that was reached.
-    pub reports: Vec<FrontReport>,
+    pub reports: Vec<R>,
     /// Phases that have appeared or vanished.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseEvent>,
 }
 
-/// Seconds of a front, by part.
+/// Seconds of fronts, by part.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct FrontParts {
-    /// Moving the front and solving the heat equation.
+    /// Moving the fronts and solving the equations between them.
     pub pde: f64,
 }
 
-impl Figures for FrontSummary {
+impl<R> Default for FrontSummary<R> {
+    fn default() -> Self {
+        Self { work: WorkTotal::default(), reports: Vec::new(), phases: Vec::new() }
+    }
+}
+
+impl<R: Clone + Serialize> Figures for FrontSummary<R> {
     type Parts = FrontParts;
 }
 
@@ -137,9 +141,8 @@ impl Row {
     pub fn of(
         report: &FrontReport,
         temperatures: [f64; 4],
-        dt: f64,
         quality: Quality,
-        (newton_iterations, seconds): (usize, f64),
+        Progress { dt, newton_iterations, seconds }: Progress,
     ) -> Self {
         let [temperature_min, temperature_max, bottom_temperature, top_temperature] = temperatures;
         Self {
@@ -163,56 +166,5 @@ impl Row {
             newton_iterations,
             seconds,
         }
-    }
-}
-
-/// `history.csv` and `front.csv`.
-pub(super) struct Tables {
-    history: Rows,
-    fronts: Rows,
-}
-
-impl Tables {
-    const NAMES: [&str; 2] = ["history.csv", "front.csv"];
-
-    pub fn create(directory: &Path, x: &[f64]) -> Result<Self> {
-        let [history, fronts] = Self::NAMES.map(|name| Rows::create(&directory.join(name)));
-        let mut tables = Self { history: history?, fronts: fronts? };
-        let heads = ["t".to_string()].into_iter().chain(x.iter().map(|x| format!("x={x}")));
-        tables.fronts.add(heads.collect::<Vec<_>>())?;
-        Ok(tables)
-    }
-
-    /// Goes on behind the rows that a checkpoint knows of.
-    pub fn resume(directory: &Path, kept: &Kept) -> Result<Self, Unfit> {
-        let [history, fronts] = Self::NAMES.map(|name| Rows::reopen(&directory.join(name), kept.get(name)?));
-        Ok(Self { history: history?, fronts: fronts? })
-    }
-
-    /// Every front so far, behind its time.
-    pub fn fronts(directory: &Path) -> Result<Vec<Vec<f64>>, Unfit> {
-        let file = Self::NAMES[1];
-        let beside = |reason: String| Unfit::Beside { file: file.into(), reason };
-        let mut rows = csv::Reader::from_path(directory.join(file)).map_err(|error| beside(error.to_string()))?;
-        let row = |row: csv::Result<csv::StringRecord>| -> Result<Vec<f64>, Unfit> {
-            let row = row.map_err(|error| beside(error.to_string()))?;
-            let number = |entry: &str| entry.parse().map_err(|_| beside(format!("{entry:?} is no number")));
-            row.iter().map(number).collect()
-        };
-        rows.records().map(row).collect()
-    }
-
-    pub fn keep(&mut self, kept: &mut Kept) -> Result<()> {
-        for (name, table) in Self::NAMES.into_iter().zip([&mut self.history, &mut self.fronts]) {
-            kept.put(name, &table.sync()?);
-        }
-        Ok(())
-    }
-
-    pub fn write(&mut self, row: Row, front: &[f64]) -> Result<()> {
-        let heights = [row.t].into_iter().chain(front.iter().copied()).map(|value| value.to_string());
-        self.fronts.add(heights.collect::<Vec<_>>())?;
-        self.history.add(row)?;
-        self.history.flush().and(self.fronts.flush())
     }
 }

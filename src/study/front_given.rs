@@ -1,6 +1,6 @@
 //! Studies of kind `stefan`: the problem that formulas or an exact solution give.
 
-use super::mapped::{mistaken, parse};
+use super::mapped::parse;
 use super::stefan::{Centre, ExactFront, ExactKind, PhaseTable, StefanStudy, Walls};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
@@ -31,7 +31,7 @@ impl Wall {
 
     fn flux(key: &str, text: &str) -> Result<Self> {
         let value = parse(key, text, &["u", "x", "y", "t"])?;
-        let by_u = value.derivative(0).map_err(|mistake| mistaken(key, text, mistake))?;
+        let by_u = value.derivative(0).map_err(|mistake| mistake.of(key, text))?;
         Ok(Self::Flux { value, by_u })
     }
 }

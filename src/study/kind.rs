@@ -9,6 +9,24 @@ use crate::simulation::{Observer, Scene, Schedule};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
+/// The tables that studies of all kinds have, as functions of [`Kind`], from fields of their names.
+macro_rules! common_tables {
+    () => {
+        fn common(&self) -> (&$crate::study::Header, &$crate::study::Output) {
+            (&self.study, &self.output)
+        }
+
+        fn data(&self) -> &$crate::study::DataTables {
+            &self.data
+        }
+
+        fn data_mut(&mut self) -> &mut $crate::study::DataTables {
+            &mut self.data
+        }
+    };
+}
+pub(super) use common_tables;
+
 /// The settings of a study of one kind, and how a run of them begins.
 pub trait Kind: Clone + Serialize + DeserializeOwned {
     /// What runs.

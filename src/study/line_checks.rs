@@ -1,11 +1,10 @@
 //! Studies of kind `equidistribution`: what is refused, and what is completed.
 
-use super::common::{Header, Output, StudyKind};
-use super::data::DataTables;
+use super::common::StudyKind;
 use super::equidistribution::{
     EquidistributionStudy, FirstMesh, Integral, Interval, LineDomain, LineTime, MethodName, SchwarzTable, StopTable,
 };
-use super::kind::Kind;
+use super::kind::{Kind, common_tables};
 use super::line_run::LineRun;
 use super::mapped::parse;
 use crate::equidistribution::{
@@ -33,17 +32,7 @@ impl Kind for EquidistributionStudy {
 
     const KIND: StudyKind = StudyKind::Equidistribution;
 
-    fn common(&self) -> (&Header, &Output) {
-        (&self.study, &self.output)
-    }
-
-    fn data(&self) -> &DataTables {
-        &self.data
-    }
-
-    fn data_mut(&mut self) -> &mut DataTables {
-        &mut self.data
-    }
+    common_tables!();
 
     fn resolve(&mut self) -> Result<()> {
         self.output.check()?;

@@ -5,7 +5,7 @@ use super::line_figures::NumberedIterate;
 use super::line_run::Evolution;
 use crate::equidistribution::{FaceDensity, History, Line};
 use crate::error::Result;
-use crate::output::{Curve, Figure, RunDirectory, Scale, moment};
+use crate::output::{Curve, Figure, RunDirectory, Scale, moment, names};
 use crate::simulation::{Scene, Values};
 use ndarray::{Array1, Array2, arr0};
 use ndarray_npy::{NpzWriter, WriteNpzError};
@@ -28,13 +28,13 @@ pub(super) fn keep(
     directory: &RunDirectory,
     evolution: &Evolution,
 ) -> Result<()> {
-    directory.write("final.npz", &arrays(line, evolution))?;
+    directory.write(names::ARRAYS, &arrays(line, evolution))?;
     let mut pictures = vec![(
-        "mesh",
+        names::MESH,
         if study.time.is_some() { paths(study, line, evolution) } else { mapping(study, line, evolution) },
     )];
-    pictures.extend(evolution.last.as_ref().map(|history| ("convergence", convergence(study, history))));
-    pictures.push(("density", density(study, line, evolution)));
+    pictures.extend(evolution.last.as_ref().map(|history| (names::CONVERGENCE, convergence(study, history))));
+    pictures.push((names::DENSITY, density(study, line, evolution)));
     for (name, figure) in pictures {
         figure.draw().write(directory.path(), name)?;
     }
@@ -82,7 +82,7 @@ pub(super) fn write_history(
         Some(_) => csv_of(&evolution.steps),
         None => csv_of(iterates.enumerate().map(|(n, iterate)| NumberedIterate::new(n, iterate)).collect::<Vec<_>>()),
     };
-    directory.write("history.csv", &table)
+    directory.write(names::HISTORY, &table)
 }
 
 /// A mesh of the line at time t, shown with a number and at a place on the axis of time that are those of an iterate

@@ -145,13 +145,13 @@ impl LineRun {
     /// Shows the newest mesh; `dt` is the length of the step that led to it.
     fn tell(&mut self, event: Event, dt: f64, stage: &mut Stage<'_>) -> Result<()> {
         let Evolution { done: step, newest, .. } = &self.evolution;
-        let [start, t, end] = [0, *step, self.steps()].map(|step| self.time(step));
+        let t = self.time(*step);
         let snapshot = Snapshot {
             t,
             step: *step,
             dt,
             steps: Some(self.steps()),
-            share: (t - start) / (end - start),
+            share: self.schedule.as_ref().map_or(0.0, |schedule| schedule.share(t)),
             smallest: shortest(&self.line, newest),
             seconds: stage.wall(),
             nodes: &[],

@@ -1,5 +1,5 @@
 use crate::error::{Error, Failure, Result};
-use crate::formula::{Formula, Mistake};
+use crate::formula::Formula;
 use crate::geometry::{Chart, FormulaMap, Lattice, Mesh, check_simple, check_unfolded};
 use crate::random::{Philox, uniform};
 use crate::setting::{Axes, pair};
@@ -105,12 +105,7 @@ pub struct Grading {
 
 /// Reads a formula of these variables.
 pub(super) fn parse(key: &str, text: &str, variables: &[&str]) -> Result<Formula> {
-    Formula::parse(text, variables).map_err(|mistake| mistaken(key, text, mistake))
-}
-
-pub(super) fn mistaken(key: &str, text: &str, mistake: Mistake) -> Error {
-    let Mistake { message, at, help } = mistake;
-    Error::Formula { key: key.into(), text: text.into(), at, message, help }
+    Formula::parse(text, variables).map_err(|mistake| mistake.of(key, text))
 }
 
 impl Grading {

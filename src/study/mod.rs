@@ -11,6 +11,7 @@ mod front_figures;
 mod front_given;
 mod front_run;
 mod front_start;
+mod fronts;
 mod kind;
 mod line_checks;
 mod line_figures;
@@ -35,6 +36,7 @@ mod species_checks;
 mod species_figures;
 mod species_run;
 mod stefan;
+mod time_loop;
 mod together;
 mod uniform;
 
@@ -49,7 +51,8 @@ pub use equidistribution::{
 };
 pub use examples::write_examples;
 pub use front_figures::{FrontError, FrontFigures, FrontParts, FrontReport, FrontSummary};
-pub use front_run::{FrontCourse, FrontRun};
+pub use front_run::{FrontRun, TwoPhase};
+pub use fronts::{Controller, Fronts, Progress, View};
 pub use kind::{Kind, Running, SpentBy};
 pub use line_figures::{LineFigures, LineParts, LineQuality, LineWork, NumberedIterate, PerStep, Rate, StepRow};
 pub use line_run::{Evolution, LineRun};
@@ -58,17 +61,18 @@ pub use memory::check_memory;
 pub use moving_mesh::{
     Compare, Domain, Grid, MeshForm, MeshTable, MovingLine, MovingMesh, MovingStudy, StartMesh, Stepper, Time,
 };
-pub use moving_run::{MovingFigures, MovingParts, MovingRun};
+pub use moving_run::{MovingFigures, MovingRun};
 pub use poisson::{Equation, ExactSolution, GradedGrid, LaplacianTable, PoissonStudy, Sides, SolverKind, SolverTable};
 pub use poisson_run::{PoissonError, PoissonFigures, PoissonParts, PoissonRun, Solved, StencilReport};
 pub use remedy::failures;
 pub use runner::{Begin, Finished, Stage};
 pub use source::Source;
 pub use species::{LawTable, Laws, SpeciesDomain, SpeciesGrid, SpeciesStudy, SpeciesTable};
-pub use species_figures::{Balance, FrontsReport, SpeciesReport, SpeciesSummary};
-pub use species_run::{SpeciesCourse, SpeciesRun};
+pub use species_figures::{Balance, FrontsReport, SpeciesReport};
+pub use species_run::SpeciesRun;
 pub use stefan::{
     Centre, ExactFront, ExactKind, FrontDomain, FrontGrid, FrontTable, FrontTime, PhaseTable, Phases, StefanStudy,
     Walls,
 };
+pub use time_loop::{FrontCourse, TimeLoop};
 pub use uniform::UniformEquivalent;

@@ -1,9 +1,8 @@
 //! Studies of kind `moving-mesh`: what is refused, what is completed, and what is doubtful.
 
-use super::common::{Header, Output, StudyKind};
-use super::data::DataTables;
+use super::common::StudyKind;
 use super::dimension::{GeneratorTable, PdeTable, Studied};
-use super::kind::Kind;
+use super::kind::{Kind, common_tables};
 use super::moving_mesh::{MovingStudy, StartMesh, Stepper};
 use super::moving_run::MovingRun;
 use crate::density::{ArclengthTable, GivenTable, MonitorKind};
@@ -29,17 +28,7 @@ where
 
     const KIND: StudyKind = StudyKind::MovingMesh;
 
-    fn common(&self) -> (&Header, &Output) {
-        (&self.study, &self.output)
-    }
-
-    fn data(&self) -> &DataTables {
-        &self.data
-    }
-
-    fn data_mut(&mut self) -> &mut DataTables {
-        &mut self.data
-    }
+    common_tables!();
 
     fn resolve(&mut self) -> Result<()> {
         Mesh::resolve(self)

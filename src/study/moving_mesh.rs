@@ -290,7 +290,7 @@ where
         record.timed(|record| {
             let mut mesh = self.uniform_mesh()?;
             if self.mesh.start == Some(StartMesh::Adapted) {
-                let start = timed(&mut record.seconds.mesh, || simulation.adapted_from(mesh, observers))?;
+                let start = timed(&mut record.seconds.parts.mesh, || simulation.adapted_from(mesh, observers))?;
                 mesh = start.mesh;
                 let why = match start.end {
                     Ending::AtRest => None,

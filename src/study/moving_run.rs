@@ -9,10 +9,10 @@ use crate::error::{Error, Result, Unfit};
 use crate::geometry::{Mesh, compare};
 use crate::kept::{Kept, check_nodal};
 use crate::output::{
-    Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Spent, Summary, final_arrays, moment,
+    Curve, Figure, Figures, Frames, FramesAt, History, RunDirectory, Scale, Summary, final_arrays, moment, names,
 };
 use crate::simulation::{
-    Checkpoint, Course, Event, Keeper, Observer, Record, Report, Retries, Scene, Schedule, Seconds, Simulation,
+    Checkpoint, Course, Event, Keeper, MovingParts, Observer, Record, Report, Retries, Scene, Schedule, Simulation,
     Snapshot, State, Values, WorkTotal,
 };
 use serde::{Deserialize, Serialize};
@@ -27,19 +27,6 @@ pub struct MovingFigures {
     pub safety: Retries,
     /// One entry for each time of `time.report` that was reached.
     pub reports: Vec<Report>,
-}
-
-/// Seconds of a moving mesh, by part.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct MovingParts {
-    /// Computing the density.
-    pub monitor: f64,
-    /// Estimating interface values.
-    pub interface: f64,
-    /// Solving the mesh equation, `interface` not included.
-    pub mesh: f64,
-    /// Solving the physics.
-    pub pde: f64,
 }
 
 impl Figures for MovingFigures {
@@ -112,7 +99,8 @@ where
             Some(state) => state,
             None => {
                 let start = self.study.start(&self.simulation, &mut self.record, &mut stage.observers())?;
-                self.history = stage.directory.map(|to| History::create(&to.path().join(HISTORY))).transpose()?;
+                self.history =
+                    stage.directory.map(|to| History::create(&to.path().join(names::HISTORY))).transpose()?;
                 start
             }
         };
@@ -140,9 +128,9 @@ where
         mover.generator.resume(mesh.parameters(), &found.kept)?;
         self.meshes = Meshes::resume(&self.study, &mesh, &found.kept)?;
         let Checkpoint { record, course, kept, .. } = found;
-        self.history = directory.map(|to| History::resume(&to.join(HISTORY), &kept)).transpose()?;
+        self.history = directory.map(|to| History::resume(&to.join(names::HISTORY), &kept)).transpose()?;
         (self.state, self.record, self.course) = (Some(state), record, Some(course));
-        Ok((self.spent(), kept))
+        Ok((self.record.seconds, kept))
     }
 
     pub(super) fn last_scene(&self) -> Result<Vec<Scene>> {
@@ -157,11 +145,6 @@ where
             Some(scene) => leave_line(&self.study.study.name, scene, directory),
             None => Ok(()),
         }
-    }
-
-    fn spent(&self) -> SpentBy<Self> {
-        let Seconds { wall, cpu, monitor, interface, mesh, pde, output } = self.record.seconds;
-        Spent { wall, cpu, parts: MovingParts { monitor, interface, mesh, pde }, output }
     }
 }
 
@@ -199,7 +182,7 @@ where
     fn tell(&self, summary: &mut Summary<MovingFigures>) {
         let Record { work, safety, reports, warnings, .. } = self.record.clone();
         summary.figures = MovingFigures { work, safety, reports };
-        (summary.seconds, summary.warnings) = (self.spent(), warnings);
+        (summary.seconds, summary.warnings) = (self.record.seconds, warnings);
     }
 
     fn warn(&mut self, warnings: Vec<String>) {
@@ -211,12 +194,9 @@ where
 #[derive(Deserialize)]
 pub struct MovingCheckpoint<const D: usize = 2>(Checkpoint<D>);
 
-/// Where the history of a run is.
-const HISTORY: &str = "history.csv";
-
 /// Leaves the arrays of a line and a plot of its first unknown.
 fn leave_line(name: &str, scene: &Scene, directory: &RunDirectory) -> Result<()> {
-    directory.write("final.npz", &final_arrays(scene))?;
+    directory.write(names::ARRAYS, &final_arrays(scene))?;
     let curves = scene.nodal.iter().filter_map(|(name, values)| match values {
         Values::Scalars(values) => {
             let points = scene.points.iter().zip(values).map(|(x, u)| [x[0], *u]).collect();
@@ -231,7 +211,7 @@ fn leave_line(name: &str, scene: &Scene, directory: &RunDirectory) -> Result<()>
         curves: curves.collect(),
         ..Figure::default()
     };
-    figure.draw().write(directory.path(), "mesh")
+    figure.draw().write(directory.path(), names::MESH)
 }
 
 /// Keeps the meshes at the times of reports, where `[compare]` gives something to compare them with.

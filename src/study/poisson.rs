@@ -2,7 +2,7 @@
 
 use super::common::{Header, Output, StudyKind};
 use super::data::DataTables;
-use super::kind::Kind;
+use super::kind::{Kind, common_tables};
 use super::mapped::{Grading, MappedDomain, Side};
 use super::poisson_run::PoissonRun;
 use crate::error::{Error, Result};
@@ -164,17 +164,7 @@ impl Kind for PoissonStudy {
 
     const KIND: StudyKind = StudyKind::Poisson;
 
-    fn common(&self) -> (&Header, &Output) {
-        (&self.study, &self.output)
-    }
-
-    fn data(&self) -> &DataTables {
-        &self.data
-    }
-
-    fn data_mut(&mut self) -> &mut DataTables {
-        &mut self.data
-    }
+    common_tables!();
 
     fn resolve(&mut self) -> Result<()> {
         self.output.check()?;

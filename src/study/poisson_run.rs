@@ -2,11 +2,11 @@
 
 use super::kind::{Running, SpentBy};
 use super::poisson::{PoissonStudy, SolverKind};
-use super::poisson_sides::Given;
+use super::poisson_sides::{Given, finite};
 use super::runner::Stage;
 use crate::error::{Failure, Result, Unfit};
 use crate::formula::Program;
-use crate::geometry::{Mesh, node_areas};
+use crate::geometry::{Mesh, check_finite, node_areas};
 use crate::kept::Kept;
 use crate::laplacian::{Laplacian, Poisson, Stencils, diffusion, unchecked};
 use crate::numerics::{larger, sum};
@@ -137,10 +137,7 @@ impl PoissonStudy {
             SolverKind::Krylov => problem.iterate(&mesh, solved)?,
         };
         seconds.solve = clock.elapsed().as_secs_f64();
-        if let Some(k) = u.iter().position(|u| !u.is_finite()) {
-            let at = mesh.node_place(k);
-            return Err(Failure::NonFinite { what: "the solution", value: u[k], at }.into());
-        }
+        check_finite(["the solution"], &mesh, u.as_chunks().0)?;
         let error = exact.as_ref().map(|exact| PoissonError::of(&mesh, &u, exact));
         Ok(Solved { mesh, u, exact, stencils, error, work, seconds })
     }
@@ -268,11 +265,6 @@ fn values(mesh: &Mesh<2>, exact: &Program<2, 5>) -> Result<Vec<f64>, Failure> {
     let mut out = vec![[0.0; 5]; mesh.x().len()];
     exact.eval_each(mesh.x(), &[], &mut out);
     let u: Vec<f64> = out.into_iter().map(|[u, ..]| u).collect();
-    match u.iter().position(|u| !u.is_finite()) {
-        None => Ok(u),
-        Some(k) => {
-            let at = mesh.node_place(k);
-            Err(Failure::Formula { what: "exact.u".into(), value: u[k], at, given: Vec::new() })
-        }
-    }
+    (0..u.len()).try_for_each(|k| finite(mesh, k, "exact.u", u[k]))?;
+    Ok(u)
 }

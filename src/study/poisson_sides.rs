@@ -1,6 +1,6 @@
 //! Studies of kind `poisson`: the formulas of the equation and of its sides.
 
-use super::mapped::{mistaken, parse};
+use super::mapped::parse;
 use super::poisson::{Equation, ExactSolution, PoissonStudy};
 use crate::error::{Error, Failure, Result};
 use crate::formula::{Formula, Program};
@@ -247,7 +247,7 @@ pub(super) fn on_side(mesh: &Mesh<2>, data: &Data, k: usize, at: (usize, bool)) 
     Ok(found)
 }
 
-fn finite(mesh: &Mesh<2>, k: usize, what: &str, value: f64) -> Result<(), Failure> {
+pub(super) fn finite(mesh: &Mesh<2>, k: usize, what: &str, value: f64) -> Result<(), Failure> {
     match value.is_finite() {
         true => Ok(()),
         false => {
@@ -298,7 +298,7 @@ fn missing(key: &str) -> Error {
 
 /// u, its gradient, u_xx and u_yy.
 fn exact(text: &str) -> Result<Program<2, 5>> {
-    let slope = |f: &Formula, d| f.derivative(d).map_err(|mistake| mistaken("exact.u", text, mistake));
+    let slope = |f: &Formula, d| f.derivative(d).map_err(|mistake| mistake.of("exact.u", text));
     let u = parse("exact.u", text, &VARIABLES)?;
     let [x, y] = [slope(&u, 0)?, slope(&u, 1)?];
     Ok(Program::new([&u, &x, &y, &slope(&x, 0)?, &slope(&y, 1)?]))
@@ -308,14 +308,14 @@ fn exact(text: &str) -> Result<Program<2, 5>> {
 fn diffusivity(text: &str) -> Result<Program<2, 3>> {
     let key = "equation.diffusivity";
     let d = parse(key, text, &VARIABLES)?;
-    let slope = |axis| d.derivative(axis).map_err(|mistake| mistaken(key, text, mistake));
+    let slope = |axis| d.derivative(axis).map_err(|mistake| mistake.of(key, text));
     Ok(Program::new([&d, &slope(0)?, &slope(1)?]))
 }
 
 /// A flux and its derivative by u, which it must be linear in.
 fn read_flux(key: &str, text: &str) -> Result<(Program<3, 2>, String)> {
     let flux = parse(key, text, &["x", "y", "u"])?;
-    let by_u = flux.derivative(2).map_err(|mistake| mistaken(key, text, mistake))?;
+    let by_u = flux.derivative(2).map_err(|mistake| mistake.of(key, text))?;
     if by_u.depends_on(2) {
         let message = "a flux of poisson is at most linear in u".to_string();
         let help = Some("write a + b*u with formulas a and b of x and y, or take a study of kind moving-mesh".into());

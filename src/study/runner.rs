@@ -5,7 +5,7 @@ use super::together::Together;
 use crate::error::{Error, Moment, Result, Unfit};
 use crate::kept::Kept;
 use crate::output::{
-    Behind, Checkpoints, Frames, Resumed, RunDirectory, Spent, Summary, draw, final_arrays, structured,
+    Behind, Checkpoints, Frames, Resumed, RunDirectory, Spent, Summary, draw, final_arrays, names, structured,
 };
 use crate::parallel::join;
 use crate::ranks::Ranks;
@@ -245,7 +245,7 @@ fn run_ready<K: Kind>(
     stage.watched_by(watchers);
     let summary = Summary::running(&header.name, K::KIND.name());
     directory.write_summary(&summary)?;
-    directory.write("study.toml", study.to_toml().as_bytes())?;
+    directory.write(names::STUDY, study.to_toml().as_bytes())?;
     run.warn(idle(Ranks::here(), run.frames().1));
     sent(checkpoint);
     let failure = run.go(&mut stage).err();
@@ -367,9 +367,9 @@ fn draw_all<K: Kind>(
     let drawn = drawn.map(|scene| (scene, format!("{}, {}", header.name, run.caption(scene))));
     let picture = || match &drawn {
         Some((scene, title)) => {
-            directory.write("final.npz", &final_arrays(scene))?;
-            directory.write("final.vts", structured(scene).as_bytes())?;
-            draw(title, scene).write(directory.path(), "mesh")
+            directory.write(names::ARRAYS, &final_arrays(scene))?;
+            directory.write(names::GRID, structured(scene).as_bytes())?;
+            draw(title, scene).write(directory.path(), names::MESH)
         }
         None => Ok(()),
     };

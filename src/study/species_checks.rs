@@ -1,9 +1,8 @@
 //! Studies of kind `stefan` with `[species]`: what is refused, and what runs.
 
-use super::common::{Header, Output, StudyKind};
-use super::data::DataTables;
-use super::kind::Kind;
-use super::mapped::{mistaken, parse};
+use super::common::StudyKind;
+use super::kind::{Kind, common_tables};
+use super::mapped::parse;
 use super::species::{SpeciesStudy, SpeciesTable};
 use super::species_run::SpeciesRun;
 use crate::error::{Error, Failure, Result};
@@ -20,17 +19,7 @@ impl Kind for SpeciesStudy {
 
     const KIND: StudyKind = StudyKind::Stefan;
 
-    fn common(&self) -> (&Header, &Output) {
-        (&self.study, &self.output)
-    }
-
-    fn data(&self) -> &DataTables {
-        &self.data
-    }
-
-    fn data_mut(&mut self) -> &mut DataTables {
-        &mut self.data
-    }
+    common_tables!();
 
     fn resolve(&mut self) -> Result<()> {
         self.begin()?;
@@ -244,5 +233,5 @@ impl SpeciesStudy {
 fn rate(key: &str, text: &str, names: &[String]) -> Result<Rate> {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let formula = parse(key, text, &names)?;
-    Rate::new(formula).map_err(|mistake| mistaken(key, text, mistake))
+    Rate::new(formula).map_err(|mistake| mistake.of(key, text))
 }

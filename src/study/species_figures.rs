@@ -1,27 +1,9 @@
-//! Studies of kind `stefan` with `[species]`: what a run finds, and the table that it leaves.
+//! Studies of kind `stefan` with `[species]`: what a run finds, and the rows of its table.
 
-use super::front_figures::FrontParts;
-use crate::error::{Result, Unfit};
-use crate::kept::Kept;
-use crate::output::{Figures, Rows};
-use crate::simulation::WorkTotal;
+use super::fronts::Progress;
 use crate::species::{Species, SpeciesState, Total};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::Path;
-
-/// What `summary.json` says of fronts between species.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct SpeciesSummary {
-    /// Steps and their cost.
-    pub work: WorkTotal,
-    /// One entry for each time of `time.report` that was reached.
-    pub reports: Vec<SpeciesReport>,
-}
-
-impl Figures for SpeciesSummary {
-    type Parts = FrontParts;
-}
 
 /// The state at one of the times asked for.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -74,51 +56,31 @@ impl SpeciesReport {
     }
 }
 
-/// `history.csv`.
-pub(super) struct Table(Rows);
+/// Names of the columns of `history.csv`.
+pub(super) fn heads(problem: &Species) -> Vec<String> {
+    let fronts = problem.laws.len();
+    let each = |what: &str| -> Vec<String> {
+        (1..=fronts).map(|k| if fronts == 1 { what.into() } else { format!("{what}_{k}") }).collect()
+    };
+    let parts = ["content", "inflow", "produced", "consumed"];
+    let totals = problem.names.species().iter().flat_map(|name| parts.map(|part| format!("{name}_{part}")));
+    ["t".into(), "dt".into()]
+        .into_iter()
+        .chain(each("front"))
+        .chain(each("velocity"))
+        .chain(totals)
+        .chain(["newton_iterations".into(), "seconds".into()])
+        .collect()
+}
 
-impl Table {
-    const NAME: &'static str = "history.csv";
-
-    pub fn create(directory: &Path, problem: &Species) -> Result<Self> {
-        let mut rows = Rows::create(&directory.join(Self::NAME))?;
-        let fronts = problem.laws.len();
-        let each = |what: &str| -> Vec<String> {
-            (1..=fronts).map(|k| if fronts == 1 { what.into() } else { format!("{what}_{k}") }).collect()
-        };
-        let parts = ["content", "inflow", "produced", "consumed"];
-        let totals = problem.names.species().iter().flat_map(|name| parts.map(|part| format!("{name}_{part}")));
-        let heads: Vec<String> = ["t".into(), "dt".into()]
-            .into_iter()
-            .chain(each("front"))
-            .chain(each("velocity"))
-            .chain(totals)
-            .chain(["newton_iterations".into(), "seconds".into()])
-            .collect();
-        rows.add(heads)?;
-        Ok(Self(rows))
-    }
-
-    /// Goes on behind the rows that a checkpoint knows of.
-    pub fn resume(directory: &Path, kept: &Kept) -> Result<Self, Unfit> {
-        Ok(Self(Rows::reopen(&directory.join(Self::NAME), kept.get(Self::NAME)?)?))
-    }
-
-    pub fn keep(&mut self, kept: &mut Kept) -> Result<()> {
-        kept.put(Self::NAME, &self.0.sync()?);
-        Ok(())
-    }
-
-    pub fn write(&mut self, report: &SpeciesReport, dt: f64, (newton, seconds): (usize, f64)) -> Result<()> {
-        let totals = report.species.values().flat_map(|of| [of.content, of.inflow, of.produced, of.consumed]);
-        let row: Vec<f64> = [report.t, dt]
-            .into_iter()
-            .chain(report.front.x.iter().copied())
-            .chain(report.front.velocity.iter().copied())
-            .chain(totals)
-            .chain([newton as f64, seconds])
-            .collect();
-        self.0.add(row)?;
-        self.0.flush()
-    }
+/// A row of `history.csv`.
+pub(super) fn row(report: &SpeciesReport, Progress { dt, newton_iterations, seconds }: Progress) -> Vec<f64> {
+    let totals = report.species.values().flat_map(|of| [of.content, of.inflow, of.produced, of.consumed]);
+    [report.t, dt]
+        .into_iter()
+        .chain(report.front.x.iter().copied())
+        .chain(report.front.velocity.iter().copied())
+        .chain(totals)
+        .chain([newton_iterations as f64, seconds])
+        .collect()
 }

@@ -5,7 +5,7 @@ mod integral;
 mod samples;
 
 use crate::error::{Error, Failure, Result};
-use crate::formula::{Formula, Mistake, Program};
+use crate::formula::{Formula, Program};
 use samples::Samples;
 use std::borrow::Cow;
 use std::fmt;
@@ -320,13 +320,9 @@ pub fn check_ends(key: &str, [a, b]: [f64; 2]) -> Result<()> {
 }
 
 fn parsed(key: &str, text: &str) -> Result<Formula> {
-    Formula::parse(text, &["x", "t"]).map_err(|mistake| mistaken(key, text, mistake))
+    Formula::parse(text, &["x", "t"]).map_err(|mistake| mistake.of(key, text))
 }
 
 fn differentiated(key: &str, text: &str, formula: &Formula) -> Result<Formula> {
-    formula.derivative(0).map_err(|mistake| mistaken(key, text, mistake))
-}
-
-fn mistaken(key: &str, text: &str, Mistake { message, at, help }: Mistake) -> Error {
-    Error::Formula { key: key.into(), text: text.into(), at, message, help }
+    formula.derivative(0).map_err(|mistake| mistake.of(key, text))
 }

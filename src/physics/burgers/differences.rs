@@ -2,12 +2,12 @@
 
 use super::{Burgers, Convection};
 use crate::error::Failure;
-use crate::geometry::{Field, Patch};
+use crate::geometry::{Field, Patch, check_finite};
 use crate::numerics::larger;
 use crate::numerics::linear::{LatticeMatrix, LinearSolver};
 use crate::parallel;
+use crate::physics::Motion;
 use crate::physics::curvilinear::Stencils;
-use crate::physics::{Motion, check_finite};
 use crate::work::Work;
 
 /// Newton's method has converged once the largest residual is below this; u is of size one.

@@ -5,10 +5,10 @@ use super::repair::{repair, settle};
 use super::transport::Transport;
 use super::{Around, Block, Excess, FiniteVolumes, Half, Law, Limited, Side, Stepper, inside, sides, stretched};
 use crate::error::Failure;
-use crate::geometry::{Cells, DualCells, Mesh, padded};
+use crate::geometry::{Cells, DualCells, Mesh, check_finite, padded};
 use crate::numerics::larger;
 use crate::numerics::linear::LinearSolver;
-use crate::physics::{Motion, check_finite};
+use crate::physics::Motion;
 use crate::work::Work;
 
 /// A mesh with what is measured of it, and the time at which nodes stand there.

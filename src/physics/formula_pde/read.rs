@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::formula::Formula;
 use crate::physics::sides::{Condition, Conditions, Open};
 use crate::physics::terms::TermFormulas;
-use crate::physics::{AXES, Diffusivity, bounds, formula, mistaken};
+use crate::physics::{AXES, Diffusivity, bounds, formula};
 use std::collections::BTreeMap;
 
 /// The formulas of a [`FormulaPde`], parsed.
@@ -45,7 +45,7 @@ impl<const D: usize> FormulaPde<D> {
         let mut all: Vec<Formula> = values.iter().map(|(_, f)| f.clone()).collect();
         for unknown in 0..names.len() {
             for (key, f) in &values {
-                all.push(f.derivative(D + unknown).map_err(|mistake| mistaken(key, f.text(), mistake))?);
+                all.push(f.derivative(D + unknown).map_err(|mistake| mistake.of(key, f.text()))?);
             }
         }
         let read = |table: &str, texts: &BTreeMap<String, String>| -> Result<Vec<Option<Formula>>> {
@@ -140,10 +140,10 @@ impl<const D: usize> FormulaPde<D> {
         let slopes: Vec<String> = slopes.collect();
         let names = self.unknowns.iter().chain(&slopes).map(String::as_str);
         let variables: Vec<&str> = AXES[..D].iter().copied().chain(names).chain(["t"]).collect();
-        let formula = Formula::parse(text, &variables).map_err(|mistake| mistaken(key, text, mistake))?;
+        let formula = Formula::parse(text, &variables).map_err(|mistake| mistake.of(key, text))?;
         // that derivatives can be taken is seen here
         for variable in D..variables.len() - 1 {
-            formula.derivative(variable).map_err(|mistake| mistaken(key, text, mistake))?;
+            formula.derivative(variable).map_err(|mistake| mistake.of(key, text))?;
         }
         Ok(formula)
     }
@@ -157,7 +157,7 @@ impl<const D: usize> FormulaPde<D> {
     fn at_nodes(&self, text: &str) -> Result<Formula> {
         let names = self.unknowns.iter().map(String::as_str);
         let variables: Vec<&str> = AXES[..D].iter().copied().chain(names).chain(["t"]).collect();
-        Formula::parse(text, &variables).map_err(|mistake| mistaken("flux", text, mistake))
+        Formula::parse(text, &variables).map_err(|mistake| mistake.of("flux", text))
     }
 
     /// What flows of unknown c along each axis by gradients: its flux where that takes gradients, less what diffuses.

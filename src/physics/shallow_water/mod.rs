@@ -3,9 +3,9 @@
 mod advective;
 mod flux;
 
-use super::{Motion, Physics, check_finite, nodal};
+use super::{Motion, Physics, nodal};
 use crate::error::{Error, Failure, Result};
-use crate::geometry::{DualCells, Field, Mesh, Patch};
+use crate::geometry::{DualCells, Field, Mesh, Patch, check_finite};
 use crate::numerics::linear::{BlockMatrix, LinearSolver, RobustBlock};
 use crate::numerics::{larger, sum};
 use crate::parallel;

@@ -3,9 +3,9 @@
 mod band;
 mod stencil;
 
-use super::{Burgers, Convection, Motion, Physics, check_finite, nodal};
+use super::{Burgers, Convection, Motion, Physics, nodal};
 use crate::error::{Error, Failure, NodePlace, Result};
-use crate::geometry::{Field, Mesh};
+use crate::geometry::{Field, Mesh, check_finite};
 use crate::numerics::larger;
 use crate::work::Work;
 use stencil::Stencil;
