@@ -91,16 +91,16 @@ fn a_layer_that_forms_is_followed_on_any_cells() {
     }
 }
 
-/// Two layers take at most 5000 Newton iterations, in the median over lattices: how often steps are tried again while
-/// the layers form differs much from one lattice to the next.
+/// Two layers take at most 5000 Newton iterations, in the median over seven lattices: how often steps are tried again
+/// while the layers form differs by half from one lattice to the next.
 #[test]
 fn layers_that_form_take_no_more_than_5000_newton_iterations() {
-    let mut counts = [60, 80, 100].map(|cells| {
+    let mut counts = [50, 60, 70, 80, 90, 100, 120].map(|cells| {
         let text = LAYERS.replace("cells = [80]", &format!("cells = [{cells}]"));
         run(&text.replace("[0.2, 0.6, 1.0]", "[]")).record.work.work.newton_iterations
     });
     counts.sort_unstable();
-    assert!(counts[1] <= 5000, "{counts:?}");
+    assert!(counts[3] <= 5000, "{counts:?}");
 }
 
 /// Nodes that have gone round a periodic line many times are as exact as at the start: a pulse on many cells goes round
