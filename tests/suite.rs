@@ -1,6 +1,7 @@
 //! All tests of the library from outside, as one program: built and linked once, on all cores until the last test.
 //! `cargo test --release --test suite mover::` runs those of tests/mover.rs.
 
+mod brought_up;
 mod cell_sizes;
 mod columns;
 mod conserved;
