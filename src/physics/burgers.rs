@@ -71,8 +71,8 @@ pub enum Convection {
     /// u u_x + u u_y by central differences at nodes.
     Advective,
     /// Finite volumes on dual cells: Σ A u changes only by the flux through the sides, on any moving mesh. Where cells
-    /// are wider than 2ν/u and hold more than a few hundredths of the range of u, the value from upstream limits what
-    /// passes.
+    /// are wider than 2ν/u and u changes over them by more than a few hundredths of its range, the flux through a face
+    /// is limited toward that of the upstream value.
     #[default]
     Flux,
 }
