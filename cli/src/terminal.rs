@@ -10,22 +10,22 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// How the program ends, for whoever called it.
 pub type Status = u8;
-/// Everything that was asked for is done.
+/// Exit status: everything that was asked for is done.
 pub const DONE: Status = 0;
-/// The computation failed, or warned where warnings were to be failures.
+/// Exit status: the computation failed, or gave a warning under `--strict`.
 pub const FAILED: Status = 1;
-/// The study or the command line is wrong.
+/// Exit status: the study or the command line is wrong, and nothing was computed.
 pub const WRONG: Status = 2;
 
-/// Why something could not be printed.
+/// Why writing to standard output failed the first time, as on a full disk; empty if it did not.
 static UNSAID: OnceLock<String> = OnceLock::new();
 /// Warnings printed so far.
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
-/// The error of a rank that does not speak.
+/// The error of a rank other than 0, which is printed only where this rank alone failed.
 static WITHHELD: Mutex<String> = Mutex::new(String::new());
 
-/// The command line.
+/// The words of the command line.
 static WORDS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Forgets what was said before, and keeps the command line.

@@ -38,9 +38,10 @@ pub struct CellSizes {
     pub largest: Option<f64>,
 }
 
-/// Steps to the mean of a limited density: each at least halves an interval of double precision.
+/// Largest number of steps in the search for the mean m of a limited density: each at least halves its interval, of
+/// which double precision allows about 60 halvings.
 const STEPS: usize = 100;
-/// The mean is known to this share.
+/// The search for the mean m ends once it changes by no more than this share: round-off.
 const CLOSE: f64 = 1e-14;
 
 impl CellSizes {

@@ -35,7 +35,7 @@ const GAUSS: [(f64, f64); 6] = [
     (0.8306046932331322, 0.1803807865240693),
     (0.966234757101576, 0.08566224618958518),
 ];
-/// Number of places along an axis at which a map is looked at before it is used.
+/// Number of places along an axis at which a map is evaluated and checked before it is used.
 const SAMPLES: usize = 64;
 /// Ends of a closed axis may be apart by this share of the size of the domain, which is round-off.
 const SEAM: f64 = 1e-9;

@@ -114,10 +114,12 @@ impl<const D: usize, const S: usize> From<Written<D>> for Schwarz<D, S> {
     }
 }
 
-/// Defaults of a study: cells of overlap, tolerance as a share of the largest coordinate, and largest number of
-/// iterations.
+/// Number of cells that neighbouring subdomains share where a study gives none.
 const OVERLAP: usize = 2;
+/// Tolerance where a study gives neither this nor a number of iterations, as a share of the largest coordinate: far
+/// below the shortest edge of any mesh.
 const TOLERANCE: f64 = 1e-10;
+/// Largest number of iterations where a study gives none.
 const ITERATIONS: usize = 1000;
 
 impl<const D: usize, const S: usize> Schwarz<D, S> {
@@ -191,8 +193,9 @@ impl<const D: usize, const S: usize> Schwarz<D, S> {
     }
 }
 
-/// Numbers of waves along a cut, and of values of β, among which the minimax for p = "auto" is searched.
+/// Number of waves along a cut among which p = "auto" looks for the one that converges slowest.
 const WAVES: usize = 64;
+/// Number of values of β among which p = "auto" looks for the one whose slowest wave converges fastest.
 const TRIALS: usize = 200;
 
 impl<const D: usize, const S: usize> Schwarz<D, S> {

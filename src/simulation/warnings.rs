@@ -9,7 +9,7 @@ use crate::meshing::{Movable, Relaxation};
 use crate::mover;
 use crate::numerics::ends;
 
-/// τ above this many time steps is warned of: the mesh then hardly moves.
+/// τ in time steps above which a run warns that the mesh hardly moves any more.
 const HARDLY_FOLLOWS: f64 = 2e3;
 const HASTY: &str = "`mesh.relaxation` is short";
 const RESTLESS: &str = "the mesh hardly follows its density any more";
@@ -21,7 +21,8 @@ const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
 const WIDE: &str = "changes within cells that are too wide for central fluxes";
 const PASSED: &str = "changes within a step";
-/// An unknown that is this many times as large as in all data when a run ends for its growth blows up.
+/// An unknown of a run whose steps became too short blows up if it has grown to more than this multiple of its largest
+/// value in all data.
 const GROWN: f64 = 2.0;
 const MISSED: &str = "the mesh has not come to a layer of it";
 /// Share of the range of an unknown within one cell, and length of that cell over the shortest, from which on the mesh

@@ -71,6 +71,7 @@ impl Filter {
 
     /// The factor by which the filter lengthens the longest stable step: π / max θ F(θ).
     pub fn relief(&self) -> f64 {
+        /// Number of angles θ in (0, π] among which the largest θ F(θ) is looked for.
         const SAMPLES: usize = 2000;
         let [own, other] = self.weights();
         let wave = |k: usize| {

@@ -53,13 +53,16 @@ pub struct MonteCarlo {
     pub common: bool,
 }
 
-/// Largest number of paths, of paths from a Sobol sequence, and of substeps.
+/// Largest number of paths that start at a point: more than any run could afford.
 const MAX_PATHS: usize = 1 << 31;
+/// Largest number of paths that start at a point and take their increments from a Sobol sequence.
 const MAX_SOBOL_PATHS: usize = 1 << 16;
+/// Largest number of substeps of a path in a time step.
 const MAX_SUBSTEPS: usize = 100_000;
 /// Number of independent scramblings of the Sobol sequence.
 const SCRAMBLINGS: usize = 4;
-/// Blocks of random words from this number on decide exits; those before are for increments.
+/// Blocks of random words with this bit in their number decide whether a path leaves the domain; those without give its
+/// increments.
 const EXITS: u32 = 1 << 31;
 
 impl MonteCarlo {
