@@ -130,7 +130,9 @@ pub fn use_threads(threads: Option<u16>) -> driftmesh::Result<()> {
     let alone = Ranks::here().count() == 1;
     let number = threads.map_or(if alone { 0 } else { 1 }, usize::from);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(number).use_current_thread().build_global();
-    pool.map_err(|error| Error::invalid("--threads", number, format!("no such pool can be made: {error}")))
+    pool.map_err(|error| {
+        Error::invalid("--threads", number, format!("no pool of so many threads can be made: {error}"))
+    })
 }
 
 /// A time in eight letters or so.

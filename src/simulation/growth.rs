@@ -94,9 +94,9 @@ where
         let (times, Some((name, k))) = worst else { return };
         let times = (10.0 * times / OUTRUNS).ceil() / 10.0;
         record.warnings.push(format!(
-            "`{name}`: {GROWS}: at t = {t}, {}, one is {times:.1} times as wide as a front can cross before they do, \
-             2√(D/k) for growth at the rate k, and the front may be at the wrong place; refine `grid.cells` {times:.1} \
-             times",
+            "`{name}`: {GROWS}: at t = {t}, {}, a cell is {times:.1} times as wide as 2√(D/k), the width that a front \
+             of the diffusivity D crosses before values that grow at the rate k do, and the front may be at the wrong \
+             place; refine `grid.cells` {times:.1} times",
             named(mesh.image(mesh.x()[k]))
         ));
     }

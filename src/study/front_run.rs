@@ -153,8 +153,9 @@ impl Fronts for TwoPhase {
         let (percent, [way, rows]) = (100.0 * doubt, state.way);
         Some(if doubt > rows / way {
             format!(
-                "the front may have gone too far or not far enough by {percent:.1} % of its way: growth into this \
-                 melt turns on the last per cent of the heat, and its balance misses more; raise grid.cells"
+                "the front may have gone too far or not far enough by {percent:.1} % of its way: its speed \
+                 in a melt so far below melting turns on the last per cent of the heat, and the balance of heat is off \
+                 by more; raise grid.cells"
             )
         } else {
             format!(

@@ -48,7 +48,8 @@ pub fn table_2() -> Result<Vec<Table>> {
     let title = "Table 2: milliseconds for the mesh of one step of Burgers' equation, a core for each subdomain";
     let mut table = Table::new(title, &COLUMNS).ruled(RULE);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let pool = pool.map_err(|error| Error::invalid("threads", 1, format!("no such pool can be made: {error}")))?;
+    let pool =
+        pool.map_err(|error| Error::invalid("threads", 1, format!("no pool of one thread can be made: {error}")))?;
     for &(cells, paper) in &PAPER {
         let cells_set = format!("grid.cells=[{cells}, {cells}]");
         let all = settings(&[&cells_set, "time.end=0.3", "time.report=[0.3]", WHOLE]);
