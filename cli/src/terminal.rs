@@ -78,7 +78,7 @@ pub fn warn(text: &str) {
 }
 
 /// How the program ends where nothing failed: with `strict`, any warning makes it fail, and one line says so. `what`
-/// says what there is all the same.
+/// names what is complete in spite of them.
 pub fn succeeded(strict: bool, what: &str) -> Status {
     let count = match WARNINGS.load(Ordering::Relaxed) {
         _ if !strict => return DONE,

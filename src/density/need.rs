@@ -45,13 +45,14 @@ impl Need {
         Self { kept: 1.0 - (1.0 - KEPT) * uneven }
     }
 
-    /// Where u changes by `share` of its range over an equal cell at most: 0 where equal cells resolve u, 1 where they
-    /// do not.
+    /// The need where u changes by at most `share` of its range over an equal cell: 0 where equal cells resolve u, 1
+    /// where they do not.
     pub fn by_slopes(self, share: f64) -> f64 {
         between(SLOPES.map(|limit| self.kept * limit), share)
     }
 
-    /// The same where u bends by `share` of its range in both directions within a few nodes.
+    /// The need where u bends by `share` of its range in both directions within [`WINDOW`] nodes: 0 where equal cells
+    /// resolve u, 1 where they do not.
     pub fn by_bends(self, share: f64) -> f64 {
         between(BENDS.map(|limit| self.kept * limit), share)
     }

@@ -19,9 +19,9 @@ const MOST_PARTS: usize = 60;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Change {
-    /// It is there from now on.
+    /// The phase is there from now on.
     Appeared,
-    /// It is gone.
+    /// The phase is gone.
     Vanished,
 }
 

@@ -47,7 +47,7 @@ impl Filter {
         Err(Error::invalid("filter", format!("{:?}", [a, b, c]), rule))
     }
 
-    /// Its weights on the node itself, and on both neighbours together.
+    /// Weights of the filter on the node itself, and on both neighbours together.
     fn weights(&self) -> [f64; 2] {
         self.0.map_or([1.0, 0.0], |[a, b, _]| [b / (b + 2.0 * a), 2.0 * a / (b + 2.0 * a)])
     }

@@ -106,9 +106,9 @@ struct Origin {
 struct Sent<const B: usize> {
     /// The fluxes, as if both nodes had the values of one.
     fluxes: [[f64; B]; 2],
-    /// Derivatives of ½ Δt times these.
+    /// Derivatives of ½ Δt times the fluxes.
     still: [Block<B>; 2],
-    /// The same relative to the nodes of the mesh.
+    /// Derivatives of ½ Δt times the fluxes relative to the moving nodes of the mesh.
     moving: [Block<B>; 2],
     /// Half of the area that the face sweeps.
     swept: f64,

@@ -136,7 +136,7 @@ mod tests {
         }
     }
 
-    /// Far from all that there is every node gives something; more than all have stays missing.
+    /// A node far from all others that have something takes from every node; what exceeds the sum of all stays missing.
     #[test]
     fn what_nobody_has_is_left() {
         let mesh = Mesh::uniform(Lattice::bounded([20]).unwrap(), [0.0], [1.0]).unwrap();
