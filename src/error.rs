@@ -140,7 +140,7 @@ pub enum Error {
 /// Why a run cannot go on from a file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unfit {
-    /// It is of another format.
+    /// The file is of another format.
     #[error("it is no checkpoint that this program can read")]
     Foreign,
     /// Bytes are missing or wrong, or what they say cannot be.
@@ -152,14 +152,14 @@ pub enum Unfit {
         /// The version of the other.
         found: String,
     },
-    /// It belongs to other settings.
+    /// The checkpoint belongs to a study with other settings.
     #[error("it belongs to a study in which `{key}` is {was}; here it is {is}")]
     Study {
         /// Dotted key of the first setting that differs.
         key: String,
-        /// Its value there.
+        /// Value of that setting in the checkpoint's study.
         was: String,
-        /// Its value now.
+        /// Value of that setting in this study.
         is: String,
     },
     /// The run came to its end, behind which it is not to go on.

@@ -67,7 +67,8 @@ impl Stream {
     }
 }
 
-const TINY: f64 = 1.0 / 4_294_967_296.0; // 2⁻³²
+/// 2⁻³², which takes a random word of 32 bits to a number in [0, 1).
+const TINY: f64 = 1.0 / 4_294_967_296.0;
 
 /// A word as a number strictly between 0 and 1: (word + ½) 2⁻³².
 #[inline(always)]

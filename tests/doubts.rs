@@ -35,7 +35,7 @@ fn a_relaxation_that_is_too_short_is_told_the_limit() {
             said.contains(&format!("it is {short:.1} time steps, and the mesh turns back from step to step")),
             "{said}"
         );
-        let limit = said.split("it rests with ").nth(1).and_then(|text| text.split(';').next());
+        let limit = said.split("the mesh rests at ").nth(1).and_then(|text| text.split(' ').next());
         let limit: f64 = limit.unwrap_or_else(|| panic!("{said}")).parse().unwrap();
         assert!(limit > short, "{said}");
         let enough = format!("{{ steps = {}, prediction = 0.2 }}", limit);

@@ -65,7 +65,7 @@ struct StudyArgs {
     /// Override one setting: a dotted key and a TOML value.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// End with status 1 where there are warnings, too.
+    /// End with status 1 if there was a warning, too.
     #[arg(long)]
     strict: bool,
 }

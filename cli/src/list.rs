@@ -11,7 +11,7 @@ use driftmesh::{
 
 #[derive(Args)]
 pub struct List {
-    /// Only these; all of them where nothing is named.
+    /// Group of kinds to list; all groups where none is given.
     topic: Option<Topic>,
 }
 

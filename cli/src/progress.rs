@@ -15,10 +15,11 @@ pub struct Progress {
     adapting: (usize, Instant),
 }
 
-/// Pieces of a run: of the bar, and as lines.
+/// Number of equal shares of a run after each of which the bar is drawn again: finer than a terminal shows.
 const OF_THE_BAR: usize = 500;
+/// Number of equal shares of a run after each of which a line is printed where standard error is no terminal.
 const LINES: usize = 10;
-/// Between two lines about a mesh that adapts.
+/// Least time between two lines about the adaptation of the first mesh, whose number of steps is not known before.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 impl Progress {

@@ -11,13 +11,13 @@ pub struct Reproduce {
     /// What to rerun; everything where nothing is named.
     #[arg(value_name = "ITEM", value_parser = PossibleValuesParser::new(ITEMS.iter().map(|item| item.name)))]
     items: Vec<String>,
-    /// Everything, and one page of it that stands alone: index.html in the directory.
+    /// Rerun everything, and write one page of all results that needs no other file: index.html in the directory.
     #[arg(long, conflicts_with = "items")]
     all: bool,
-    /// Fewer rows and samples: everything in five minutes.
+    /// Use fewer rows and samples: everything then takes about five minutes.
     #[arg(long)]
     quick: bool,
-    /// Threads to use; all cores where nothing is said.
+    /// Number of threads; all cores by default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Directory for the tables, one Markdown file an item, and for plots as SVG and PNG.

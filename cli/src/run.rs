@@ -13,16 +13,17 @@ use std::path::{Path, PathBuf};
 pub struct Run {
     #[command(flatten)]
     study: StudyArgs,
-    /// Directory for the results; `out/NAME` where nothing is said.
+    /// Directory for the results; by default out/ and the name of the study.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Threads to use; where nothing is said all cores, or one for each rank of several. Results do not depend on it.
+    /// Number of threads; by default all cores, or one for each rank where there are several. Results do not depend on
+    /// it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Go on from the newest checkpoint in the directory; from the start where there is none.
     #[arg(long)]
     resume: bool,
-    /// No progress and no table.
+    /// Show no progress and print no table.
     #[arg(long)]
     quiet: bool,
 }

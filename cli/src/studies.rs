@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Studies {
-    /// Where they go; what is there by these names is kept.
+    /// Directory for the example studies; files that are there already under their names are kept.
     #[arg(value_name = "DIR", default_value = "studies")]
     directory: PathBuf,
 }

@@ -10,22 +10,22 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// How the program ends, for whoever called it.
 pub type Status = u8;
-/// Everything that was asked for is done.
+/// Exit status: everything that was asked for is done.
 pub const DONE: Status = 0;
-/// The computation failed, or warned where warnings were to be failures.
+/// Exit status: the computation failed, or gave a warning under `--strict`.
 pub const FAILED: Status = 1;
-/// The study or the command line is wrong.
+/// Exit status: the study or the command line is wrong, and nothing was computed.
 pub const WRONG: Status = 2;
 
-/// Why something could not be printed.
+/// Why writing to standard output failed the first time, as on a full disk; empty if it did not.
 static UNSAID: OnceLock<String> = OnceLock::new();
 /// Warnings printed so far.
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
-/// The error of a rank that does not speak.
+/// The error of a rank other than 0, which is printed only where this rank alone failed.
 static WITHHELD: Mutex<String> = Mutex::new(String::new());
 
-/// The command line.
+/// The words of the command line.
 static WORDS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Forgets what was said before, and keeps the command line.
@@ -78,7 +78,7 @@ pub fn warn(text: &str) {
 }
 
 /// How the program ends where nothing failed: with `strict`, any warning makes it fail, and one line says so. `what`
-/// says what there is all the same.
+/// names what is complete in spite of them.
 pub fn succeeded(strict: bool, what: &str) -> Status {
     let count = match WARNINGS.load(Ordering::Relaxed) {
         _ if !strict => return DONE,
@@ -130,7 +130,9 @@ pub fn use_threads(threads: Option<u16>) -> driftmesh::Result<()> {
     let alone = Ranks::here().count() == 1;
     let number = threads.map_or(if alone { 0 } else { 1 }, usize::from);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(number).use_current_thread().build_global();
-    pool.map_err(|error| Error::invalid("--threads", number, format!("no such pool can be made: {error}")))
+    pool.map_err(|error| {
+        Error::invalid("--threads", number, format!("no pool of so many threads can be made: {error}"))
+    })
 }
 
 /// A time in eight letters or so.

@@ -248,7 +248,12 @@ fn ranks_without_subdomains_are_warned_of() {
     assert_done(&sandbox.alone("alone", &[set]));
     let output = sandbox.ranks(2, "2", &[set]);
     assert_done(&output);
-    assert_eq!(said(&output).matches("warning: 2 ranks compute the same").count(), 1, "{}", said(&output));
+    assert_eq!(
+        said(&output).matches("warning: 2 ranks compute the same, each on its own").count(),
+        1,
+        "{}",
+        said(&output)
+    );
     assert!(sandbox.left("2") == sandbox.left("alone"));
 }
 

@@ -130,7 +130,7 @@ class MeshGenerator:
 
     @property
     def safety(self) -> dict[str, int]:
-        """How far a step that fails is tried again."""
+        """In which ways, and how often, a step that fails is tried again."""
         return dict(self._safety)
 
     @property

@@ -105,7 +105,8 @@ class Strip(Kind):
     Args:
         width: Nodes beyond each cut that a subdomain solves for together with its own, or ``"auto"``.
         coarse: Cells along each axis that make one cell of the coarse lattice, 1 for no coarse lattice, or ``"auto"``.
-        exchanges: Exchanges between neighbours in a step; ``"auto"`` adds some to the first while it is not enough.
+        exchanges: Exchanges between neighbours in a step; ``"auto"`` goes on with them until the error that is left is
+            estimated at no more than a hundredth of the shortest edge.
 
     >>> from driftmesh import Mesh, MeshGenerator, Stochastic, Strip
     >>> mesh = Mesh.uniform(cells=(16, 16))
@@ -148,7 +149,7 @@ class MonteCarlo(Kind):
         substeps: Steps of the Euler–Maruyama scheme in a time step.
         antithetic: Pairs of paths with opposite increments.
         sobol: Increments from a Sobol sequence.
-        control_variate: Subtracts a martingale whose mean is known to be 0.
+        control_variate: Subtracts from each path a sum of its increments whose mean is 0, which lowers the variance.
         common: The same random numbers at all nodes.
 
     >>> from driftmesh import MonteCarlo, Stochastic

@@ -46,7 +46,7 @@ def convergence(error: Floats, ax: Axes | None, **line: Any) -> Axes:
 
 
 def run(of: Run, path: str | PathLike[str] | None, ax: Axes | None) -> Axes:
-    """The last state of a run, by what there is of it."""
+    """The last state of a run: the mesh over its first unknown, errors over iterations, or values over a line."""
     own = ax is None
     ax = _axes(ax)
     iterates = of.summary.get("iterations")

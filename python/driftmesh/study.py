@@ -178,7 +178,8 @@ def studies(directory: str | PathLike[str] = "studies") -> list[Path]:
     """Write the example studies, with the files they read, into a directory, and return the paths of all.
 
     Args:
-        directory: Where they go. It is made where there is none; what is there by the same names is kept.
+        directory: The directory, which is made if it does not exist; files that are there already under the same names
+            are kept.
 
     Raises:
         OSError: The directory cannot be written.

@@ -120,5 +120,5 @@ impl Door for Arguments {
     }
 }
 
-/// The generator that solves the whole domain, as a study writes it.
+/// The generator that solves the whole domain, as a study writes it and remedies name it.
 const WHOLE: &str = "{ kind = \"whole\" }";

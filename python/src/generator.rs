@@ -246,7 +246,10 @@ impl Generator {
             steps_to_rest(&mesh, parts.mover.equation, dt, &*parts.monitor, values)
         })?;
         let limit = limit.map_or("\"auto\" finds how many steps it takes to rest".into(), |steps| {
-            format!("on this u it rests with {:.3e}, {steps:.0} steps; \"auto\" finds it by itself", steps * dt)
+            format!(
+                "on this u the mesh rests with τ = {:.3e}, {steps:.0} steps of `dt`; \"auto\" finds it by itself",
+                steps * dt
+            )
         });
         Ok(format!("`relaxation` is short: the mesh turns back from step to step; {limit}"))
     }

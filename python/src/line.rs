@@ -21,7 +21,7 @@ pub enum Density {
     Function(Py<PyAny>),
 }
 
-/// Memory for each cell, about.
+/// Bytes of memory for each cell, as for a study of a line: measured at a million cells, with a reserve.
 const BYTES_PER_CELL: u128 = 1000;
 
 fn line_density(density: Density, ends: [f64; 2], caller: &Caller) -> driftmesh::Result<LineDensity> {

@@ -35,6 +35,7 @@ struct Last<const D: usize> {
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+/// What a pickled memory must be, for messages about one that cannot be read.
 const OURS: &str = "must be what a generator of this version remembered; make a new one";
 
 fn unfit(value: impl std::fmt::Display, rule: &str) -> Error {

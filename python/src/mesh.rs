@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use std::any::Any;
 use std::sync::Arc;
 
-/// Memory for each node while a mesh is moved, about.
+/// Bytes of memory for each node while a mesh is moved, about.
 const BYTES_PER_NODE: u128 = 1000;
 
 /// An array of a shape that depends on the number of dimensions.

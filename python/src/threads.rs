@@ -12,11 +12,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often signals are looked for.
+/// Time between two looks for a signal, such as Ctrl-C, while a computation runs: too short for a person to notice.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long a computation that was told to stop, and looks whether it was, may take to write what it has.
+/// How long the caller waits, after a signal, for a computation that stops by itself at its next step and writes its
+/// results; after that it is left to finish in the background.
 pub const PATIENCE: Duration = Duration::from_secs(3);
-/// The same for one that may not look.
+/// How long the caller waits, after a signal, for a computation that cannot be stopped: it ends in this time if it was
+/// nearly done, else it is left to finish in the background.
 pub const BRIEFLY: Duration = Duration::from_millis(200);
 
 /// A number of threads; all cores, or what RAYON_NUM_THREADS says, where none is given.
@@ -24,10 +26,10 @@ pub type Threads = Option<usize>;
 /// A pool, with the number of threads that it was asked for with.
 type Pool = (Threads, Arc<ThreadPool>);
 
-/// Pools at rest, kept for the next computations, and the process that they belong to: its threads are not there after
-/// a fork.
+/// Idle pools of threads, kept for the next computations, beside the id of the process that they belong to: a forked
+/// process has none of these threads.
 static RESTING: Mutex<(u32, Vec<Pool>)> = Mutex::new((0, Vec::new()));
-/// Most pools at rest; what is more ends its threads.
+/// Largest number of idle pools that are kept; the threads of further ones end.
 const KEPT: usize = 4;
 
 fn resting() -> MutexGuard<'static, (u32, Vec<Pool>)> {

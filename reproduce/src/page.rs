@@ -147,7 +147,7 @@ fn section(done: &Done) -> Section {
     }
 }
 
-/// A cell with more letters than this is text.
+/// A cell of a table with more letters than this is set as text, not as a number.
 const NUMBER: usize = 24;
 
 fn shown(table: &super::Table) -> Shown {

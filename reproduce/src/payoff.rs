@@ -36,16 +36,20 @@ struct Task {
     target: f64,
 }
 
-/// Grids grow by this factor in the search.
+/// Factor between the cells of one grid and the next in the search for the coarsest grid that meets an error.
 const FINER: f64 = 1.025;
-/// It begins so much further back where its first grid is good enough, and gives up after so many grids.
+/// Where the first grid of the search meets the error already, its cells are divided by this until one does not.
 const BACK: f64 = 1.1;
+/// Number of grids after which the search is given up.
 const MOST: usize = 40;
+/// Viscosities ν of the fronts, from thick to thin.
 const VISCOSITIES: [f64; 4] = [5e-3, 2e-3, 1e-3, 2e-4];
-/// Uniform grids are timed down to this viscosity: beyond, a run would take minutes and say nothing new.
+/// Uniform grids are timed down to this viscosity; times for thinner fronts are extrapolated, since a run would take
+/// minutes.
 const TIMED: f64 = 5e-4;
-/// Runs of which the fastest counts, and the seconds above which two are enough.
+/// Number of runs on the grid that is found; the fastest counts.
 const RUNS: usize = 5;
+/// Seconds of a run above which two runs are enough: noise is a small share of them.
 const LONG: f64 = 0.5;
 const METHODS: [(&str, Method); 3] = [
     ("moving mesh, nothing set by hand", Method::Moving),

@@ -11,7 +11,7 @@ pub(super) struct Following<const D: usize> {
     unknowns: usize,
 }
 
-/// x, y, t and as many unknowns as any equation has.
+/// Number of values that a formula takes at a place: x, y, t, and as many unknowns as any equation has.
 const PLACES: usize = 12;
 
 impl<const D: usize> Following<D> {

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 /// On a line of N cells over the length L, 0.2 is 0.2 L/N. Along every mesh line ρ is cut to
 ///
 /// ```text
-/// m/largest ≤ ρ ≤ m/smallest,   m = the mean of what is left along the line,
+/// m/largest ≤ ρ ≤ m/smallest,   m = the mean of the limited ρ along the line,
 /// ```
 ///
-/// since at rest an edge has the length m L/(N ρ) on a line. In the plane, where mesh lines are tied to their
-/// neighbours, edges in front of which ρ changes along the other axis come near to that.
+/// since at rest an edge has the length m L/(N ρ) on a line. In the plane mesh lines are tied to their neighbours, and
+/// where ρ also changes across the lines, edges meet the limits only nearly.
 ///
 /// # Example
 /// ```
@@ -38,9 +38,10 @@ pub struct CellSizes {
     pub largest: Option<f64>,
 }
 
-/// Steps to the mean of a limited density: each at least halves an interval of double precision.
+/// Largest number of steps in the search for the mean m of a limited density: each at least halves its interval, of
+/// which double precision allows about 60 halvings.
 const STEPS: usize = 100;
-/// The mean is known to this share.
+/// The search for the mean m ends once it changes by no more than this share: round-off.
 const CLOSE: f64 = 1e-14;
 
 impl CellSizes {

@@ -80,7 +80,7 @@ pub trait Monitor<const D: usize = 2>: Send {
 kinds! {
     /// `[monitor]` of a study.
     MonitorKind {
-        "auto" = RootGradientTable: "rho = 1 + 4 sqrt(|du/dx|) over its mean along each axis, smoothed; nothing to set",
+        "auto" = RootGradientTable: "rho = 1 + 4 sqrt(|du/dx|)/mean along each axis, smoothed; nothing to set",
         "arclength" = ArclengthTable: "rho = sqrt(1 + alpha |grad u|^2), smoothed",
         "curvature" = CurvatureTable: "rho = (1 + alpha |H|^2)^(1/(D + 4)), H the second derivatives of u, smoothed",
         "given" = GivenTable: "rho = the unknown itself, smoothed",

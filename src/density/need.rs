@@ -13,22 +13,24 @@ const BENDS: [f64; 2] = [0.06, 0.09];
 /// Number of nodes in a row over which bends are added up: those of a jump are in four of them.
 const WINDOW: usize = 4;
 
-/// What a mesh that is not even keeps of these limits: it goes back to equal cells only where these resolve u this much
-/// better. On its way back a front would leave the nodes behind, which have to travel far, and pass through cells wider
-/// than equal ones; and were the limits the same, a solution near them would send the mesh to and fro.
+/// Factor of [`SLOPES`] and [`BENDS`] on a mesh that is far from even: it goes back to equal cells only where these
+/// resolve u that much better. On its way back a front would leave the nodes behind, which have to travel far, and pass
+/// through cells wider than equal ones; and were the limits the same, a solution near them would send the mesh to and
+/// fro.
 const KEPT: f64 = 0.25;
-/// One less the smallest cell over an equal one, from which on a mesh begins not to be even, and is not.
+/// 1 − (smallest cell)/(equal cell), by volume: up to the first a mesh counts as even, from the second on as far from
+/// even.
 const UNEVEN: [f64; 2] = [0.4, 0.7];
 
 /// The need for a density that is not even
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Need {
-    /// What is left of the limits for this mesh.
+    /// Factor of [`SLOPES`] and [`BENDS`] on this mesh, from [`KEPT`] to 1.
     kept: f64,
 }
 
 impl Need {
-    /// On equal cells, whatever the mesh is.
+    /// The need of equal cells, whatever the mesh is.
     pub const OF_EQUAL_CELLS: Self = Self { kept: 1.0 };
 
     /// On a mesh.
@@ -43,13 +45,14 @@ impl Need {
         Self { kept: 1.0 - (1.0 - KEPT) * uneven }
     }
 
-    /// Where u changes by `share` of its range over an equal cell at most: 0 where equal cells resolve u, 1 where they
-    /// do not.
+    /// The need where u changes by at most `share` of its range over an equal cell: 0 where equal cells resolve u, 1
+    /// where they do not.
     pub fn by_slopes(self, share: f64) -> f64 {
         between(SLOPES.map(|limit| self.kept * limit), share)
     }
 
-    /// The same where u bends by `share` of its range in both directions within a few nodes.
+    /// The need where u bends by `share` of its range in both directions within [`WINDOW`] nodes: 0 where equal cells
+    /// resolve u, 1 where they do not.
     pub fn by_bends(self, share: f64) -> f64 {
         between(BENDS.map(|limit| self.kept * limit), share)
     }

@@ -54,20 +54,21 @@ const CONTRAST: f64 = 1e6;
 /// are about a hundredth of equal ones. A shock without viscosity is never wider than a cell, and thinner cells take
 /// more steps to follow it.
 const CONTRAST_OF_JUMPS: f64 = 500.0;
-/// Lengths in equal cells of edges that are short enough to hold a jump, and that are not.
+/// Lengths of an edge in units of an equal cell: up to the first it may hold a jump, from the second on it does not,
+/// since a mesh has its shortest edges at a jump.
 const THIN: [f64; 2] = [0.05, 0.2];
-/// Ratio of the steepest slope to the background's below which the density is even, and above which it counts in full:
-/// where all slopes are alike there is no place from which nodes could be taken.
+/// Steepest slope over the background slope: below the first ratio the density is constant, above the second it counts
+/// in full. Where all slopes are alike there is no place from which nodes could be taken.
 const STEEPER: [f64; 2] = [2.0, 4.0];
 /// Number of passes of the filter (1 2 1)/4 on 41 × 41 nodes with one layer; it grows with the square of the number of
 /// nodes along an axis, so that the filter is a twentieth of the domain wide.
 const PASSES: f64 = 8.0;
-/// Up to this many layers on a lattice line the density is smoothed as for one layer. Were two of them smoothed less,
-/// on periodic axes or where a front winds across the lines, a mesh of 40 cells would not come to rest around layers
-/// thinner than a hundredth of the box.
+/// Number of layers on a lattice line up to which the density is smoothed as for one layer. Were two of them smoothed
+/// less, on periodic axes or where a front winds across the lines, a mesh of 40 cells would not come to rest around
+/// layers thinner than a hundredth of the box.
 const FEW: f64 = 2.0;
-/// u is constant but for what solvers leave where its change over the domain, at the steepest slope, is below this
-/// share of its size.
+/// u counts as constant where its steepest slope times the extent of the domain is below this share of its largest
+/// value: such changes are the error of solvers.
 const ALIKE: f64 = 1e-7;
 /// Slopes are even where their excess is below this share of the background.
 const ROUNDING: f64 = 1e-10;

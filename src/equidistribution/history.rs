@@ -134,7 +134,8 @@ impl History {
                 format!("; that is rounding, which no iteration lowers: ask for {:.0e} or more", rounding / length)
             }
             _ if still => {
-                "; it stands still: with these conditions subdomains learn next to nothing of each other".into()
+                "; it no longer changes: with these conditions hardly anything passes from one subdomain to another"
+                    .into()
             }
             (Some(rate), Some(more)) if more <= MOST_ITERATIONS as f64 => {
                 format!("; it contracts by {rate:.4} in two iterations: about {more:.0} more would do")
@@ -143,7 +144,7 @@ impl History {
             _ if matches!(method, Method::Classical { linearized: true, .. }) => {
                 "; the linearised iteration need not converge where M varies much over the overlap".into()
             }
-            _ if count < FEW => "; so few do not tell whether it contracts".into(),
+            _ if count < FEW => "; so few iterations do not tell whether it contracts".into(),
             _ => "; it does not contract".into(),
         };
         let converges = !still && (more.is_some_and(|more| more <= MOST_ITERATIONS as f64) || count < FEW);

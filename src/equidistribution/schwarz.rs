@@ -62,7 +62,7 @@ pub enum Coarse {
 /// The parameter p of Robin conditions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Robin {
-    /// The same value at every cut.
+    /// The same p at every cut.
     Value(f64),
     /// M̃/α for two subdomains that meet at ξ = α, with M̃ = M at the mean of both sides' last values; `lagged` for
     /// more of them.

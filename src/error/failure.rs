@@ -75,7 +75,7 @@ pub enum Failure {
         /// The node.
         at: NodePlace,
     },
-    /// An explicit step that would not end in any time worth waiting for.
+    /// An explicit step would take too many substeps: over 1e8 on a uniform mesh, over 2e4 by limited fluxes.
     #[error("the step would take {substeps:.1e} explicit substeps for speeds up to {speed:.1e}")]
     ManySubsteps {
         /// Substeps that stability needs.
@@ -124,7 +124,7 @@ pub enum Failure {
         /// The node.
         at: NodePlace,
     },
-    /// Random walks that would not end in any time worth waiting for.
+    /// The random walks of a step would take more than 1e11 jumps.
     #[error(
         "{walks} random walks from each of {points} points would take too long: Δt/(τh²) = {stiffness:.1e}, about \
          {jumps:.1e} jumps a walk"
@@ -228,7 +228,7 @@ pub enum Failure {
     NotConverged {
         /// What is measured.
         measure: &'static str,
-        /// Its last value.
+        /// The last value of that measure.
         last: f64,
         /// Iterations done.
         iterations: usize,
@@ -312,7 +312,7 @@ pub enum Failure {
         wall: &'static str,
         /// Where.
         x: f64,
-        /// Its temperature.
+        /// Temperature of the wall there.
         value: f64,
         /// T_m.
         melting: f64,
@@ -332,7 +332,7 @@ pub enum Failure {
     OutOfRange {
         /// The setting, in the reader's words.
         what: String,
-        /// Its value.
+        /// The value of the setting.
         value: String,
         /// What must hold.
         rule: String,
@@ -342,7 +342,7 @@ pub enum Failure {
     WrongLength {
         /// The array.
         what: &'static str,
-        /// Its length.
+        /// Number of values in the array.
         found: usize,
         /// Number of nodes.
         expected: usize,

@@ -19,8 +19,8 @@ impl Cause {
             Self::BlowUp => vec![
                 Remedy::any([Refine(Setting::Cells)]).with(" where a layer forms that the mesh does not resolve"),
                 Remedy::any([Set(Setting::Flux, &["\"energy\""])])
-                    .with(", which keeps Burgers' equation stable meanwhile"),
-                Remedy::any([Change("end the run before with", Setting::End)])
+                    .with(", which keeps Burgers' equation stable until cells resolve the layer"),
+                Remedy::any([Change("end the run before that time with", Setting::End)])
                     .with(" where the equation itself blows up"),
             ],
             Self::Restless => vec![Remedy::any([
@@ -34,11 +34,11 @@ impl Cause {
                     Say("smooth the initial solution where it jumps, also against its sides,"),
                     Refine(Setting::Cells),
                 ]),
-                Remedy::any([Number(Setting::TimeStep)]).with(", which goes over it"),
+                Remedy::any([Number(Setting::TimeStep)]).with(", which steps over the jump"),
             ],
             Self::Stiff => vec![
                 Remedy::any([Say("smooth what jumps in time"), Number(Setting::TimeStep)])
-                    .with(", since fast sources allow longer steps than their changes do"),
+                    .with(", since implicit steps may be longer than the time in which a fast source acts"),
             ],
         }
     }
@@ -174,7 +174,7 @@ impl Failure {
                 Say("move the mesh of the unit square instead, and map it to the domain"),
                 Set(Setting::Generator, &["{ kind = \"fixed\" }"]),
             ])],
-            Self::OutOfRange { .. } => vec![Remedy::any([Say("give a value that does")])],
+            Self::OutOfRange { .. } => vec![Remedy::any([Say("give a value within the range that the message names")])],
             Self::WrongLength { .. } => vec![Remedy::any([Say("give one value a node, in lattice order")])],
             _ => Vec::new(),
         }

@@ -170,12 +170,12 @@ impl Remedy {
         Self { acts: acts.into(), ..Self::default() }
     }
 
-    /// The same remedy in a case that these words tell, which stand before it.
+    /// This remedy for one case only: `before` names the case, in words that stand before the remedy.
     pub fn when(self, before: &'static str) -> Self {
         Self { before, ..self }
     }
 
-    /// The same remedy, followed by these words.
+    /// This remedy with further words behind it.
     pub fn with(self, behind: &'static str) -> Self {
         Self { behind, ..self }
     }

@@ -79,7 +79,7 @@ pub(super) enum Node {
 const MAX_PRODUCT: f64 = 32.0;
 
 impl Node {
-    /// The same operation on other operands.
+    /// This operation with each operand replaced by `to` of it.
     pub fn map(self, mut to: impl FnMut(Id) -> Id) -> Self {
         match self {
             Self::Constant(_) | Self::Variable(_) => self,

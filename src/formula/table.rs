@@ -58,6 +58,7 @@ pub struct Table {
 /// A share of the length of a table by which rounding may lead out of it.
 const ROUNDING: f64 = 1e-9;
 
+/// Number of the next table that is made, by which tables are told apart.
 static NUMBERS: AtomicU32 = AtomicU32::new(0);
 
 thread_local! {

@@ -35,7 +35,7 @@ const GAUSS: [(f64, f64); 6] = [
     (0.8306046932331322, 0.1803807865240693),
     (0.966234757101576, 0.08566224618958518),
 ];
-/// Number of places along an axis at which a map is looked at before it is used.
+/// Number of places along an axis at which a map is evaluated and checked before it is used.
 const SAMPLES: usize = 64;
 /// Ends of a closed axis may be apart by this share of the size of the domain, which is round-off.
 const SEAM: f64 = 1e-9;
@@ -215,9 +215,11 @@ impl Chart<2> {
 
     /// The place of a point, by Newton's method from a place nearby; nothing where it is outside or not found.
     pub(super) fn place(&self, x: [f64; 2], near: [f64; 2]) -> Option<[f64; 2]> {
-        /// From a place in the same cell three or four steps are enough.
+        /// Steps of Newton's method after which the place counts as not found: from a place in the same cell it takes
+        /// three or four.
         const STEPS: usize = 30;
-        /// Beyond the sides of the unit box by this much is rounding.
+        /// The place is found once its image is off x by at most this share of the size of the domain: rounding of the
+        /// map.
         const ROUNDING: f64 = 1e-9;
         let clamped = |s: [f64; 2]| [0, 1].map(|d| if self.closed[d] { s[d] } else { s[d].clamp(0.0, 1.0) });
         let mut s = near;

@@ -108,7 +108,8 @@ struct Starts<'a> {
     cells: Vec<[isize; 2]>,
 }
 
-/// So many points have one starting cell, since each of these costs a search, too.
+/// Number of points that share a starting cell: a starting cell costs a search of its own, and fewer would make the
+/// searches from it longer.
 const POINTS_A_START: f64 = 8.0;
 
 impl<'a> Starts<'a> {

@@ -57,9 +57,10 @@ pub struct Interpolator<const D: usize> {
 const ROUNDING: f64 = 1e-9;
 /// Most steps of Newton's method to find ξ in the cubic map. From the linear one it takes three or four.
 const NEWTON_STEPS: usize = 12;
-/// Changes of ξ below this are of rounding.
+/// Newton's method has converged once it changes ξ by less than this, in cells: rounding.
 const CONVERGED: f64 = 1e-12;
-/// How far beyond its cell ξ of the cubic map may lie, in cells.
+/// Newton's method is given up where it leads farther than this beyond the cell, in cells: the point then has no place
+/// in the cubic map.
 const BEYOND: f64 = 0.5;
 
 /// True where two points are one, up to rounding.

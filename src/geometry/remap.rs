@@ -161,8 +161,8 @@ fn counted_from_near<const D: usize>(
     Ok((from.placed(x)?, fields))
 }
 
-/// Values above this are carried in units of it, so that nothing overflows. It is a power of two, so that they keep
-/// their bits.
+/// Values larger than this are divided by it while they are carried, so that sums of their products do not overflow. It
+/// is a power of two, so that they keep their bits.
 const LARGE: f64 = (1_u128 << 127) as f64;
 /// The largest area that the faces of a dual cell may sweep in one step, as a share of its area. Up to a half, limited
 /// slopes and Heun's method keep values within the range of their neighbours.

@@ -6,7 +6,7 @@ pub(crate) fn dot<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
     (1..D).fold(a[0] * b[0], |sum, d| sum + a[d] * b[d])
 }
 
-/// Squares from which a length is as exact as its vector: sums of smaller and larger ones lose digits or overflow.
+/// Range of sums of squares whose root is an exact length: smaller sums lose digits to underflow, larger ones overflow.
 const SQUARES: std::ops::Range<f64> = 1e-280..1e280;
 
 /// The length of a vector, which does not overflow where its square would.

@@ -5,8 +5,8 @@ use crate::error::{Error, Failure, NodePlace, Result};
 use crate::geometry::{Mesh, padded};
 use crate::parallel;
 
-/// Places along an edge at which D is looked at. Their number is even, so that a jump in the middle of an edge, at the
-/// face between two nodes, is between two of them.
+/// Number of places along an edge at which D is evaluated. Their number is even, so that a jump in the middle of an
+/// edge, at the face between two nodes, is between two of them.
 const SAMPLES: usize = 8;
 
 /// Places of the eight neighbours of a node, in the order of [`LatticeMatrix::POINTS`] behind the node itself.

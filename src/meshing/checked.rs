@@ -4,8 +4,8 @@ use super::{Mmpde, Moved, Relaxation, Steps};
 use crate::error::Failure;
 use crate::geometry::{Density, Mesh, check_unfolded, mark_folded};
 
-/// A folded mesh is blamed on noise where the standard error of the interface values exceeds this share of its shortest
-/// edge.
+/// A message blames a fold on noise where the standard error of the interface values exceeds this share of the shortest
+/// edge of the mesh.
 const NOISE_THAT_FOLDS: f64 = 0.05;
 /// Nodes may lie off the sides of the box by this share of its extent, which is round-off.
 const ROUNDING: f64 = 1e-9;
@@ -47,9 +47,9 @@ pub(super) fn check_box<const D: usize>(mesh: &Mesh<D>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The most passes over places around folded cells.
+/// Largest number of passes that even out the nodes around folded cells.
 const PASSES: usize = 60;
-/// The most times that ways are halved.
+/// Largest number of halvings of the distances that nodes move: 2⁻¹⁶ of a step makes no progress.
 const HALVINGS: usize = 16;
 
 /// The mesh whose nodes lie at other places of the unit box, or next to them

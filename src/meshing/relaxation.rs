@@ -87,13 +87,13 @@ fn is_zero(gain: &f64) -> bool {
     *gain == 0.0
 }
 
-/// τ/Δt at the first step of a mesh for which τ is chosen.
+/// τ in time steps at the first step of a mesh with τ = "auto".
 pub const STEPS_TO_BEGIN_WITH: f64 = 40.0;
-/// γ of a mesh for which τ is chosen.
+/// γ of a mesh with τ = "auto": the share of a correction that the velocity of a node learns in a step.
 const PREDICTION_BY_ITSELF: f64 = 0.2;
 /// Smallest τ/Δt that may be set: with less, a mesh folds on any thin layer.
 const FEWEST_STEPS: f64 = 2.0;
-/// Largest γ that may be set: with more, the mesh oscillates about its density.
+/// Largest γ that may be set: with more, the mesh oscillates about the mesh that its density asks for.
 const MOST_PREDICTION: f64 = 0.5;
 
 impl From<f64> for Relaxation {

@@ -49,7 +49,8 @@ pub struct Schwarz<const D: usize = 2, const S: usize = 5> {
     pub overlap: usize,
     /// What neighbours exchange: positions (`"classical"`) or Robin's conditions (`"optimized"`).
     pub method: Transmission,
-    /// p of Robin's condition, in units of one over the length of the unit square of ξ.
+    /// p > 0 of Robin's condition ∂_n c + p c for the correction c of the mesh, with lengths measured in the unit
+    /// square of ξ; "auto" takes the p for which the slowest wave along a cut converges fastest.
     pub robin: Auto<f64>,
     /// The iteration ends once it changes no node by more than this share of the largest coordinate. Without a
     /// tolerance it ends after `iterations`, which is no failure.
@@ -87,8 +88,9 @@ struct Written<const D: usize> {
     /// What neighbours exchange: positions (`"classical"`) or Robin's conditions (`"optimized"`).
     #[serde(default)]
     method: Transmission,
-    /// p of Robin's condition ∂_n c + p c with `method = "optimized"`, in units of one over the length of the unit
-    /// square of ξ.
+    /// p > 0 of Robin's condition ∂_n c + p c, which neighbours exchange with `method = "optimized"`: c is the
+    /// correction of the mesh, and lengths are measured in the unit square of ξ. "auto" takes the p for which the
+    /// slowest wave along a cut converges fastest.
     #[serde(default)]
     robin: Auto<f64>,
     /// Largest change of a node in the last iteration, as a share of the largest coordinate. 1e-10 where neither this
@@ -112,10 +114,12 @@ impl<const D: usize, const S: usize> From<Written<D>> for Schwarz<D, S> {
     }
 }
 
-/// Defaults of a study: cells of overlap, tolerance as a share of the largest coordinate, and largest number of
-/// iterations.
+/// Number of cells that neighbouring subdomains share where a study gives none.
 const OVERLAP: usize = 2;
+/// Tolerance where a study gives neither this nor a number of iterations, as a share of the largest coordinate: far
+/// below the shortest edge of any mesh.
 const TOLERANCE: f64 = 1e-10;
+/// Largest number of iterations where a study gives none.
 const ITERATIONS: usize = 1000;
 
 impl<const D: usize, const S: usize> Schwarz<D, S> {
@@ -189,8 +193,9 @@ impl<const D: usize, const S: usize> Schwarz<D, S> {
     }
 }
 
-/// Numbers of waves along a cut, and of values of β, among which the minimax for p = "auto" is searched.
+/// Number of waves along a cut among which p = "auto" looks for the one that converges slowest.
 const WAVES: usize = 64;
+/// Number of values of β among which p = "auto" looks for the one whose slowest wave converges fastest.
 const TRIALS: usize = 200;
 
 impl<const D: usize, const S: usize> Schwarz<D, S> {

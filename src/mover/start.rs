@@ -44,11 +44,12 @@ const JUMP_AT_THE_END: f64 = 0.4;
 const THIN_AT_THE_END: f64 = 0.1;
 /// A mesh stands still where no node moves by more than this share of the shortest edge in a step.
 const AT_REST: f64 = 4e-3;
-/// Factor between one τ and the next that is tried.
+/// Factor between one τ and the next, longer one that is tried until a mesh rests with it.
 const LONGER: f64 = 1.25;
-/// A τ of this many steps is not tried any more.
+/// τ in time steps from which on the search for a τ with which the mesh rests is given up.
 const LONGEST: f64 = 1e3;
-/// A mesh that does not turn back in [`WATCHED`] steps may do so later where its τ is close to the limit.
+/// Factor of the shortest τ with which the mesh rests in [`WATCHED`] steps, for the τ that a message recommends: with a
+/// τ close to the limit it may turn back later.
 const SURE: f64 = 1.5;
 /// Number of steps in which a mesh that is moved with a τ is watched.
 const WATCHED: usize = 200;

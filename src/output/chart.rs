@@ -120,6 +120,7 @@ impl Chart<'_> {
 
     /// Names of the curves in a corner, at the top right where none is free.
     fn legend(&self, s: &mut String) {
+        /// Room between the legend and the frame, and within the legend, in units of the drawing.
         const MARGIN: f64 = 8.0;
         let [right, upper] = self.figure.free_corner().unwrap_or([true, true]);
         let named: Vec<(&Curve, [u8; 3])> = self

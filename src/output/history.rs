@@ -16,6 +16,7 @@ pub struct History {
     flushed: Instant,
 }
 
+/// Least time between two writings of rows to the file: a watching reader waits no longer, and short steps cost little.
 const BETWEEN_FLUSHES: Duration = Duration::from_millis(500);
 
 #[derive(Serialize)]

@@ -18,7 +18,7 @@ pub const REPORT: &str = "report.html";
 pub const ANIMATION: &str = "animation.gif";
 /// The folder of the frames, and the file that puts them in time.
 pub const FRAMES: [&str; 2] = ["frames", "run.pvd"];
-/// The same of the run that this one is compared with.
+/// The folder of the frames of the run that this one is compared with, and the file that puts them in time.
 pub const COMPARED: [&str; 2] = ["compare", "compare.pvd"];
 /// The newest checkpoint of a run that is not at its end and the one before, written in turns.
 pub const CHECKPOINTS: [&str; 2] = ["checkpoint.0", "checkpoint.1"];

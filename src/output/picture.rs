@@ -44,7 +44,7 @@ impl Picture {
 
 /// The font of all drawings.
 pub(super) const FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
-/// Bytes of a part of a PNG.
+/// Largest number of bytes in an IDAT chunk of a PNG.
 const CHUNK: usize = 1 << 16;
 
 /// Colours of an image, row by row.

@@ -172,7 +172,9 @@ impl Sheet {
 /// The title, over the box; over the whole drawing where it is too wide for that, and as small as it needs to be; in
 /// two lines where that would be too small to read.
 fn heading(s: &mut String, title: &str, width: f64, whole: f64) {
+    /// Size of the font of a title that fits, in units of the drawing.
     const SIZE: f64 = 15.0;
+    /// Size of the font below which a title is divided into two lines, in units of the drawing.
     const LEGIBLE: f64 = 10.0;
     let letters = |line: &str| line.chars().count();
     let fitting = |line: &str| SIZE.min((whole - 20.0) / (WIDE * letters(line) as f64));

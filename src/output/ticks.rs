@@ -1,9 +1,9 @@
 //! Marks of linear and logarithmic axes, and their labels.
 
-/// Labels that would be long count from a round number below the axis, or above its beginning by no more than this
-/// share of its length.
+/// Labels that would be long are differences from a round number below the axis; it may also lie above the lower end of
+/// the axis, by no more than this share of its length.
 const NEARLY: f64 = 0.05;
-/// Figures that round numbers begin with.
+/// Leading digits of round numbers.
 pub(super) const ROUND: [f64; 3] = [1.0, 2.0, 5.0];
 /// Numbers that differ by less than this share of themselves count as the same on a logarithmic axis: rounding.
 const SLACK: f64 = 1e-9;

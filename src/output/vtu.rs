@@ -11,9 +11,9 @@ const QUAD: u8 = 9;
 /// A series of unstructured grids over one lattice, as `.vtu` files with compressed inline arrays.
 #[derive(Debug)]
 pub(crate) struct Grid {
-    /// Cells of a document.
+    /// Number of cells of each document.
     count: usize,
-    /// They themselves, in all documents.
+    /// The text of the cells, which is the same in all documents.
     topology: String,
 }
 

@@ -71,8 +71,8 @@ pub enum Convection {
     /// u u_x + u u_y by central differences at nodes.
     Advective,
     /// Finite volumes on dual cells: Σ A u changes only by the flux through the sides, on any moving mesh. Where cells
-    /// are wider than 2ν/u and hold more than a few hundredths of the range of u, the value from upstream limits what
-    /// passes.
+    /// are wider than 2ν/u and u changes over them by more than a few hundredths of its range, the flux through a face
+    /// is limited toward that of the upstream value.
     #[default]
     Flux,
 }
@@ -199,9 +199,9 @@ impl pulp::WithSimd for FrontAt<'_> {
 
 impl Law<1> for Burgers {
     type Node = f64;
-    /// Fluxes in wide cells are limited where u changes over a face by more than these shares of its range. The feet of
-    /// a layer that the mesh resolves stand in wide cells that hold next to nothing: the product of both values
-    /// oscillates little there, and limited fluxes have up to twice the error.
+    /// Fluxes in wide cells are limited where u changes over a face by more than these shares of its range. Where a
+    /// layer that the mesh resolves begins and ends, cells are wide and u changes little over them: the flux `product`
+    /// hardly oscillates there, and limited fluxes have up to twice the error.
     const COUNTING: Option<[f64; 2]> = Some([0.02, 0.05]);
 
     fn names(&self) -> [&'static str; 1] {

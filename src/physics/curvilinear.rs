@@ -65,7 +65,7 @@ pub(super) fn gradient(x: &[[f64; 2]], k: usize, strides: [usize; 2]) -> [[f64; 
     gradient_and_inverse(x, k, strides).0
 }
 
-/// These weights, and 1/J with undivided differences.
+/// The weights of [`gradient`], and 1/J with undivided differences.
 fn gradient_and_inverse(x: &[[f64; 2]], k: usize, [s, t]: [usize; 2]) -> ([[f64; 2]; 4], f64) {
     let (xi, eta) = (minus(x[k + s], x[k - s]), minus(x[k + t], x[k - t]));
     let inverse = 1.0 / cross(xi, eta);

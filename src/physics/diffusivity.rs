@@ -185,7 +185,7 @@ impl JsonSchema for Diffusivity {
         ] });
         json_schema!({ "anyOf": [
             own,
-            { "type": "object", "additionalProperties": own, "description": "By the gradients of some unknowns." },
+            { "type": "object", "additionalProperties": own, "description": "By the unknown whose gradient acts." },
         ] })
     }
 }

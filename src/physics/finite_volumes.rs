@@ -29,9 +29,8 @@ pub(super) trait Law<const B: usize, const D: usize = 2>: Sync {
     /// Newton's method has converged once, after at least one step, every residual is below this share of the size of
     /// its unknown: far below the error of a time step.
     const TOLERANCE: f64 = 1e-6;
-    /// Where fluxes are limited in wide cells ([`Damping`](damping::Damping)): change over a face, as a share of the
-    /// range of the unknown, from which that begins, and from which it is complete. None where it is complete for any
-    /// change.
+    /// Change of an unknown over a face, as a share of its range, from which its flux begins to be limited in wide
+    /// cells ([`Damping`](damping::Damping)), and from which it is limited in full. `None`: in full for any change.
     const COUNTING: Option<[f64; 2]> = None;
 
     /// Names of the unknowns, for messages.

@@ -61,12 +61,13 @@ use std::collections::BTreeMap;
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "FormulaPde")]
 pub struct FormulaPde<const D: usize = 2> {
-    /// Names of the unknowns, at most [`MAX_UNKNOWNS`].
+    /// Names of the unknowns: at most four in the plane, eight on a line.
     pub unknowns: Vec<String>,
     /// Flux F of each unknown, as formulas along x and along y; 0 by default.
     #[serde(default, skip_serializing_if = "no_flux")]
     pub flux: Fluxes<D>,
-    /// Diffusivity D ≥ 0 of each unknown, a [`Diffusivity`]; 0 by default.
+    /// Diffusivity D ≥ 0 of each unknown: a formula, one for each axis, a tensor as rows of formulas, or a table of
+    /// these by the unknown whose gradient drives the flux; 0 by default.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub diffusivity: BTreeMap<String, Diffusivity>,
     /// What takes the place of u in u_t, a formula of the unknowns, x, y and t; 0 for an equation without time
@@ -88,8 +89,9 @@ pub struct FormulaPde<const D: usize = 2> {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub boundary: BTreeMap<String, Conditions>,
     /// The lower and the upper bound of an unknown, formulas of x, y and t, or ±∞ for none: an obstacle, or what is
-    /// known of a solution. Where an unknown lies on its bound, its equation holds but for what it takes not to leave
-    /// it. Without bounds, an unknown with a source keeps to −1, 0 and 1 where its equation does and pushes away.
+    /// known of a solution. Where an unknown lies on its bound, its equation has a further source, just strong enough
+    /// to keep it there, so that ∫u changes. An unknown with a source and without bounds does not pass those of −1, 0
+    /// and 1 that solve its equation, if the source drives it away from one of them: round-off would grow there.
     #[serde(default, skip_serializing_if = "no_flux")]
     pub bounds: Fluxes<2>,
     /// `"limited"` fluxes, of the second order where the solution is smooth and without new extrema, which are carried
@@ -107,9 +109,9 @@ pub struct FormulaPde<const D: usize = 2> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Scheme {
-    /// By the mean of both sides of a face, implicitly.
+    /// The value at a face is the mean of the values on both sides of it; stepped implicitly.
     Central,
-    /// By values that lie between those of the nodes, in explicit substeps: no new extrema.
+    /// The value at a face is limited so that no new extrema arise; stepped in explicit substeps.
     Limited,
 }
 

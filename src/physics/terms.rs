@@ -7,7 +7,7 @@ use crate::geometry::Mesh;
 use crate::parallel;
 
 /// Number of values that formulas of terms take at a place: coordinates, unknowns, their derivatives along all axes,
-/// one unknown after the other, and t in all places that are left.
+/// one unknown after the other, and t in all that remain.
 const PLACES: usize = 20;
 
 /// A formula, and which entry of a result it gives.

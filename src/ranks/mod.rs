@@ -51,7 +51,8 @@ static HERE: OnceLock<Ranks> = OnceLock::new();
 static MESSAGES: AtomicU64 = AtomicU64::new(0);
 static BYTES: AtomicU64 = AtomicU64::new(0);
 
-/// In place of a length: the rank has come to its end and exchanges nothing more. Its exit status is added.
+/// Bit of a word that a rank sends in place of a length when it has come to its end and exchanges nothing more; the
+/// other bits are its exit status.
 const ENDED: u64 = 1 << 63;
 /// How long a rank waits to be ended by one that failed, before it ends all itself.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// How long a rank asks again and again for what others send, before it sleeps between questions: where there are more
 /// ranks than cores, one that never sleeps takes the core that another needs.
 const AWAKE: Duration = Duration::from_micros(200);
-/// How long it sleeps.
+/// How long a waiting rank sleeps between two questions.
 const NAP: Duration = Duration::from_micros(20);
 
 /// MPI as long as it is there; dropping it waits for the other ranks.

@@ -7,9 +7,9 @@ use crate::simulation::{Scene, Values};
 use gif::{Encoder, Repeat};
 use std::collections::HashMap;
 
-/// Largest number of frames of an animation; of more, evenly spaced ones are taken.
+/// Largest number of frames of an animation; of a run with more, evenly spaced ones are taken.
 const MOST: usize = 120;
-/// Time that all frames take together, about, in hundredths of a second.
+/// Time that an animation takes, about, in hundredths of a second.
 const WHOLE: usize = 500;
 /// Shortest and longest time of a frame, in hundredths of a second.
 const ONE: [usize; 2] = [4, 25];
@@ -25,7 +25,7 @@ const STRENGTHS: [f64; 2] = [0.25, 0.5];
 const GREYS: usize = 26;
 /// Steps from white to the colour of a curve.
 const STEPS: usize = 128;
-/// A density whose largest value is so many times its smallest one gets a logarithmic axis.
+/// Largest over smallest density above which its axis is logarithmic.
 const MUCH: f64 = 30.0;
 /// Colours of a front, and of its antialiased edge on white.
 const FRONT: [[u8; 3]; 2] = [[213, 94, 0], [234, 174, 128]];

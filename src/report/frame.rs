@@ -133,6 +133,7 @@ fn integers<const N: usize>(array: &Array<'_>, count: usize) -> Result<Vec<usize
 
 /// Decodes a block after a header of four numbers, up to a number of bytes.
 fn bytes(array: &Array<'_>, most: usize) -> Result<Vec<u8>, String> {
+    /// Letters of base64 that hold the header: four numbers of eight bytes.
     const HEADER: usize = 44;
     let damaged = |what: &str| format!("its array {:?} is damaged ({what})", array.name);
     let compressed = array.text.get(HEADER..).ok_or_else(|| damaged("too short"))?;

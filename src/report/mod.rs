@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub struct Built {
     /// The page.
     pub path: PathBuf,
-    /// Its size.
+    /// Size of the page in bytes.
     pub bytes: usize,
     /// Files that were damaged or left out.
     pub notes: Vec<String>,

@@ -9,7 +9,7 @@ use std::io::Write;
 
 /// The data of the viewer on the page.
 pub struct Viewer {
-    /// Its data, as JSON that cannot end a script element.
+    /// What the viewer shows, as JSON that cannot end a script element.
     pub data: String,
     /// Whether it shows a line.
     pub line: bool,

@@ -5,10 +5,10 @@ use crate::geometry::Mesh;
 use crate::meshing::Movable;
 use crate::physics::Motion;
 
-/// Length of the steps that solve for unknowns without a time derivative, as a share of the run: the others change by
-/// less in it than the solution is exact to.
+/// Length of the steps that solve for initial values of unknowns without a time derivative, as a share of the run: in
+/// so short a time the other unknowns change by less than the error of a run.
 const MOMENT: f64 = 1e-6;
-/// Number of these steps: Newton's method may end in each of them with a thousandth of what was wrong at its start.
+/// Number of these steps: Newton's method may end in each of them with a thousandth of the residual at its start.
 const ROUNDS: usize = 3;
 
 impl<const D: usize> Simulation<D>

@@ -26,13 +26,14 @@ pub(super) struct Control {
 const ORDER: f64 = 3.0;
 /// Weight of the newest error in the exponent of the next step length.
 const NEWEST: f64 = 0.7;
-/// Weight of the error before in the exponent of the next step length.
+/// Weight of the error of the step before in the exponent of the next step length.
 const BEFORE: f64 = 0.4;
 /// Error of a step at which steps aim, as a share of the tolerance, so that few are refused.
 const AIM: f64 = 0.8;
 /// Factors by which a step is at most shorter and longer than the one before it.
 const GROWTH: [f64; 2] = [0.2, 2.0];
-/// Smallest e that counts: steps in which nothing happens have an error of 0.
+/// Smallest e, the error of a step over the error that steps aim at: a step in which nothing changes has an error of 0,
+/// by which the formula divides.
 const LEAST: f64 = 1e-4;
 
 impl Control {

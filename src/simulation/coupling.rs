@@ -13,22 +13,24 @@ use serde::{Deserialize, Serialize};
 
 /// How mesh and physics alternate within one time step
 ///
-/// `mesh_steps` = k > 1 is M^kP: the mesh goes to the new time in k sub-steps, ρ carried onto each sub-mesh by
-/// piecewise linear interpolation, so that it follows ρ(x) rather than ρ(ξ). `iterations` = l > 1 is (MP)^l: mesh and
-/// physics are computed l times from the same old state, each time with ρ from the newest solution.
+/// With M for a step of the mesh and P for one of the physics, `mesh_steps` = k > 1 is M^kP: the mesh goes to the new
+/// time in k sub-steps, ρ carried onto each sub-mesh by piecewise linear interpolation, so that it follows ρ(x) rather
+/// than ρ(ξ). `iterations` = l > 1 is (MP)^l: mesh and physics are computed l times from the same old state, each time
+/// with ρ from the newest solution.
 ///
-/// With a `tolerance` ε > 0 both are the most: sub-steps are doubled, 1, 2, 4 …, until the mesh of twice as many
-/// differs by at most ε (M^vP, sub-steps as many as a step needs), and rounds end when the mesh of the next one does,
-/// (MP)^∞, which solves mesh and physics together. ε is a share of the longest side of the box.
+/// With a `tolerance` ε > 0 both numbers are upper limits. The number of sub-steps is doubled, 1, 2, 4 …, until the
+/// mesh changes by at most ε from one doubling to the next: M^vP, with v chosen anew in each step. Mesh and physics are
+/// computed again until the mesh changes by at most ε: (MP)^∞, which solves both together. ε is a share of the longest
+/// side of the box.
 ///
 /// # Source
 /// Section 5 of Bihlo, Haynes and Walsh (2015).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Coupling {
-    /// Number of sub-steps of the mesh in a time step; with a tolerance, the most.
+    /// Number of sub-steps of the mesh in a time step; with a tolerance the largest number.
     pub mesh_steps: usize,
-    /// How often mesh and solution are computed in a time step; with a tolerance, the most.
+    /// How often mesh and solution are computed in a time step; with a tolerance the largest number.
     pub iterations: usize,
     /// Sub-steps are doubled, and mesh and solution computed again, until the mesh changes by at most this share of the
     /// longest side of the box; 0 for exactly `mesh_steps` and `iterations`.

@@ -5,16 +5,16 @@ use crate::density::{NOISE_WORTH_A_WARNING, noise};
 use crate::geometry::{Cells, Field, Lattice, Mesh, node_areas};
 use crate::numerics::{ends, larger, sum};
 
-/// A loss of more than this share of the content of an unknown at the start is warned of.
+/// Share of the content of the initial data of an unknown that the first mesh may miss without a warning.
 const LOSS: f64 = 0.2;
-/// Data within a cell that exceed those at the nodes around it by more than this share of the range of the unknown are
-/// warned of.
+/// Largest amount by which initial data within a cell may exceed those at the nodes around it without a warning, as a
+/// share of the range of the unknown.
 const HIDDEN: f64 = 0.25;
 /// A content below this share of the largest value times the area of the box is made of rounding.
 const ROUNDING: f64 = 1e-9;
-/// Largest number of cells of the reference, along an axis, for a cell of the mesh.
+/// Largest number of parts into which a cell is divided along each axis to see the initial data between the nodes.
 const FINER: usize = 8;
-/// Largest number of nodes of the reference.
+/// Largest number of places at which the initial data are evaluated to see them between the nodes.
 const MOST_NODES: usize = 1 << 20;
 
 /// Warnings of a density that is noise at the cell scale, and of each unknown of which the mesh misses something at the

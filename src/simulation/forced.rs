@@ -13,11 +13,11 @@ const MOMENTS: f64 = 2048.0;
 const A_STEP: f64 = 4.0;
 /// Largest number of nodes at which prescribed formulas are sampled: half of them anywhere, half on sides.
 const PLACES: usize = 128;
-/// A step may miss this share of what a source or an inflow brings in the run, or of the range of its unknown if that
-/// is larger.
+/// Largest amount of a source or an inflow that a step may miss between its stages, as a share of what it brings in the
+/// whole run or of the range of its unknown, whichever is larger.
 const MISSED: f64 = 1e-3;
-/// A side value may differ from its straight lines between the stages of a step by this share of its change in the run,
-/// or of the range of its unknown if that is larger.
+/// Largest distance of a given side value from the straight lines between its values at the stages of a step, as a
+/// share of its change in the run or of the range of its unknown, whichever is larger.
 const BENDS: f64 = 0.05;
 /// A side value may differ by more than [`BENDS`] allows if the integral of that difference over the step is below this
 /// share of the length of the run times its change.
@@ -27,6 +27,7 @@ const STAGES: [f64; 3] = [0.0, 2.0 - std::f64::consts::SQRT_2, 1.0];
 /// Weights of the stages of TR-BDF2 in what a step takes of a source.
 const WEIGHTS: [f64; 3] =
     [0.25 * std::f64::consts::SQRT_2, 0.25 * std::f64::consts::SQRT_2, 1.0 - 0.5 * std::f64::consts::SQRT_2];
+/// Indices of the three kinds of data that are sampled.
 const SOURCE: usize = 0;
 const INFLOW: usize = 1;
 const VALUE: usize = 2;

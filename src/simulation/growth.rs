@@ -7,8 +7,8 @@ use crate::geometry::{Cells, Density, Mesh, node_areas};
 use crate::meshing::Movable;
 use crate::numerics::{ends, larger, sum};
 
-/// Where w is less than the width of equal cells, cells may be this many times as wide as equal ones: narrower ones
-/// would take nodes from the front.
+/// Least limit on the width of a cell, as a multiple of an equal cell, where small values grow: with a narrower limit
+/// cells ahead of the front would take nodes from it.
 const WIDER: f64 = 1.05;
 /// Number of iterations of Newton's method for the mean of the narrowed density, whose equation is piecewise linear and
 /// convex.
@@ -19,10 +19,11 @@ const FRONT: f64 = 0.18;
 /// A node is ahead of a front, or behind it, where its value is within this share of the range from an end of the
 /// range.
 const AHEAD: f64 = 1e-3;
-/// How far small values ahead of a front may grow in a step, as the exponent: a step of TR-BDF2 is then off by 0.04
-/// times its square, as a share of the growth, and so is the speed of a front that is pulled by it.
+/// Largest k Δt for values that grow like e^(kt) ahead of a front. TR-BDF2 then misses the growth in a step by the
+/// share 0.04 (k Δt)², and so the speed of a front that small values pull.
 const GROWN: f64 = 0.2;
-/// Cells wider than this multiple of w = √(D/k) are warned of: values in them grow before the front arrives.
+/// Width of a cell, as a multiple of √(D/k) with the diffusivity D and the growth rate k of small values, above which a
+/// run warns: values in it grow before the front arrives.
 const OUTRUNS: f64 = 2.0;
 const GROWS: &str = "small values grow in cells that are too wide";
 
@@ -93,9 +94,9 @@ where
         let (times, Some((name, k))) = worst else { return };
         let times = (10.0 * times / OUTRUNS).ceil() / 10.0;
         record.warnings.push(format!(
-            "`{name}`: {GROWS}: at t = {t}, {}, one is {times:.1} times as wide as a front can cross before they do, \
-             2√(D/k) for growth at the rate k, and the front may be at the wrong place; refine `grid.cells` {times:.1} \
-             times",
+            "`{name}`: {GROWS}: at t = {t}, {}, a cell is {times:.1} times as wide as 2√(D/k), the width that a front \
+             of the diffusivity D crosses before values that grow at the rate k do, and the front may be at the wrong \
+             place; refine `grid.cells` {times:.1} times",
             named(mesh.image(mesh.x()[k]))
         ));
     }

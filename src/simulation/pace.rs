@@ -157,14 +157,15 @@ const MOST_SHORT: usize = 1000;
 const SHORTEST: f64 = 1e-12;
 /// Factor by which the first step is shortened where it fails: it is a guess, and may be far too long.
 const FIRST_AGAIN: f64 = 0.1;
-/// Where the solution is prescribed, no step is shorter than this share of the longest: nothing is lost where nodes
-/// pass a jump in it.
+/// Shortest step, as a share of the longest, where the solution is prescribed: a prescribed solution has no error that
+/// shorter steps could lower.
 const GIVEN: f64 = 0.02;
-/// Number of steps in a run in which nothing changes: the longest step is the whole run over this.
+/// Smallest number of steps of a run: no step is longer than the whole run divided by this, even if nothing changes.
 const FEWEST: f64 = 20.0;
-/// The time of which τ is a multiple may be halved from one step to the next. Where the change at fixed places asks for
-/// more, it is measured again on a mesh that rests. Short steps are due to the moving mesh if the solution would change
-/// on a mesh that rests by less than this share of what it does.
+/// Ratio of two measures of a change below which the change is doubted. The time of which τ is a multiple may fall to
+/// this share from one step to the next; where the change at fixed places asks for less, that change is measured again
+/// on a mesh at rest. Short steps are blamed on the moving mesh if the solution changes on a mesh at rest by less than
+/// this share of its change on the moving one.
 const DOUBTED: f64 = 0.5;
 /// Steps are short because of a blow-up if the range of the first unknown, or its size where it is the same everywhere,
 /// grows by more than this share of its largest change at a node.

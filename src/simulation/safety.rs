@@ -9,13 +9,13 @@ use crate::mover::Care;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[safety]`: how far a step that fails is tried again
+/// `[safety]`: in which ways, and how often, a step that fails is tried again
 ///
 /// Where the mesh of a step folds, or its equation cannot be solved, the mesh goes to the new time in 2, 4, …
 /// `substeps` parts, with ρ carried along. Where that does not help, ρ is smoothed by 2, 4, … `smoothing` further
 /// passes before it moves the mesh. Where that does not help either, or the equation on the mesh fails, the time step
 /// is halved, `halvings` times at most; a step of a fixed length is then done in parts that meet its end exactly. When
-/// all is spent the run ends with what the step failed with. With `mesh.relaxation = "auto"` a step in which the
+/// all tries have failed the run ends with the failure of the step. With `mesh.relaxation = "auto"` a step in which the
 /// solution changes at the nodes by more than three hundredths of its range is done in such parts, too: there the mesh
 /// has fallen behind. τ is a multiple of each part then.
 ///

@@ -9,7 +9,7 @@ use crate::meshing::{Movable, Relaxation};
 use crate::mover;
 use crate::numerics::ends;
 
-/// τ above this many time steps is warned of: the mesh then hardly moves.
+/// τ in time steps above which a run warns that the mesh hardly moves any more.
 const HARDLY_FOLLOWS: f64 = 2e3;
 const HASTY: &str = "`mesh.relaxation` is short";
 const RESTLESS: &str = "the mesh hardly follows its density any more";
@@ -21,7 +21,8 @@ const OF_ROUNDING: f64 = 1e-7;
 const LEAVES: &str = "leaves the range of its data";
 const WIDE: &str = "changes within cells that are too wide for central fluxes";
 const PASSED: &str = "changes within a step";
-/// An unknown that is this many times as large as in all data when a run ends for its growth blows up.
+/// An unknown of a run whose steps became too short blows up if it has grown to more than this multiple of its largest
+/// value in all data.
 const GROWN: f64 = 2.0;
 const MISSED: &str = "the mesh has not come to a layer of it";
 /// Share of the range of an unknown within one cell, and length of that cell over the shortest, from which on the mesh
@@ -76,9 +77,11 @@ where
         });
         let limit = match found {
             Some(limit) => {
-                format!("on the solution of that time it rests with {limit:.0}; \"auto\" finds it by itself")
+                format!(
+                    "with the solution of that time the mesh rests at {limit:.0} steps; \"auto\" finds it by itself"
+                )
             }
-            None => "\"auto\" finds how many it takes".into(),
+            None => "\"auto\" finds how many the mesh takes to rest".into(),
         };
         record.warnings.push(format!(
             "{HASTY}: at t = {t} it is {steps:.1} time steps, and the mesh turns back from step to step; {limit}"
@@ -163,9 +166,9 @@ where
         let Some((c, k, size, before)) = all.max_by(|a, b| a.2.total_cmp(&b.2)) else { return };
         let at = named(state.mesh.image(state.mesh.x()[k]));
         record.warnings.push(format!(
-            "blow-up: `{}` grows beyond all bounds at t = {}, {at}: from {before:.4} it has come to {size:.4e} there, \
-             and steps that follow it to {dt:.1e}; that time is as exact as the steps and cells before are: compare it \
-             with a run with more `grid.cells`, and with `time.tolerance` = 1e-5",
+            "blow-up: `{}` grows beyond all bounds at t = {}, {at}: it has grown from {before:.4} to {size:.4e} there, \
+             and time steps that follow it have shrunk to {dt:.1e}; the time of the blow-up is as exact as the steps \
+             and cells before it: compare with a run with more `grid.cells`, and with `time.tolerance` = 1e-5",
             names[c], state.t
         ));
     }
@@ -206,12 +209,13 @@ where
         let (percent, limit) = (interface.noise.map(|noise| 100.0 * noise), 100.0 * INTERFACE_NOISE_WORTH_A_WARNING);
         let warning = match percent {
             None => format!(
-                "{UNKNOWN}: at t = {} it cannot be told from these samples; it takes two or more a point",
+                "{UNKNOWN}: at t = {} there are too few samples of each point to tell it; take two walks \
+                 or paths or more",
                 state.t
             ),
             Some(percent) if percent > limit => format!(
                 "{NOISY}: from t = {} on their standard error is {percent:.1} % of the shortest edge of the mesh or \
-                 more (said above {limit} %); more walks or paths, or more sweeps, lower it",
+                 more (a run warns above {limit} %); more walks or paths, or more sweeps, lower it",
                 state.t
             ),
             Some(_) => return,

@@ -17,7 +17,8 @@ const MOST_STEPS: usize = 30;
 const LEFT: f64 = 0.5;
 /// A phase counts as vanished where it is thinner than this share of the line.
 const VANISHED: f64 = 1e-3;
-/// Every third place may be changed at once: an equation takes its own place and the two beside it.
+/// Distance, in places, at which unknowns may be changed at once for the derivatives: an equation depends on its own
+/// place and the two beside it.
 const STRIDE: usize = 3;
 
 impl Species {

@@ -15,7 +15,7 @@ const IMPLICIT: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 pub struct Total {
     /// ∫σ x^m dx at the start.
     pub start: f64,
-    /// The same now.
+    /// ∫σ x^m dx now.
     pub content: f64,
     /// What has come in through the walls.
     pub inflow: f64,

@@ -7,12 +7,14 @@ use super::solver::{Front, Problem, Side, Transfer};
 use crate::error::{Error, Failure, Result};
 use crate::numerics::larger;
 
-/// How often the slope at a wall whose flux depends on temperature is sought before a step is given up. Two to four
-/// times are usual.
+/// Iterations for the slope of the temperature at walls and sides whose flux depends on temperature, after which a step
+/// is given up. Two to four are usual.
 const MOST_SLOPES: usize = 40;
-/// What such slopes may change over a row once they are found, as a share of the largest temperature.
+/// The iteration for the slope at walls and sides has converged once the slope times the height of a row changes by
+/// less than this share of the largest temperature: rounding.
 const SETTLED: f64 = 1e-12;
-/// By what share of a phase a place on the front is taken to lie within it.
+/// A place on the front is moved into its phase by this share of the thickness of the phase, so that a formula by place
+/// knows which of the two phases is meant.
 const INSIDE: f64 = 1e-7;
 
 /// Heights of the front and temperatures of both phases, or a linear combination of several of these.

@@ -40,7 +40,7 @@ impl Energy {
         self.miss(self.inflow)
     }
 
-    /// The same with the fluxes by one-sided differences.
+    /// |ΔE − ∫F dt| / M with the flux F by one-sided differences; none before heat has moved.
     pub fn imbalance_by_differences(&self) -> Option<f64> {
         self.miss(self.inflow_by_differences)
     }

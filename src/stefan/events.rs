@@ -7,7 +7,8 @@ use crate::error::{Error, Failure, Result};
 use crate::work::Work;
 use serde::{Deserialize, Serialize};
 
-/// A phase that is nowhere thicker than this share of the distance between the walls vanishes at its speed then.
+/// A phase that is nowhere thicker than this share of the distance between the walls is taken to vanish at the speed
+/// that its front has.
 const THIN: f64 = 0.01;
 /// The share of the way to the wall that a front moves in a part of a step before it reaches the wall.
 const PART: f64 = 0.2;
@@ -18,9 +19,9 @@ const MOST_PARTS: usize = 60;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Change {
-    /// It is there from now on.
+    /// The phase is there from now on.
     Appeared,
-    /// It is gone.
+    /// The phase is gone.
     Vanished,
 }
 

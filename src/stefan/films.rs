@@ -15,9 +15,10 @@ use crate::error::{Failure, Result};
 const SEED: f64 = 4e-3;
 /// A phase leaves a wall bare at a column where it is thinner than this share of the distance between the walls.
 const LEAVES: f64 = 2.0 * FILM;
-/// Temperatures that are beyond melting by less than this share of their size are not.
+/// A temperature counts as beyond melting only by more than this share of the largest temperature: less is rounding.
 const ROUNDING: f64 = 1e-9;
-/// Temperatures of a wall on the wrong side of melting that are below this share of their size come from overshoots.
+/// A wall on the wrong side of melting by less than this share of the largest temperature is accepted: steps overshoot
+/// by as much.
 const OVERSHOOT: f64 = 1e-6;
 
 /// 1 where a phase lies above its wall and is the warm one, −1 for the other.

@@ -47,7 +47,7 @@ impl Filter {
         Err(Error::invalid("filter", format!("{:?}", [a, b, c]), rule))
     }
 
-    /// Its weights on the node itself, and on both neighbours together.
+    /// Weights of the filter on the node itself, and on both neighbours together.
     fn weights(&self) -> [f64; 2] {
         self.0.map_or([1.0, 0.0], |[a, b, _]| [b / (b + 2.0 * a), 2.0 * a / (b + 2.0 * a)])
     }
@@ -71,6 +71,7 @@ impl Filter {
 
     /// The factor by which the filter lengthens the longest stable step: π / max θ F(θ).
     pub fn relief(&self) -> f64 {
+        /// Number of angles θ in (0, π] among which the largest θ F(θ) is looked for.
         const SAMPLES: usize = 2000;
         let [own, other] = self.weights();
         let wave = |k: usize| {

@@ -155,9 +155,9 @@ impl FrontState {
 /// What a step comes to.
 #[derive(Debug, Clone)]
 pub struct Attempt<S = FrontState> {
-    /// The state after it.
+    /// The state after the step.
     pub state: S,
-    /// Its cost.
+    /// The work that the step took.
     pub work: Work,
     /// Its estimated error, where there is one: of an implicit step of a [`Front`] the larger one of the front's, as a
     /// share of its distance from the nearer wall, and of the temperature's, as a share of its range.

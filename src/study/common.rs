@@ -75,7 +75,7 @@ pub struct Output {
     pub report: bool,
 }
 
-/// Frames of a run in time where nothing is said.
+/// Number of frames of a run in time where `output.frames` is not given.
 const FRAMES_BY_DEFAULT: usize = 20;
 
 impl Default for Output {

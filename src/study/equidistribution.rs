@@ -157,8 +157,8 @@ pub struct SchwarzTable {
     /// classical; false where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linearized: Option<bool>,
-    /// A correction of all subdomains at once after each iteration: "integral" of ∫M, "galerkin" of x, or "none". Only
-    /// with the method classical.
+    /// A correction of all subdomains at once after each iteration: "integral" corrects ∫M, "galerkin" the nodes x; or
+    /// "none". Only with the method classical.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarse: Option<Coarse>,
     /// Parameter p > 0 of the Robin conditions F ± p x, with the flux F = M x_ξ: a number, "auto" or "lagged". Only

@@ -192,7 +192,9 @@ impl StefanStudy {
 
     /// Says so where an exact solution flows through sides that are insulated.
     fn crosses_walls(&self, front: &Front, given: &Given, state: &FrontState) -> Option<String> {
+        /// Step of the difference quotient at a side, as a share of the width of the box.
         const STEP: f64 = 1e-6;
+        /// Normal derivative at a side times the width of the box, as a share of the range, above which a run warns.
         const NOTICEABLE: f64 = 1e-3;
         let x = front.columns.x();
         let width = x[x.len() - 1] - x[0];

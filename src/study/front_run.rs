@@ -145,15 +145,17 @@ impl Fronts for TwoPhase {
         Ok(rows.iter().map(|row| (row[0], row[1..].to_vec())).collect())
     }
 
-    /// A front is in doubt whose way depends on how many rows there are.
+    /// A warning of a front whose way would change with more rows of cells.
     fn doubt(&self, state: &FrontState) -> Option<String> {
+        /// Share of the way of a front above which its uncertainty is worth a warning.
         const DOUBTFUL: f64 = 0.01;
         let doubt = self.front.doubt(state).filter(|doubt| *doubt > DOUBTFUL)?;
         let (percent, [way, rows]) = (100.0 * doubt, state.way);
         Some(if doubt > rows / way {
             format!(
-                "the front may have gone too far or not far enough by {percent:.1} % of its way: growth into this \
-                 melt turns on the last per cent of the heat, and its balance misses more; raise grid.cells"
+                "the front may have gone too far or not far enough by {percent:.1} % of its way: its speed \
+                 in a melt so far below melting turns on the last per cent of the heat, and the balance of heat is off \
+                 by more; raise grid.cells"
             )
         } else {
             format!(

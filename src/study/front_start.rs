@@ -5,13 +5,13 @@ use super::stefan::StefanStudy;
 use crate::error::{Error, Result};
 use crate::stefan::{Front, FrontState, LOWER, Problem, Side, UPPER};
 
-/// Moments of a run at which formulas of its walls are looked at.
+/// Number of moments of a run at which formulas of its walls and sides are evaluated before it begins.
 const MOMENTS: usize = 512;
-/// Columns at which they are.
+/// Number of columns at which formulas of walls are evaluated before a run begins.
 const COLUMNS: usize = 16;
 /// Temperatures on the wrong side of melting by less than this share of the largest are round-off.
 const ROUNDING: f64 = 1e-9;
-/// How many times higher than a column is wide a row may be before round-off is worth a warning.
+/// Height of a row over the width of a column above which round-off is worth a warning.
 const FLAT: f64 = 1e4;
 
 const NAMES: [&str; 2] = ["lower", "upper"];
@@ -105,6 +105,7 @@ impl StefanStudy {
     /// Refuses formulas of sides that have no finite value at some time of the run, and temperatures that leave the
     /// front no place on a side.
     fn check_sides(&self, front: &Front, given: &Given, [start, end]: [f64; 2]) -> Result<()> {
+        /// Number of equal parts of a side at whose ends its formula is evaluated.
         const HEIGHTS: usize = 16;
         let (x, melting) = (front.columns.x(), front.material.melting);
         for (side, i) in

@@ -7,7 +7,7 @@ use crate::stefan::Attempt;
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
-/// How much shorter and longer than an automatic step the next one may be.
+/// Smallest and largest ratio of an automatic step to the one before it.
 const GROWTH: [f64; 2] = [0.2, 2.0];
 /// The share of the longest step within the tolerance, as estimated, at which the next step aims.
 const AIM: f64 = 0.9;

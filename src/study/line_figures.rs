@@ -133,9 +133,10 @@ pub struct StepRow {
 
 /// Largest number of nodes that are compared with the continuous mesh.
 const COMPARED: usize = 1000;
-/// Cells of a line up to which M is integrated to round-off; in more of them the trapezoidal rule is as good.
+/// Number of cells of a line up to which M is integrated over each cell to round-off; in more, and so smaller, cells
+/// the trapezoidal rule is as good.
 const EXACTLY: usize = 100_000;
-/// Places at which the density is looked at for layers between the nodes.
+/// Number of places at which the density is evaluated to find layers between the nodes.
 const PLACES: usize = 20_000;
 /// A difference between ∫M over the cells and ∫M, as a share of it, that tells of a layer which the cells miss.
 const NOTICEABLE: f64 = 0.2;

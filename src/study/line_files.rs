@@ -12,13 +12,14 @@ use ndarray_npy::{NpzWriter, WriteNpzError};
 use serde::Serialize;
 use std::io::Cursor;
 
-/// Points of a curve.
+/// Largest number of points of a drawn curve: more are not told apart.
 const DRAWN: usize = 400;
-/// Places between two nodes at which M is drawn.
+/// Number of places between two nodes at which M is drawn.
 const BETWEEN: usize = 8;
-/// Cells of a line up to which M is integrated to round-off in frames; in more of them the trapezoidal rule is as good.
+/// Number of cells of a line up to which M is integrated over each cell to round-off in frames; in more, and so
+/// smaller, cells the trapezoidal rule is as good.
 const EXACTLY: usize = 10_000;
-/// Paths of nodes drawn in time.
+/// Number of nodes whose paths in time are drawn.
 const PATHS: usize = 40;
 
 /// Writes the arrays and the pictures.

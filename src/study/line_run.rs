@@ -46,7 +46,8 @@ pub struct LineCheckpoint {
     kept: Kept,
 }
 
-/// Seconds between two writings of `history.csv` while a mesh moves.
+/// Seconds between two writings of `history.csv` while a mesh moves: what a report of a run that still goes on lacks at
+/// most.
 const SECONDS_UNSEEN: f64 = 1.0;
 
 /// A line while its mesh is found, or moves.

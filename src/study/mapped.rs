@@ -268,6 +268,7 @@ impl MappedDomain {
 
 /// Refuses an empty interval, and curves that meet or have no value on it.
 pub(super) fn check_between(x: [f64; 2], [bottom, top]: &[Formula; 2]) -> Result<()> {
+    /// Number of equal parts of the range of x at whose ends both curves are evaluated.
     const SAMPLES: usize = 1000;
     if !(x[0].is_finite() && x[1].is_finite() && x[0] < x[1]) {
         return Err(Error::invalid("x", format!("{x:?}"), "must be two numbers, the lower one first"));

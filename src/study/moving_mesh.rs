@@ -45,10 +45,10 @@ where
     /// How the mesh follows its density.
     #[serde(default)]
     pub mesh: MeshTable<Generator<D>>,
-    /// How far a step that fails is tried again.
+    /// In which ways, and how often, a step that fails is tried again.
     #[serde(default)]
     pub safety: Safety,
-    /// A second run with another mesh generator, with whose meshes those of the run are compared.
+    /// A second run of the study with another mesh generator, as a reference for the meshes of the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compare: Option<Compare<Generator<D>>>,
     /// What a run leaves behind in its directory.
@@ -88,8 +88,9 @@ pub struct Domain<const D: usize = 2> {
     /// Which axes are periodic, so that their ends are the same place.
     #[serde(default = "bounded::<D>")]
     pub periodic: Axes<bool, D>,
-    /// A mapping of the unit square (s, r). The first axis is that of the parameter that turns into the other one
-    /// against the clock; where an axis is closed, it is that of the parameter along which the map closes.
+    /// The domain as the image of the unit square: x and y as formulas of its coordinates s and r. The first axis of
+    /// the mesh is along s if s, r is a right-handed pair in the image (r lies counter-clockwise of s), else along r.
+    /// With `closed`, the closed axis is along the one of s and r at whose two ends the map has the same curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<Mapping>,
     /// Which axes are closed, so that their ends are the same curve, as in a ring.

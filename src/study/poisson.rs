@@ -88,8 +88,8 @@ pub struct Equation {
     /// said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flux: Option<String>,
-    /// The mean of u over the domain, where all sides have a flux without u; that of `exact.u` where that is known and
-    /// nothing is said, else 0.
+    /// The mean of u over the domain, where fluxes that do not depend on u are given on all sides: the equation then
+    /// leaves a constant in u open. Where nothing is said that of `exact.u` if it is given, else 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean: Option<f64>,
 }
@@ -98,8 +98,8 @@ pub struct Equation {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sides {
-    /// Sides on which the flux is given instead of u: any of left, right, bottom and top. `equation.boundary` by side
-    /// says more.
+    /// Sides on which the flux is given instead of u: any of left, right, bottom and top. Conditions of other kinds are
+    /// given side by side in `equation.boundary`.
     pub neumann: Vec<Side>,
 }
 

@@ -92,9 +92,9 @@ pub struct Solved {
     seconds: PoissonParts,
 }
 
-/// Nodes times passes: small meshes have their stencils computed several times, and the shortest time counts.
+/// Nodes times passes: the stencils of small meshes are computed several times, and the shortest time is reported.
 const SMALL: usize = 100_000;
-/// The most passes beside the first one.
+/// Largest number of passes after the first one.
 const SMALL_PASSES: usize = 5;
 
 impl PoissonStudy {

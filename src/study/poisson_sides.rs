@@ -166,7 +166,8 @@ impl PoissonStudy {
     }
 }
 
-/// The largest share of what flows that may be missing from a balance.
+/// Largest gap between inflow and source, as a share of what flows, with which a problem without given values counts as
+/// balanced.
 const UNBALANCED: f64 = 1e-6;
 
 /// Integrals over a domain and its sides.

@@ -56,7 +56,7 @@ where
     };
     Ok(Some(format!(
         "the mesh does not move: no node went farther than {went:.2} cells, and the density at the end asks \
-         for {asks:.2}; {reason}"
+         for a way of {asks:.2} cells; {reason}"
     )))
 }
 
@@ -88,7 +88,7 @@ where
     let retries = record.safety.substeps + record.safety.smoothed + record.safety.shortened;
     let span = study.time.end - study.time.start;
     if 2 * retries > record.work.steps {
-        format!("{retries} tries of {} steps failed, so that [safety] held it back", record.work.steps)
+        format!("{retries} tries in {} steps failed, so that [safety] held the mesh back", record.work.steps)
     } else {
         match study.mesh.relaxation {
             Relaxation::Auto if study.mesh.start == Some(StartMesh::Uniform) => {
@@ -147,8 +147,8 @@ where
     let without = self::spread(bare.density(&state.mesh, &followed, None)?.largest());
     Ok(match without > NOT_FLAT {
         true => format!(
-            "its density is flat, largest over smallest {spread:.3}: `monitor.smoothing` = {smoothing} passes leave \
-             that of {without:.3}"
+            "its density is flat, largest over smallest {spread:.3}: `monitor.smoothing` = {smoothing} passes \
+             have lowered that from {without:.3}"
         ),
         false => format!("its density is flat, largest over smallest {spread:.3}: raise `monitor.strength`"),
     })

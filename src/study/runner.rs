@@ -261,7 +261,8 @@ fn sent(checkpoint: Vec<u8>) -> Vec<u8> {
 fn idle(ranks: Ranks, subdomains: [usize; 2]) -> Vec<String> {
     let idle = ranks.count() > 1 && subdomains == [1, 1];
     let warning = format!(
-        "{} ranks compute the same: only meshes by the generators `stochastic` and `schwarz` are shared among ranks",
+        "{} ranks compute the same, each on its own: only meshes by the generators `stochastic` and `schwarz` are \
+         shared among ranks",
         ranks.count()
     );
     if idle { vec![warning] } else { Vec::new() }

@@ -38,9 +38,9 @@ const KINDED: [&str; 7] = [
     "compare.generator.estimator",
     "compare.generator",
 ];
-/// Tables that hold one of several keys.
+/// Tables in which exactly one of several keys stands.
 const CHOICES: [&str; 3] = ["monitor.strength", "output.frames", "output.checkpoint"];
-/// Characters of a line that are shown.
+/// Largest number of characters of a line that an error message shows.
 const SHOWN: usize = 160;
 
 impl Source {

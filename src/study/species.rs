@@ -41,7 +41,8 @@ pub struct SpeciesDomain {
     /// What x is: a Cartesian coordinate, or the distance from an axis or a point.
     #[serde(default)]
     pub coordinates: Coordinates,
-    /// x of the left wall; at 0 of a distance there is none. 0 where nothing is said.
+    /// x of the left wall; 0 where nothing is said. With cylindrical or spherical coordinates x = 0 is the centre,
+    /// where there is no wall.
     #[serde(default = "zero")]
     pub lower: [f64; 1],
     /// x of the right wall; 1 where nothing is said.
@@ -74,16 +75,18 @@ pub struct SpeciesGrid {
 #[serde(deny_unknown_fields)]
 pub struct SpeciesTable {
     /// D in σ_t = ∇·(D ∇c) + s: a formula of the concentrations in this phase by the names of their species, of x and
-    /// t. "0" for what does not move by itself.
+    /// t. "0" for a species that does not diffuse.
     #[serde(deserialize_with = "needed")]
     #[schemars(with = "Text")]
     pub diffusivity: String,
-    /// σ, the amount of it in a volume, a formula of the same; c where nothing is said, and "0" for a concentration
-    /// that follows its surroundings at once.
+    /// σ in σ_t = ∇·(D ∇c) + s, the amount of the species per volume: a formula of the concentrations in this phase, of
+    /// x and t; c where nothing is said. "0" for a species that is not stored: 0 = ∇·(D ∇c) + s then holds at every
+    /// time.
     #[serde(default, deserialize_with = "text", skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Text>")]
     pub storage: Option<String>,
-    /// s, what arises for each volume and time, a formula of the same; 0 where nothing is said.
+    /// s in σ_t = ∇·(D ∇c) + s, the amount of the species that is produced per volume and time: a formula of the
+    /// concentrations in this phase, of x and t; 0 where nothing is said.
     #[serde(default, deserialize_with = "text", skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Text>")]
     pub source: Option<String>,
@@ -92,13 +95,14 @@ pub struct SpeciesTable {
     #[schemars(with = "Text")]
     pub initial: String,
     /// What holds at the left end of the phase: c, a formula; "no-flux"; "outflow", no gradient, so that what the front
-    /// sweeps over leaves; or `{ flux = "…" }`, what comes in for each area and time beside a front that may move.
-    /// Formulas on a wall take the concentrations in the phase, x and t; on a front also what `front.law` takes, and
-    /// the `velocity` of the front. Left out at the centre of a distance.
+    /// sweeps over leaves; or `{ flux = "…" }`, the amount that enters the phase per area and time, D ∂c/∂n + σ V·n, n
+    /// being the outward normal and V the velocity of this end. Formulas on a wall take the concentrations in the
+    /// phase, x and t; on a front also what `front.law` takes, and the `velocity` of the front. Left out where the
+    /// phase begins at x = 0 of a radius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "end_schema")]
     pub left: Option<Condition>,
-    /// What holds at the right end, in the same words.
+    /// What holds at the right end of the phase, with the same choices as `left`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "end_schema")]
     pub right: Option<Condition>,
@@ -111,7 +115,7 @@ fn needed<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error
 fn end_schema(generator: &mut SchemaGenerator) -> Schema {
     let walls = wall_schema(generator);
     json_schema!({ "anyOf": [
-        { "const": "outflow", "description": "No gradient: what the front sweeps over leaves." },
+        { "const": "outflow", "description": "No gradient: what a moving front sweeps over leaves the phase." },
         walls,
     ] })
 }

@@ -9,7 +9,7 @@ use crate::simulation::{Scene, Values};
 use crate::species::{Species, SpeciesState};
 use crate::stefan::Attempt;
 
-/// The first automatic step, as a share of the run.
+/// Length of the first automatic step, as a share of the run.
 const FIRST: f64 = 1e-5;
 
 /// Fronts between species while they run.

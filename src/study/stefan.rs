@@ -102,7 +102,7 @@ pub struct PhaseTable {
     /// Thermal conductivity k, with D = k/C. Goes with `capacity` and `front.latent_heat`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conductivity: Option<f64>,
-    /// Volumetric heat capacity C: heat for each volume and degree. Goes with `conductivity`.
+    /// Volumetric heat capacity C: heat per volume and degree. Goes with `conductivity`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub capacity: Option<f64>,
     /// Temperature at the start, a formula of x and y.
@@ -136,15 +136,14 @@ pub struct FrontTable {
     /// in its place.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mobility: Option<f64>,
-    /// Volumetric latent heat Λ: heat for each volume that melts. Goes with `conductivity` and `capacity` of both
-    /// phases.
+    /// Volumetric latent heat Λ: heat per volume that melts. Goes with `conductivity` and `capacity` of both phases.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub latent_heat: Option<f64>,
     /// Melting temperature T_m, that of the front; 0 where nothing is said. Goes with `latent_heat`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub melting: Option<f64>,
-    /// Whether a phase is a melt below its melting temperature, which freezes into it: the upper one if its initial
-    /// temperature is below melting anywhere, else the lower one.
+    /// Whether one of the phases is undercooled: a melt below its melting temperature, into which the front moves as it
+    /// freezes. It is the upper phase if its initial temperature is below melting anywhere, else the lower one.
     pub undercooled: bool,
     /// How the front is moved: column by column as a graph over x, or by segments along their normals, as published and
     /// less accurate.

@@ -14,12 +14,15 @@ pub struct UniformEquivalent {
     pub t: f64,
 }
 
-/// The thinnest front that uniform runs are made on: a few hundredths of a second each.
+/// Smallest viscosity of the fronts that uniform runs are made on, so that each takes a few hundredths of a second.
 const THINNEST: f64 = 5e-3;
-/// Cells along the longer side in the first run, and the most there may be.
+/// Number of cells along the longer side in the first uniform run.
 const CELLS: f64 = 120.0;
+/// Number of cells along the longer side above which no further uniform run is made.
 const MOST: f64 = 400.0;
+/// Number of cells along the longer side below which a uniform mesh does not show the front, and is not reported.
 const FEWEST: f64 = 8.0;
+/// Number of uniform runs, each with the cells that the error of the one before asks for.
 const RUNS: usize = 3;
 
 impl MovingMesh {

@@ -12,13 +12,14 @@ const X0: f64 = 0.25;
 const CELLS: usize = 60;
 const STEPS: usize = 250;
 const DT: f64 = 2e-3;
-/// τ of MMPDE5.
+/// Relaxation time τ of the mesh equation MMPDE5.
 const RELAXATION: f64 = 0.02;
-/// A mesh that changes by less between rounds is that of the coupled system.
+/// Largest change of a node between two rounds of mesh and solution below which the mesh counts as that of the coupled
+/// system, in units of the domain.
 const SETTLED: f64 = 1e-8;
 const MOST_ROUNDS: usize = 50;
 const MOST_NEWTON: usize = 50;
-/// How far errors may be apart that count as the same.
+/// Two errors count as the same where they differ by less than this share.
 const SAME: f64 = 0.05;
 const RULE: &str = "“as good” where the error of u is within 5 % of that on one domain with the same number of \
      rounds; else the ratio of both. A mesh out of order ends a run by name";

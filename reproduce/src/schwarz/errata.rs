@@ -6,6 +6,7 @@ use crate::errata::{self, row};
 use driftmesh::equidistribution::{FaceDensity, Line, Stop};
 use driftmesh::error::Result;
 
+/// The node that stands at α = .45, the end of the overlap, on 100 cells.
 const ALPHA: usize = 45;
 
 pub fn errata() -> Result<Rerun> {

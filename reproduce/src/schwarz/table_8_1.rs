@@ -6,8 +6,9 @@ use driftmesh::equidistribution::{History, Line, Method, Robin};
 use driftmesh::error::Result;
 use driftmesh::output::{Curve, Figure, Scale};
 
+/// Iterations of which the table prints the largest jump.
 const AT: [usize; 6] = [0, 2, 4, 6, 8, 10];
-/// Half of the paper's last digit.
+/// Half a unit of the last digit of the values in the paper, which are rounded to four decimals.
 const HALF: f64 = 5e-5;
 const RULE: &str = "values agree where ours, rounded to four decimals, are the paper's; else they are not reproduced \
      with our settings, and the columns that are not are named. Counts agree where all five are the paper's";
@@ -115,7 +116,9 @@ fn jumps(history: &History) -> Vec<f64> {
 
 /// “Just a few iterations are needed to produce quality meshes”, and the best error in many fewer iterations.
 fn few(line: &Line) -> Result<Table> {
+    /// Iterations after which a method counts as not reaching the best error.
     const MOST: usize = 400;
+    /// Number of iterations taken for the “few” of the paper, which names none.
     const FEW: usize = 4;
     let mut table = Table::new(
         "What the text says of table 8.1: few iterations, with values and interpolation errors over those of the limit",

@@ -9,7 +9,7 @@ use driftmesh::equidistribution::{Coarse, FaceDensity, History, Line, Method, Ro
 use driftmesh::error::Result;
 use std::f64::consts::PI;
 
-/// Errors above this are no rounding.
+/// Errors above this are not made of rounding.
 const ROUNDING: f64 = 1e-11;
 
 pub fn theorems() -> Result<Rerun> {

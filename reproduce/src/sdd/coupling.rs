@@ -25,6 +25,7 @@ const ROWS: [(&str, &[&str]); 8] = [
     ("(MP)^∞, ε = 1e-7", &["mesh.coupling={iterations=50, tolerance=1e-7}"]),
     (OTHER, &["mesh.relaxation=0.1"]),
 ];
+/// The row that is no claim of the paper: another τ.
 const OTHER: &str = "MP, τ = .1";
 
 fn procedures(options: Options) -> Result<Table> {
@@ -106,7 +107,7 @@ fn procedure(name: &str, more: &[&str], s: usize, plain: &mut [f64; 2]) -> Resul
     ])
 }
 
-/// How far errors of the box may be apart that count as the same.
+/// Two errors of the box count as the same where they differ by less than this share.
 const SAME: f64 = 0.1;
 
 /// Interface values on bounded and on periodic meshes, from the published Monte Carlo.

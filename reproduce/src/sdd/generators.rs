@@ -84,7 +84,9 @@ fn inverse() -> Result<Table> {
 /// The mesh equation x_t = (1/τ) ∇·(ρ∇x): the row of a node as if its own step were ρΔt, solved by Gauss–Seidel sweeps.
 struct Undivided;
 
+/// Sweeps after which the reference counts as not solved.
 const SWEEPS: usize = 20_000;
+/// Largest change of a node in a sweep below which the reference counts as solved, in units of the box.
 const EXACT: f64 = 1e-13;
 
 impl Undivided {

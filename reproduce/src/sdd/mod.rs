@@ -153,10 +153,9 @@ const COLUMNS: [&str; 10] = [
     "tries rejected",
     "verdict of R_max / R_mean",
 ];
-/// How far two ratios may be apart that count as the same: the paper's own are within this of 1 nearly everywhere; and
-/// the
-/// half digit that they are rounded to.
+/// Two ratios count as the same where they differ by at most this: nearly all of the paper's are within it of 1.
 const SAME: f64 = 0.01;
+/// Half a unit of the last digit of the ratios in the paper, which are rounded to two decimals, with round-off.
 const ROUNDED: f64 = 0.005 + 1e-9;
 const RULE: &str = "“agrees” where |R − R of the paper| ≤ .01, plus the half digit that the paper's is rounded to. \
      Where not, what counts is the distance to 1, on either side: “nearer to 1” or “farther from 1” than the \

@@ -7,8 +7,7 @@ use driftmesh::error::{Error, Result};
 use driftmesh::study::{Kind, MovingRun};
 
 /// l_inf of the paper for one domain, 2×2, 3×3 and 4×4 at t = .75, 1, 1.25, with .032, .035 and .024 for the printed
-/// .320,
-/// .35 and .24.
+/// .320, .35 and .24.
 const LINF: [(usize, [f64; 3]); 4] =
     [(1, [0.027, 0.031, 0.030]), (2, [0.023, 0.033, 0.031]), (3, [0.031, 0.032, 0.035]), (4, [0.026, 0.034, 0.024])];
 /// R_max and R_mean by subdomains and time.
@@ -24,9 +23,9 @@ const RATIOS: [(usize, f64, f64, f64); 9] = [
     (4, 1.25, 1.0, 1.0),
 ];
 const COLUMNS: [&str; 5] = ["run", "t = 0.75", "t = 1", "t = 1.25", "verdict"];
-/// How far two errors may be apart that count as the same, as a share and by the half digit that the paper's are
-/// rounded to.
+/// Two errors count as the same where they differ by at most this share.
 const SAME: f64 = 0.1;
+/// Half a unit of the last digit of the errors in the paper, which are rounded to three decimals, with round-off.
 const ROUNDED: f64 = 5e-4 + 1e-9;
 const RULE: &str = "“agrees” where all errors are within 10 % of the paper's, plus the half digit that those are \
      rounded to; else the least and the largest ratio of ours to the paper's";

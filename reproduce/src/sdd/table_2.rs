@@ -14,9 +14,9 @@ use std::time::Instant;
 const PAPER: [(usize, [f64; 5]); 3] =
     [(80, [0.22, 0.45, 0.33, 0.24, 0.12]), (96, [0.34, 0.56, 0.40, 0.27, 0.16]), (112, [0.84, 0.68, 0.51, 0.35, 0.17])];
 const DT: f64 = 1e-3;
-/// Repeats of what takes milliseconds.
+/// Number of times that a step of milliseconds is timed.
 const REPEATS: usize = 10;
-/// And of Monte Carlo.
+/// Number of times that a step by Monte Carlo is timed, which takes longer.
 const FEW: usize = 3;
 const RULE: &str = "speed-up: time of one domain over that of the slowest subdomain, each with a core to itself, as \
      the paper compares its columns. “wins” or “loses” by whether ours is above 1, “too” where the paper's is on the \
@@ -48,7 +48,8 @@ pub fn table_2() -> Result<Vec<Table>> {
     let title = "Table 2: milliseconds for the mesh of one step of Burgers' equation, a core for each subdomain";
     let mut table = Table::new(title, &COLUMNS).ruled(RULE);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let pool = pool.map_err(|error| Error::invalid("threads", 1, format!("no such pool can be made: {error}")))?;
+    let pool =
+        pool.map_err(|error| Error::invalid("threads", 1, format!("no pool of one thread can be made: {error}")))?;
     for &(cells, paper) in &PAPER {
         let cells_set = format!("grid.cells=[{cells}, {cells}]");
         let all = settings(&[&cells_set, "time.end=0.3", "time.report=[0.3]", WHOLE]);

@@ -80,7 +80,9 @@ pub fn run(options: Options) -> Result<Rerun> {
 }
 
 fn slides(options: Options) -> Result<Table> {
+    /// Errors in units of 1e-3 that the slides print, for 10, 15, … 55 cells.
     const ERRORS: [f64; 10] = [10.9, 5.2, 3.1, 2.1, 1.6, 1.2, 1.0, 0.87, 0.77, 0.70];
+    /// Times in milliseconds that the slides print, for the same numbers of cells.
     const TIMES: [usize; 10] = [22, 20, 27, 41, 55, 73, 95, 119, 146, 174];
     let mut table = Table::new(
         "The slides' table: error ×1e-3 of Δu = −16 x cos 4y, and time",
@@ -136,7 +138,7 @@ fn slides(options: Options) -> Result<Table> {
     Ok(table)
 }
 
-/// An order of accuracy that counts as the second.
+/// Observed order of accuracy from which on a method counts as one of second order.
 const SECOND: f64 = 1.8;
 
 /// What the slides say of general geometries, for a kind with this order.

@@ -9,7 +9,7 @@ use crate::work::Work;
 pub struct Problem<'a, const D: usize = 2> {
     /// The mesh equation.
     pub equation: &'a Mmpde,
-    /// The same equation as a linear system.
+    /// The equation of the step as a linear system.
     pub operator: &'a MeshOperator<D>,
     /// The mesh at the start of the step.
     pub mesh: &'a Mesh<D>,

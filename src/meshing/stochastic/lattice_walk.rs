@@ -28,7 +28,7 @@ pub struct GridWalk {
     pub increment: bool,
 }
 
-/// Largest number of walks from a point.
+/// Largest number of walks that start at a point: more than any run could afford.
 const MAX_WALKS: usize = 1 << 31;
 /// Jumps of all walks in one step beyond which they are refused: they would take hours.
 const MAX_JUMPS: f64 = 1e11;
@@ -219,6 +219,7 @@ impl<'a, const D: usize> Walks<'a, D> {
 
     /// One walk. A random word of 32 bits selects a neighbour, or a stop, by the cumulated weights.
     fn walk(&self, start: usize, path: usize, steps: &mut usize) -> Stop<D> {
+        /// 2⁻³², which takes a random word of 32 bits to a number in [0, 1).
         const SCALE: f64 = 1.0 / 4_294_967_296.0;
         let Self { problem, nodes, strides, periodic } = self;
         let mut stream = problem.random.stream(problem.step, start as u32, path as u32);

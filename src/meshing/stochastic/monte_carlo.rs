@@ -34,28 +34,35 @@ pub struct MonteCarlo {
     pub paths: usize,
     /// Number M of Euler–Maruyama steps of a path within a time step.
     pub substeps: usize,
-    /// Every second path takes the increments of the one before with the opposite sign.
+    /// Whether every second path takes the increments of the one before with the opposite sign, which cancels errors
+    /// that are odd in them.
     #[serde(default)]
     pub antithetic: bool,
-    /// Takes the increments from a Sobol sequence, in the order of a Brownian bridge. Up to four independent
-    /// scramblings give means whose spread is the standard error.
+    /// Whether paths take their increments from a Sobol sequence, in the order of a Brownian bridge. The paths are
+    /// divided into up to four independent scramblings of it; the spread of their means gives the standard error.
     #[serde(default)]
     pub sobol: bool,
-    /// Subtracts the martingale Σ ∇xⁿ(Φ)·√(2Δs) W, whose mean is zero.
+    /// Subtracts from each path the sum Σ ∇xⁿ(Φ)·√(2Δs) W over its steps, with xⁿ the old mesh, Φ the place of the path
+    /// in ξ, Δs the step and W the normal increment. Its mean is zero, and it varies with the position that the path
+    /// finds, so that the difference has less variance.
     #[serde(default)]
     pub control_variate: bool,
-    /// All points use the same random numbers: neighbours then have similar errors, which bend the mesh less.
+    /// Whether all interface points use the same random numbers: neighbouring nodes then have similar errors, which
+    /// bend the mesh less.
     #[serde(default)]
     pub common: bool,
 }
 
-/// Largest number of paths, of paths from a Sobol sequence, and of substeps.
+/// Largest number of paths that start at a point: more than any run could afford.
 const MAX_PATHS: usize = 1 << 31;
+/// Largest number of paths that start at a point and take their increments from a Sobol sequence.
 const MAX_SOBOL_PATHS: usize = 1 << 16;
+/// Largest number of substeps of a path in a time step.
 const MAX_SUBSTEPS: usize = 100_000;
 /// Number of independent scramblings of the Sobol sequence.
 const SCRAMBLINGS: usize = 4;
-/// Blocks of random words from this number on decide exits; those before are for increments.
+/// Blocks of random words with this bit in their number decide whether a path leaves the domain; those without give its
+/// increments.
 const EXITS: u32 = 1 << 31;
 
 impl MonteCarlo {

@@ -23,12 +23,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Strip {
-    /// Nodes beyond each cut that a subdomain solves for with its own, from 1 to the number of cells of the narrowest
-    /// subdomain.
+    /// Width of the strip beyond each cut, in nodes, that a subdomain solves for together with its own nodes: from 1 to
+    /// the number of cells of the narrowest subdomain. "auto" takes as many as leave the nodes beyond an influence
+    /// below a thousandth if ten are enough for that, else eight.
     pub width: Auto<usize>,
-    /// Cells along each axis that make one cell of the coarse lattice; 1 for no coarse lattice.
+    /// Cells along each axis that make one cell of the coarse lattice, from whose solution the strips start; 1 for no
+    /// coarse lattice. "auto" takes 2 where ten nodes of strip are not enough, else 1.
     pub coarse: Auto<usize>,
-    /// Exchanges between neighbours in a step; "auto" adds some to the first while it is not enough.
+    /// Exchanges between neighbours in a step; "auto" goes on with them until the error that is left is estimated at no
+    /// more than a hundredth of the shortest edge of the mesh.
     pub exchanges: Auto<usize>,
 }
 

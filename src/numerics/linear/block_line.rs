@@ -13,7 +13,8 @@ use crate::work::Work;
 #[derive(Debug, Clone, Default)]
 pub struct BlockElimination {}
 
-/// The solution is refined by its residual so often.
+/// Largest number of solves with the factors, before the system counts as not solved: the first one, and refinements by
+/// the residual.
 const REFINED: usize = 3;
 
 type Block<const B: usize> = [[f64; B]; B];

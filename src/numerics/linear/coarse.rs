@@ -97,7 +97,7 @@ impl<const B: usize> Cycle<B> {
         self.count > 0
     }
 
-    /// The same by incomplete elimination of the matrix alone.
+    /// Solves approximately by incomplete elimination alone, without coarse levels.
     pub fn eliminate(&self, a: &BlockMatrix<2, 9, B>, v: &[[f64; B]], x: &mut [[f64; B]]) {
         self.finest.ilu.solve(a, v, x);
     }

@@ -12,7 +12,8 @@ use crate::work::Work;
 #[derive(Debug, Clone, Default)]
 pub struct Elimination {}
 
-/// The solution is refined by its residual so often.
+/// Largest number of solves with the factors, before the system counts as not solved: the first one, and refinements by
+/// the residual.
 const REFINED: usize = 3;
 
 impl<const K: usize> LinearSolver<1, 3, K> for Elimination {

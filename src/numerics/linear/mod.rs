@@ -251,7 +251,7 @@ pub type Robust<const K: usize> = Fallback<Bicgstab<K>, SparseLu>;
 /// [`Robust`] for B unknowns at a node that convection and diffusion couple to all nine points around it.
 pub type RobustTransport<const B: usize> = Fallback<TransportBicgstab<B>, SparseLu>;
 
-/// The same on a line.
+/// [`RobustTransport`] on a line.
 pub type RobustLine = Fallback<BlockElimination, SparseLu>;
 
 /// [`Robust`] for B coupled unknowns at a node.

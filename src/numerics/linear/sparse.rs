@@ -3,7 +3,7 @@ use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMat, Triplet};
 
-/// Refinements of a solution at most.
+/// Largest number of solves with the factors: the first one, and refinements by the residual.
 const PASSES: usize = 4;
 
 /// A square sparse system of any pattern, solved by faer's sparse LU with refinement
@@ -56,6 +56,7 @@ impl SparseSystem {
     /// # Errors
     /// [`Failure::LinearStalled`] where this bound is not met: the matrix is singular, or nearly so.
     pub fn solve(&mut self, b: &[f64]) -> Result<Vec<f64>, Failure> {
+        /// Largest residual of a row, as a share of the sum of the absolute values of its terms: some round-offs.
         const TOLERANCE: f64 = 1e-13;
         let n = self.unknowns;
         let mut x = vec![0.0; n];

@@ -19,7 +19,8 @@ pub struct TransportBicgstab<const B: usize> {
     krylov: Krylov<B>,
 }
 
-/// Products that a solve with coarse levels may take. It takes four to ten where these are of use, on any lattice.
+/// Largest number of products with the matrix in a solve with coarse levels, before elimination alone is tried. It
+/// takes four to ten where levels are of use, on any lattice.
 const PATIENCE: usize = 24;
 
 impl<const B: usize> LinearSolver<2, 9, B, [[f64; B]; B]> for TransportBicgstab<B> {

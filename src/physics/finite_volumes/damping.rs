@@ -47,10 +47,11 @@ pub(super) enum Derivative {
     Upwind,
 }
 
-/// a is limited to this multiple of the largest speed of the flow itself along the axis: else a mesh that moves at the
-/// start, however short the step is, would smear what rests.
+/// Largest a in the formula of [`Damping`], as a multiple of the largest ½ Δt F′·N of the flow along the axis: without
+/// a limit a mesh that moves fast at the start would smear a solution at rest, however short the step is.
 const SWEEPS: f64 = 4.0;
-/// Smallest θ: less would take away more than half of the diffusion that upwind fluxes have.
+/// Smallest θ in the formula of [`Damping`]: a smaller one would remove more than half of the diffusion that upwind
+/// fluxes have.
 const LEAST: f64 = -0.5;
 
 /// w, from 0 for cells that are fine enough for central fluxes to 1 for those in which they are limited in full: by the
@@ -105,9 +106,9 @@ struct Origin {
 struct Sent<const B: usize> {
     /// The fluxes, as if both nodes had the values of one.
     fluxes: [[f64; B]; 2],
-    /// Derivatives of ½ Δt times these.
+    /// Derivatives of ½ Δt times the fluxes.
     still: [Block<B>; 2],
-    /// The same relative to the nodes of the mesh.
+    /// Derivatives of ½ Δt times the fluxes relative to the moving nodes of the mesh.
     moving: [Block<B>; 2],
     /// Half of the area that the face sweeps.
     swept: f64,

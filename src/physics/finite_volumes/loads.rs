@@ -8,7 +8,7 @@ use crate::geometry::{Cells, Mesh, determinant, strides};
 /// Gauss points along each axis of a cell, on (0, 1), and their weights.
 const POINTS: [(f64, f64); 3] = [(0.1127016653792583, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.8872983346207417, 5.0 / 18.0)];
 
-/// Where σ is below this, cells are equal but for rounding.
+/// Cells with a σ below this count as equal cells: the difference is rounding.
 const EQUAL: f64 = 1e-9;
 
 impl<const D: usize> Half<'_, D>

@@ -12,13 +12,14 @@ use crate::work::Work;
 const MAX_NEWTON: usize = 30;
 /// Largest number of halvings of a correction that leads to where a formula has no value, such as a root below 0.
 const RETREATS: usize = 8;
-/// The damping follows the values up to this number of Newton steps done, and is then frozen, so that the iteration
-/// converges. From the values at the start alone a step would be of the first order.
+/// Number of Newton steps after which the damping κ follows the newest values no longer, so that the iteration
+/// converges. With κ from the values at the start of the time step alone the step would be of first order.
 const FOLLOWED: usize = 1;
-/// The same where the flow crosses more than a cell in a step: there a solution would never come to rest otherwise.
+/// As [`FOLLOWED`] where the flow crosses more than a cell in a time step: with a smaller number no solution would
+/// become steady there.
 const FOLLOWED_ACROSS_CELLS: usize = 10;
-/// The damping is frozen sooner once residuals are below this share of those at the start: what κ still changes is
-/// small then beside what the step does.
+/// The damping κ is frozen sooner once residuals are below this share of those at the start: changes of κ are then
+/// small beside the change of the solution in the step.
 const FOLLOWED_TO: f64 = 1e-3;
 /// From this number of Newton steps on κ goes only half of the way to what the newest values give: a κ that has not
 /// settled by then, as at a shock within a cell, swings between two states, and half-way it comes to rest between them.

@@ -5,8 +5,8 @@ use super::Side;
 use crate::geometry::{DualCells, Patch, strides};
 use crate::numerics::sum;
 
-/// Largest distance, in nodes along each axis, in which a node that lacks something searches for it before all nodes
-/// are asked.
+/// Largest distance, in nodes along each axis, within which a node whose value is beyond its bound takes what it lacks
+/// from others, before it takes it from all nodes.
 const REACH: usize = 8;
 
 /// Sets values that are beyond an end of their range, a lower and an upper one for each unknown, to that end, and takes
@@ -136,7 +136,7 @@ mod tests {
         }
     }
 
-    /// Far from all that there is every node gives something; more than all have stays missing.
+    /// A node far from all others that have something takes from every node; what exceeds the sum of all stays missing.
     #[test]
     fn what_nobody_has_is_left() {
         let mesh = Mesh::uniform(Lattice::bounded([20]).unwrap(), [0.0], [1.0]).unwrap();

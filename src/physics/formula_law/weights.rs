@@ -8,8 +8,8 @@ use crate::physics::finite_volumes::BISTABLE;
 /// values pull the front: full coupling (1) reaches 0.27ⁿ of n nodes ahead at once and starts growth there, none makes
 /// the speed of the front wrong to second order in wide cells.
 const PULLED: f64 = 0.5;
-/// No mass is shared where D in the unstable state ahead of a front is below this share of the largest D: nothing would
-/// damp what overshoots there.
+/// No mass is shared where D in the unstable state ahead of a front is below this share of the largest D: diffusion
+/// would not damp overshoots there.
 const DAMPS: f64 = 0.5;
 /// A state rests where the source is at most this share of the largest source.
 const RESTS: f64 = 1e-3;

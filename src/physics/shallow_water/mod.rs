@@ -70,8 +70,8 @@ pub struct ShallowWater {
     pub pile: f64,
     /// Radius of the pile at half of its height, above 0.
     pub radius: f64,
-    /// Width of the pile's edge, above 0: the distance over which it falls from half of its height by tanh(1) = .76 of
-    /// that.
+    /// Width of the pile's edge, above 0: at the distance `radius` + `width` from the centre of the box (1 − tanh 1)/2
+    /// = 12 % of its height are left.
     pub width: f64,
 }
 

@@ -65,7 +65,7 @@ impl<const G: usize> Grid<'_, G> {
         self.fill_ends(t, i, &mut u1[to..][..w]);
     }
 
-    /// Its time is that of the first stage.
+    /// The second stage of RK4 for a row; its time is that of the first stage.
     #[inline(always)]
     fn second_stage(&self, stages: &Stages<'_, G>, i: isize, u1: &[f64], u2: &mut [f64]) {
         let (w, n, to) = (self.width, self.size[1], self.slot(i));

@@ -43,6 +43,7 @@ impl<const G: usize> Stencil<G> {
     /// maps every Δt·λ into the unit disc. The real and the imaginary part, diffusion and convection, are taken
     /// together.
     pub(super) fn stable_step(&self, speed: f64) -> f64 {
+        /// Number of angles θ in (0, π] along each axis at which the step must be stable.
         const ANGLES: usize = 16;
         let axis = |d: usize| -> [[f64; 2]; ANGLES] {
             from_fn(|a| {
