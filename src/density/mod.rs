@@ -19,7 +19,7 @@ pub use curvature::Curvature;
 pub use given::Given;
 pub(crate) use jump::{edges, largest_step};
 pub use limited::CellSizes;
-pub(crate) use need::Need;
+pub(crate) use need::{Need, interpolation_errors};
 pub use noise::{NOISE_WORTH_A_WARNING, noise};
 pub use root_gradient::RootGradient;
 pub use smoothing::smooth;

@@ -22,6 +22,10 @@ const KEPT: f64 = 0.25;
 /// even.
 const UNEVEN: [f64; 2] = [0.4, 0.7];
 
+/// Error of linear interpolation on a mesh over that on equal cells, up to which the density counts in full, and from
+/// which on not at all: it may draw nodes to steep slopes of smooth u and leave too few where u bends most.
+const LOSS: [f64; 2] = [1.0, 1.5];
+
 /// The need for a density that is not even
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Need {
@@ -55,6 +59,52 @@ impl Need {
     /// resolve u, 1 where they do not.
     pub fn by_bends(self, share: f64) -> f64 {
         between(BENDS.map(|limit| self.kept * limit), share)
+    }
+}
+
+/// What of its density a mesh keeps: 1 where its error of interpolation, as the root of its mean square, is no more than
+/// that of equal cells, 0 where it is half as large again.
+pub(super) fn worth<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> f64 {
+    let mut squares = [0.0; 2];
+    for_each_error(mesh, u, |volume, errors| {
+        squares.iter_mut().zip(errors).for_each(|(sum, error)| *sum += volume * error * error);
+    });
+    let [here, equal] = squares.map(f64::sqrt);
+    // u that is linear, or not finite, has none
+    if here > equal { 1.0 - between(LOSS, here / equal) } else { 1.0 }
+}
+
+/// The largest errors of linear interpolation along the lattice: on a mesh, and on equal cells.
+pub(crate) fn interpolation_errors<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> [f64; 2] {
+    let [mut here, mut equal] = [0.0; 2];
+    for_each_error(mesh, u, |_, errors| {
+        here = larger(here, errors[0]);
+        equal = larger(equal, errors[1]);
+    });
+    [here, equal]
+}
+
+/// Tells, for every node and axis, about how much volume the node has, and the errors h² |u''|/8 of linear interpolation
+/// along the lattice line: with the longer of the two edges beside the node, and with equal cells of size h.
+fn for_each_error<const D: usize>(mesh: &Mesh<D>, u: &[f64], mut see: impl FnMut(f64, [f64; 2])) {
+    let lattice = mesh.lattice();
+    let patch = Patch { origin: [0; D], size: lattice.nodes(), wraps: lattice.periodic() };
+    let h: [f64; D] = std::array::from_fn(|d| mesh.extent()[d] / lattice.cells()[d] as f64);
+    let x = padded(lattice, mesh.x(), mesh.jump());
+    let u = padded(lattice, u.as_chunks::<1>().0, [[0.0]; D]);
+    let strides = patch.padded_strides();
+    for k in patch.places() {
+        let edge = |n: usize| length(std::array::from_fn::<f64, D, _>(|c| x[n][c] - x[k][c]));
+        let edges = strides.map(|s| [edge(k - s), edge(k + s)]);
+        let volume = edges.iter().map(|[below, above]| 0.5 * (below + above)).product::<f64>();
+        for ([below, above], (s, h)) in edges.into_iter().zip(strides.into_iter().zip(h)) {
+            // beyond a side there is no edge
+            if below > 0.0 && above > 0.0 {
+                let slopes = [(u[k][0] - u[k - s][0]) / below, (u[k + s][0] - u[k][0]) / above];
+                let bend = (2.0 * (slopes[1] - slopes[0]) / (above + below)).abs();
+                see(volume, [below.max(above), h].map(|h| h * h * bend / 8.0));
+            }
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 use super::jump::jump;
-use super::need::{Need, bends, between};
+use super::need::{Need, bends, between, worth};
 use super::{Density, Monitor, smoothing::smooth_widely};
 use crate::error::{Failure, Result};
 use crate::geometry::{Cells, Field, Lattice, Mesh, check_finite, check_length, dot, strides};
@@ -189,9 +189,10 @@ impl<const D: usize> Followed<D> {
             let bends = if all < 1.0 || by_slopes.iter().any(|s| *s < 1.0) { bends(mesh, u) } else { [0.0; D] };
             let by_bends = bends.map(|bend| need.by_bends(bend / range));
             let all = by_bends.iter().copied().fold(all, f64::max);
+            let worth = if all > 0.0 { worth(mesh, u) } else { 1.0 };
             for d in 0..D {
                 // u that is not finite everywhere is told of by its density
-                let own = if steepest.is_finite() { all.min(by_slopes[d].max(by_bends[d])) } else { 1.0 };
+                let own = if steepest.is_finite() { worth * all.min(by_slopes[d].max(by_bends[d])) } else { 1.0 };
                 needs[d] = f64::max(needs[d], own);
             }
             match slopes.is_empty() {

@@ -1,8 +1,8 @@
 //! What a mesh may do to the solution on its way.
 
 use super::State;
-use crate::density::{Need, largest_step};
-use crate::geometry::{Cells, DualCells, Field, Mesh, Patch, length, padded};
+use crate::density::{Need, interpolation_errors, largest_step};
+use crate::geometry::{Cells, DualCells, Field, Mesh, length, padded};
 use crate::numerics::difference::Metrics;
 use crate::numerics::larger;
 
@@ -103,7 +103,7 @@ where
         let unresolved = Need::OF_EQUAL_CELLS.by_slopes(over_cell);
         let of_change = OF_CHANGE + unresolved * (WHERE_UNRESOLVED - OF_CHANGE);
         let uniform = INTERPOLATION * over_cell * over_cell;
-        let [here, equal] = of_bends(places, &patch, &u, h);
+        let [here, equal] = interpolation_errors(places, &values);
         let excess = (INTERPOLATION * jump * jump - uniform).max((here - equal) / range).max(0.0);
         let budget = MOST.min(OF_UNIFORM * uniform) * dt / span + of_change * hurry * state.own_change * dt + excess;
         way.harm = larger(way.harm, harm);
@@ -112,29 +112,6 @@ where
         }
     }
     Way { harm: way.share * way.harm, ..way }
-}
-
-/// The largest errors h² |u''|/8 of linear interpolation along the lattice, from padded values: with the longer of the
-/// two edges beside a node, and with equal cells of size `h` along each axis.
-fn of_bends<const D: usize>(mesh: &Mesh<D>, patch: &Patch<D>, u: &[f64], h: [f64; D]) -> [f64; 2]
-where
-    Mesh<D>: Cells<D>,
-{
-    let x = padded(mesh.lattice(), mesh.x(), mesh.jump());
-    let [mut here, mut equal] = [0.0; 2];
-    for k in patch.places() {
-        for (d, s) in patch.padded_strides().into_iter().enumerate() {
-            let [below, above] =
-                [k - s, k + s].map(|n| length(std::array::from_fn::<f64, D, _>(|c| x[n][c] - x[k][c])));
-            // beyond a side there is no edge
-            if below > 0.0 && above > 0.0 {
-                let bend = (2.0 * ((u[k + s] - u[k]) / above - (u[k] - u[k - s]) / below) / (above + below)).abs();
-                here = larger(here, below.max(above).powi(2) * bend / 8.0);
-                equal = larger(equal, h[d] * h[d] * bend / 8.0);
-            }
-        }
-    }
-    [here, equal]
 }
 
 /// What the solution changes by itself in a unit of time: the largest change of an unknown at a fixed place in a step,
