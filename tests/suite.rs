@@ -20,6 +20,7 @@ mod domains;
 mod doubts;
 mod equidistribution;
 mod errors;
+mod few_cells;
 mod floors;
 mod forced;
 mod forming;

@@ -62,8 +62,8 @@ impl Need {
     }
 }
 
-/// What of its density a mesh keeps: 1 where its error of interpolation, as the root of its mean square, is no more than
-/// that of equal cells, 0 where it is half as large again.
+/// The share of its density that counts on a mesh: 1 where its error of interpolation, the root of the mean square, is
+/// no more than that of equal cells, 0 where it is half as large again.
 pub(super) fn worth<const D: usize>(mesh: &Mesh<D>, u: &[f64]) -> f64 {
     let mut squares = [0.0; 2];
     for_each_error(mesh, u, |volume, errors| {
@@ -84,8 +84,8 @@ pub(crate) fn interpolation_errors<const D: usize>(mesh: &Mesh<D>, u: &[f64]) ->
     [here, equal]
 }
 
-/// Tells, for every node and axis, about how much volume the node has, and the errors h² |u''|/8 of linear interpolation
-/// along the lattice line: with the longer of the two edges beside the node, and with equal cells of size h.
+/// Tells, for every node and axis, about how much volume the node has, and the errors h² |u''|/8 of interpolation along
+/// the lattice line: with the longer of the two edges beside the node, and with equal cells of size h.
 fn for_each_error<const D: usize>(mesh: &Mesh<D>, u: &[f64], mut see: impl FnMut(f64, [f64; 2])) {
     let lattice = mesh.lattice();
     let patch = Patch { origin: [0; D], size: lattice.nodes(), wraps: lattice.periodic() };
