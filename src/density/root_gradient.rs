@@ -33,10 +33,11 @@ use std::borrow::Cow;
 /// quarter of its range over a uniform cell somewhere, or by more than 0.09 bends both ways. Along an axis it is no
 /// larger than what √D g_d, or the bends along that axis, have by the same limits. On a mesh that is not even any more
 /// these limits are down to a quarter as large: it goes back to equal cells late. But where it interpolates u with a
-/// larger error than equal cells, in the mean, s falls: to 0 where the error is half as large again. Where the largest |g_d| is less than
-/// twice (⟨|g_d|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes could be taken, and
-/// s_d is 0; from four times on this does not matter. The largest ρ over the smallest is at most 10⁶, and 500 where an
-/// edge shorter than a twentieth of a uniform cell holds half of the range of u, which is then a jump.
+/// larger error than equal cells, in the mean, s falls: to 0 where the error is half as large again. Where the largest
+/// |g_d| is less than twice (⟨|g_d|^⅛⟩)⁸, as in a wave train that fills the domain, there is no place from which nodes
+/// could be taken, and s_d is 0; from four times on this does not matter. The largest ρ over the smallest is at most
+/// 10⁶, and 500 where an edge shorter than a twentieth of a uniform cell holds half of the range of u, which is then a
+/// jump.
 ///
 /// Along an axis of n nodes round(8 (n/41)²) passes of the filter (1 2 1)/4 follow, at least one: a width of a
 /// twentieth of the domain. Where lattice lines along it meet k > 2 layers on average there are (2/k)² as many. Their
