@@ -37,7 +37,7 @@ impl Need {
     /// The need of equal cells, whatever the mesh is.
     pub const OF_EQUAL_CELLS: Self = Self { kept: 1.0 };
 
-    /// On a mesh.
+    /// The need on a mesh, which is larger where the mesh is uneven.
     pub fn on<const D: usize>(mesh: &Mesh<D>) -> Self
     where
         Mesh<D>: Cells<D>,
