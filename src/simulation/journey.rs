@@ -14,8 +14,8 @@ const OF_UNIFORM: f64 = 0.25;
 /// Moving the nodes in a step may add this share of what the solution changes by itself.
 const OF_CHANGE: f64 = 0.2;
 /// Moving the nodes in a step may add this share of what the solution changes by itself where equal cells do not
-/// resolve the unknown, as when a layer forms: it gets thinner while the mesh is on its way, and a mesh that is too slow
-/// never arrives.
+/// resolve the unknown, as when a layer forms: it gets thinner while the mesh is on its way, and a mesh that is too
+/// slow never arrives.
 const WHERE_UNRESOLVED: f64 = 1.0;
 /// Linear interpolation of a layer that changes by the share g of its range over a cell has an error of this times g²,
 /// as a share of the range.
